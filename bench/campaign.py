@@ -178,7 +178,6 @@ def make_run(request: RunRequest, place: Path) -> None:
                 candidates=[candidate.to_json()],
                 seconds=0.0001,
                 requirement=problem.name,
-                told=i,
                 elapsed=0.01 * i,
             )
         )

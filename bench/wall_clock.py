@@ -5,7 +5,7 @@
     python bench/wall_clock.py --methods surrogate --jobs 1 2 --requirements AT6a PulseMeter --slower 0.3
     python bench/wall_clock.py --peer PEER/bin/python             # psy-taliro too, see peers.py
 
-A method is an engine, with the objective after a colon. A run that finds nothing in --seconds counts as that.
+A run that finds nothing in --seconds counts as that.
 The methods take turns seed by seed, so that another load of the machine hits all of them. Seconds are those
 of a run until its counterexample is confirmed, with the start of the FMU and of worker processes, without
 loading the spec and without the start of psy-taliro's process, which searches the fixed parameterization;
@@ -34,7 +34,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import confirm
 
 REQUIREMENTS = ("AT1", "AT6a", "CC3", "PulseMeter", "ChargerHandshake", "HeaterLimpHome")
-METHODS = ("surrogate:time", "surrogate:simulations", "uniform", "corners", "cma", "coverage")
+METHODS = ("surrogate", "uniform", "corners", "cma", "coverage")
 
 
 @dataclass(frozen=True)
@@ -77,15 +77,7 @@ class Run:
 
 def run(problem: Problem, method: str, *, jobs: int, seed: int, seconds: float) -> Run:
     """Search with one engine."""
-    engine, _, objective = method.partition(":")
-    result = falsify(
-        problem,
-        engine,
-        objective="time" if objective == "time" else "simulations",
-        budget=Budget(None, seconds=seconds),
-        jobs=jobs,
-        seed=seed,
-    )
+    result = falsify(problem, method, budget=Budget(None, seconds=seconds), jobs=jobs, seed=seed)
     return Run(result.falsified, result.spent.simulations, result.spent.seconds)
 
 

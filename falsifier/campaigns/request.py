@@ -11,7 +11,6 @@ from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.moves import Objective
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 
@@ -37,7 +36,6 @@ class Method:
         anonymous: whether prompts use neutral names.
         fallback: engine to switch to if the language model fails, or empty.
         together: whether several requirements shared one search.
-        objective: ``simulations`` or ``time``.
     """
 
     engine: str = ""
@@ -50,7 +48,6 @@ class Method:
     anonymous: bool = False
     fallback: str = ""
     together: bool = False
-    objective: Objective = "simulations"
 
     @property
     def label(self) -> str:
@@ -64,7 +61,6 @@ class Method:
             "neutral names": self.anonymous,
             f"fallback {self.fallback}": bool(self.fallback),
             "shared search": self.together,
-            f"objective {self.objective}": self.objective != "simulations",
         }
         return ", ".join([name, *(text for text, applies in apart.items() if applies)])
 
@@ -130,7 +126,6 @@ def cross(
             llm=_llm_settings(method, asking),
             seed=seed,
             budget=budget,
-            objective=method.objective,
             keep="best",
         )
         for problem in problems
@@ -153,7 +148,6 @@ def method_of(request: RunRequest) -> Method:
         anonymous=llm.anonymous,
         fallback=llm.fallback or "",
         together=len(request.problems) > 1,
-        objective=request.objective or "time",
     )
 
 

@@ -48,7 +48,6 @@ from falsifier.cli.options import (
     jobs_option,
     json_option,
     limit_options,
-    objective_option,
     out_option,
     parameterization_option,
     policy_changes,
@@ -64,9 +63,8 @@ from falsifier.core.words import counted
 from falsifier.llm.messages import Effort
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import ProblemSource
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.make_engines import price_of
-from falsifier.search.moves import Objective
 from falsifier.search.request import LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
 from falsifier.views.terminal import warn
@@ -113,10 +111,9 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 )
 @seed_option("Random seed of the first run; the others count up.")
 @budget_option(
-    shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}; with --objective time none",
+    shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}",
     note=" per run",
 )
-@objective_option
 @limit_options(note=" per run")
 @total_options
 @click.option(
@@ -150,7 +147,6 @@ def bench(
     runs: int,
     seed: int,
     budget: int | None,
-    objective: Objective | None,
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -185,17 +181,14 @@ def bench(
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
-    methods = [
-        replace(method, objective=objective or "simulations")
-        for method in _methods(engines, llms, effort, variants, parameterization, profile or "", how)
-    ]
+    methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
     limits = (total_budget, total_seconds, total_tokens, total_cost)
     request = CampaignRequest(
         runs=cross(
             problems,
             methods,
             seeds=range(seed, seed + runs),
-            budget=budget_of(budget, seconds, max_tokens, max_cost, objective=objective, default=usual),
+            budget=Budget(usual if budget is None else budget, seconds, max_tokens, max_cost),
             asking=how,
         ),
         limits=Budget(*limits) if any(x is not None for x in limits) else None,

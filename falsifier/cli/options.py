@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS
+from falsifier.search.budget import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
     from falsifier.problem.sections import ModelChanges
@@ -217,15 +217,6 @@ def budget_option(
         show_default=True if shown is None else shown,
         help=f"Maximum number of simulations{note}.",
     )
-
-
-def objective_option(command: Function) -> Function:
-    return click.option(
-        "--objective",
-        type=click.Choice(["simulations", "time"]),
-        help="What to keep small: with time, cheap proposals are simulated while the engine thinks or beside "
-        f"it, and without limits the run ends after {DEFAULT_SECONDS:g} s. Default: simulations.",
-    )(command)
 
 
 def limit_options(*, note: str = "") -> Decorator:

@@ -23,7 +23,6 @@ from falsifier.cli.options import (
     jobs_option,
     json_option,
     limit_options,
-    objective_option,
     out_option,
     problem_options,
     problem_source,
@@ -35,14 +34,13 @@ from falsifier.cli.options import (
 from falsifier.cli.output import conclude
 from falsifier.core.files import bundled, file_name
 from falsifier.errors import FalsifierError, JournalError, SpecError
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget, budget_of
+from falsifier.search.budget import Budget
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # imported where used, so that --help prints at once
     from falsifier.core.candidate import Candidate
     from falsifier.problem.problem import Problem
     from falsifier.problem.source import ProblemSource
-    from falsifier.search.moves import Objective
     from falsifier.search.result import Result
 
 # If several requirements end differently, the first of these that occurs decides.
@@ -70,8 +68,7 @@ class _OneTarget(click.Command):
 @engine_option()
 @llm_options
 @context_option
-@budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --objective time none")
-@objective_option
+@budget_option()
 @limit_options()
 @seed_option()
 @jobs_option("simulations")
@@ -95,8 +92,7 @@ class _OneTarget(click.Command):
 def run(
     *,
     engine: str | None,
-    budget: int | None,
-    objective: "Objective | None",
+    budget: int,
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
@@ -145,8 +141,7 @@ def run(
             engine,
             llm=llm,
             seed=seed,
-            budget=budget_of(budget, seconds, max_tokens, max_cost, objective=objective),
-            objective=objective,
+            budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=known,

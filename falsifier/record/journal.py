@@ -125,8 +125,6 @@ class Journal:
                         candidates=[c.to_json() for c in event.candidates],
                         seconds=event.seconds,
                         requirement=event.problem.name,
-                        proposer=event.proposer,
-                        told=event.told,
                         elapsed=event.spent.seconds,
                     )
                 )

@@ -11,7 +11,6 @@ from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Status
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding, FindingKind
-from falsifier.search.moves import Proposer
 from falsifier.stl import Breach
 from falsifier.stl.verdict import Verdict
 
@@ -34,8 +33,6 @@ class AskedRecord(_Record):
     candidates: list[dict[str, Any]]
     seconds: float
     requirement: str = Field(description="Requirement whose engine was asked.")
-    proposer: Proposer = Field("engine", description="Who was asked: the engine, or the scout beside it.")
-    told: int = Field(description="Number of evaluations that it had been told: all with a smaller index.")
     elapsed: float = _ELAPSED
 
 

@@ -29,7 +29,6 @@ from falsifier.record.records import (
     spent_of,
 )
 from falsifier.search.budget import Spent
-from falsifier.search.moves import Ask, Move
 from falsifier.search.proposals import proposals
 from falsifier.search.steps import Steps
 
@@ -60,13 +59,6 @@ class Replayed:
 
     def __post_init__(self) -> None:
         self.replayed = len(self.evaluations)
-
-    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
-        """Repeat the recorded moves: ask the same proposer once as much has been told as then."""
-        record = self.asked.get(self._next)
-        if record is None:
-            return decide()
-        return Ask(record.proposer, record.n) if settled >= record.told else None
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Let the engine repeat its recorded suggestions.

@@ -26,12 +26,11 @@ from falsifier.record import manifest
 from falsifier.record.journal import holds_lines, holds_run, open_journal, write_manifest
 from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
-from falsifier.search.budget import Budget, budget_of, what_counts
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.events import Listener
 from falsifier.search.levels import Level
 from falsifier.search.loop import search
-from falsifier.search.make_engines import make_engines, make_scouts, told_problems
-from falsifier.search.moves import Objective
+from falsifier.search.make_engines import make_engines, told_problems
 from falsifier.search.refine import level_starts, levels_of, make_refining
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
@@ -48,7 +47,6 @@ def falsify(
     *,
     llm: LLM | None = ...,
     budget: Budget | int | None = ...,
-    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -65,7 +63,6 @@ def falsify(
     *,
     llm: LLM | None = ...,
     budget: Budget | int | None = ...,
-    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -83,7 +80,6 @@ def falsify(
     *,
     llm: LLM | None = ...,
     budget: Budget | int | None = ...,
-    objective: Objective | None = ...,
     seed: int = ...,
     directory: Path | str | None = ...,
     jobs: int = ...,
@@ -99,7 +95,6 @@ def falsify(
     *,
     llm: LLM | None = None,
     budget: Budget | int | None = None,
-    objective: Objective | None = None,
     seed: int = 0,
     directory: Path | str | None = None,
     jobs: int = 1,
@@ -118,12 +113,7 @@ def falsify(
         engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
             if one is given.
         llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
-        budget: limits; a plain number limits the simulations. Default: 100 simulations, or 60 s if time is
-            the objective.
-        objective: ``"simulations"``: find a violation in few simulations; ``"time"``: in little time, so
-            that cheap proposals are simulated while the engine thinks or beside it, as long as a simulation
-            takes less time than a proposal. Default: simulations if the budget limits their number,
-            otherwise time.
+        budget: limits; a plain number limits the simulations. Default: 100 simulations.
         seed: seed of an engine given by name.
         directory: where to record the run, so that it can be resumed; None: no record.
         jobs: number of simulations at a time.
@@ -155,9 +145,7 @@ def falsify(
     check_names(problems)
     _check_engine(engine)
     seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
-    limits = _budget(budget, objective)
-    if objective not in (None, "simulations", "time"):
-        raise SpecError(f"objective: expected 'simulations' or 'time', got {objective!r}")
+    limits = _budget(budget)
     if refine and not isinstance(engine, str | None):
         raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
     groups, known = alike(problems), list(start_from)
@@ -175,7 +163,6 @@ def falsify(
             seed=seed,
             budget=limits,
             jobs=jobs,
-            objective=what_counts(objective, limits),
             start_from=tuple(fit(space, each).candidate.to_json() for each in known),
         )
         place = None if directory is None else Path(directory)
@@ -304,7 +291,6 @@ def carry_out(
         recorded = manifest.read(directory).contexts if begun and directory else {}
         told = told_problems(request, problems, described.contexts if described else recorded)
         made = [engine] if engine is not None else _engines(request, told, levels, chat)
-        scouts = make_scouts(request, problems)
         known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         for problem in problems:
@@ -326,8 +312,6 @@ def carry_out(
             engines,
             request.budget,
             steps=steps,
-            scouts=scouts,
-            objective=request.objective,
             jobs=request.jobs,
             in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in made),
             levels=levels,
@@ -379,10 +363,10 @@ def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
     return tuple(s for s in sources if s is not None) if all(sources) else ()
 
 
-def _budget(given: Budget | int | None, objective: Objective | None = None) -> Budget:
+def _budget(given: Budget | int | None) -> Budget:
     if isinstance(given, Budget):
         return given
-    return budget_of(None if given is None else whole("budget", given, least=1), objective=objective)
+    return Budget(DEFAULT_SIMULATIONS if given is None else whole("budget", given, least=1))
 
 
 def _changed(budget: Budget, given: Budget | int) -> Budget:

@@ -6,12 +6,9 @@ from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.llm.messages import Usage
-from falsifier.search.moves import Objective
 
 # Maximum number of simulations of a run if nothing else is said.
 DEFAULT_SIMULATIONS = 100
-# The same in s of a run that is to be fast, however many simulations that takes.
-DEFAULT_SECONDS = 60.0
 
 
 class LimitReached(FalsifierError):
@@ -25,7 +22,6 @@ class Spent:
     Attributes:
         simulations: number of simulated candidates, including failed simulations.
         failures: number of simulations among them that failed, crashed or timed out.
-        scouts: number of simulations among them whose candidates the scout proposed.
         seconds: wall-clock time of the run.
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
@@ -48,7 +44,6 @@ class Spent:
     cost: float | None = 0.0
     failures: int = 0
     timed_out: int = 0
-    scouts: int = 0
 
     @property
     def has_mostly_failed(self) -> bool:
@@ -90,7 +85,7 @@ class Budget:
         cost: maximum amount in US dollars spent on a language model.
     """
 
-    simulations: int | None = 100
+    simulations: int | None = DEFAULT_SIMULATIONS
     seconds: float | None = None
     tokens: int | None = None
     cost: float | None = None
@@ -130,37 +125,3 @@ class Budget:
     def seconds_left(self, spent: Spent) -> float | None:
         """Seconds that the budget still allows; None without a limit."""
         return None if self.seconds is None else max(0.0, self.seconds - spent.seconds)
-
-
-def what_counts(objective: Objective | None, budget: Budget) -> Objective | None:
-    """Return what counts in a run: what the user said, else simulations if the budget limits their number.
-
-    None: time, as long as a simulation takes less of it than a proposal.
-    """
-    return "simulations" if objective is None and budget.simulations is not None else objective
-
-
-def budget_of(
-    simulations: int | None,
-    seconds: float | None = None,
-    tokens: int | None = None,
-    cost: float | None = None,
-    *,
-    objective: Objective | None = None,
-    default: int = DEFAULT_SIMULATIONS,
-) -> Budget:
-    """Return the budget for what a user has limited, with a default limit if nothing else fits.
-
-    Args:
-        simulations: maximum number of simulations; None: the default, or no limit if time is the objective.
-        seconds: maximum wall-clock time in s; None: no limit, or DEFAULT_SECONDS if nothing else is limited.
-        tokens: see Budget.
-        cost: see Budget.
-        objective: what counts; None: not said.
-        default: default number of simulations.
-    """
-    if objective != "time":
-        simulations = default if simulations is None else simulations
-    elif simulations is None and seconds is None:
-        seconds = DEFAULT_SECONDS
-    return Budget(simulations, seconds, tokens, cost)

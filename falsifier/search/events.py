@@ -11,7 +11,6 @@ from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.levels import Level
-from falsifier.search.moves import Proposer
 from falsifier.search.result import Result, ResultStatus
 
 
@@ -46,8 +45,6 @@ class Asked:
         candidates: what the engine suggested.
         seconds: how long it took.
         problem: the problem that the engine works on.
-        proposer: who was asked: the engine, or the scout beside it.
-        told: number of evaluations that it had been told, all with a smaller index.
         spent: what the run has spent so far.
     """
 
@@ -56,8 +53,6 @@ class Asked:
     candidates: tuple[Candidate, ...]
     seconds: float
     problem: Problem
-    proposer: Proposer = "engine"
-    told: int
     spent: Spent
 
 

@@ -28,7 +28,6 @@ from falsifier.search.events import (
     RunStarted,
 )
 from falsifier.search.levels import Level, reached
-from falsifier.search.moves import Ask, Costs, Move, Objective, Proposer, Situation, next_move
 from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Live, Steps
@@ -42,8 +41,6 @@ def search(
     engines: Sequence[Engine],
     budget: Budget,
     *,
-    scouts: Sequence[Engine] = (),
-    objective: Objective | None = "simulations",
     steps: Steps | None = None,
     jobs: int = 1,
     in_batches: bool = False,
@@ -62,9 +59,6 @@ def search(
         problems: what to falsify; they differ only in their requirement.
         engines: one per problem.
         budget: limits of the run.
-        scouts: one per problem for cheap proposals if time counts.
-        objective: what counts; if it is time, scouts simulate as long as that costs less than thinking. None:
-            time if they do.
         steps: how to ask, simulate and confirm; default: everything in this process.
         jobs: number of simulations at a time.
         in_batches: whether an engine is asked for that many candidates at once, because each question costs;
@@ -87,10 +81,9 @@ def search(
     check_limits(problems[0])
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
-    beside = scouts if objective != "simulations" and scouts else [None] * len(problems)
-    states = [RequirementState(p, e, s) for p, e, s in zip(problems, engines, beside, strict=True)]
+    states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(states, levels, budget, steps or Live(), directory, tuple(listeners), objective, prepared)
+    loop = _Loop(states, levels, budget, steps or Live(), directory, tuple(listeners), prepared)
     status: ResultStatus
     try:
         loop.attach()
@@ -113,7 +106,6 @@ class _Started(NamedTuple):
     """A candidate that is being simulated, or will be when its evaluation is waited for."""
 
     state: RequirementState
-    proposer: Proposer
     wait: Callable[[], Evaluation]
 
 
@@ -128,7 +120,6 @@ class _Loop:
         steps: Steps,
         directory: Path | None,
         listeners: tuple[Listener, ...],
-        objective: Objective | None,
         prepared: float,
     ) -> None:
         self.states = states
@@ -137,12 +128,8 @@ class _Loop:
         self.steps = steps
         self.directory = directory
         self.listeners = listeners
-        self.objective = objective
         self.waiting: deque[_Started] = deque()
-        self.costs = Costs()
-        self.last: Proposer = "engine"
-        self.turns = self.untold_scouts = 0
-        self.count = 0
+        self.turns = self.count = 0
         self.last_error = self.last_defect = ""
         self.is_answered = False
         self.started = perf_counter() - prepared - steps.seconds
@@ -174,8 +161,8 @@ class _Loop:
             )
         )
         while standing := [t for t in self.states if t.counterexample is None]:
-            move = self.steps.move(self.count, lambda: self.decide(jobs, in_batches=in_batches))
-            if move is None:
+            wanted = self.wanted(jobs, in_batches=in_batches)
+            if not wanted:
                 self.settle(self.waiting.popleft(), standing)
                 continue
             self.tell(standing)
@@ -185,7 +172,7 @@ class _Loop:
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
             try:
-                self.ask(standing[self.turns % len(standing)], move)
+                self.ask(standing[self.turns % len(standing)], wanted)
             except LimitReached as reached:
                 self.last_defect = str(reached.__cause__ or self.last_defect)
                 return self.failure_text() if self.all_failed() else str(reached)
@@ -198,19 +185,17 @@ class _Loop:
             spent = replace(spent, seconds=0.0)
         return self.budget.exceeded(spent)
 
-    def decide(self, jobs: int, *, in_batches: bool) -> Move:
-        """Decide on the next move."""
-        limit = self.budget.simulations
-        situation = Situation(
-            waiting=len(self.waiting),
-            last=self.last,
-            cores=jobs,
-            left=None if limit is None else limit - self.count - len(self.waiting),
-            in_batches=in_batches,
-            may_scout=self.states[0].scout is not None,
-            costs=self.costs,
-        )
-        return next_move(situation)
+    def wanted(self, jobs: int, *, in_batches: bool) -> int:
+        """Return the number of candidates to ask for now; 0: wait for the oldest simulation first.
+
+        It depends on counts alone: a run depends on its seed and the number of jobs, not on the clock, and a
+        resumed run repeats it.
+        """
+        waiting, limit = len(self.waiting), self.budget.simulations
+        left = jobs if limit is None else limit - self.count - waiting
+        if waiting and (left <= 0 or waiting >= (1 if in_batches else jobs)):
+            return 0
+        return max(1, min(jobs if in_batches else 1, left))
 
     def concluded(self, reason: str) -> tuple[ResultStatus, str]:
         """Status and reason of a search that came to its end.
@@ -240,16 +225,13 @@ class _Loop:
             failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
         return f"{failed} failed; the last error: {self.last_error}"
 
-    def ask(self, state: RequirementState, move: Ask) -> None:
-        """Ask for candidates, and start to simulate them."""
-        engine = state.scout if move.proposer == "scout" else state.engine
-        assert engine is not None
-        candidates, wanted, seconds = self.steps.ask(state.problem, engine, move.n)
+    def ask(self, state: RequirementState, n: int) -> None:
+        """Ask for n candidates, and start to simulate them."""
+        engine = state.engine
+        candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
         if isinstance(engine, FollowsRun):
             engine.timed(seconds)
-        self.turns += move.proposer == "engine"
-        self.last = move.proposer
-        self.costs = self.costs.asked(move.proposer, len(candidates), seconds)
+        self.turns += 1
         self.think(seconds)
         self.emit(
             Asked(
@@ -258,13 +240,11 @@ class _Loop:
                 candidates=tuple(candidates),
                 seconds=seconds,
                 problem=state.problem,
-                proposer=move.proposer,
-                told=self.count,
                 spent=self.clock(),
             )
         )
         started = self.steps.start(state.problem, candidates)
-        self.waiting.extend(_Started(state, move.proposer, wait) for wait in started)
+        self.waiting.extend(_Started(state, wait) for wait in started)
 
     def settle(self, started: _Started, standing: Sequence[RequirementState]) -> None:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
@@ -276,8 +256,6 @@ class _Loop:
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.
         judges = standing if started.state in standing else [started.state, *standing]
         judged = [(t, evaluation if t is started.state else judge(t.problem, evaluation)) for t in judges]
-        self.costs = self.costs.simulated(started.proposer, evaluation.seconds)
-        self.untold_scouts += started.proposer == "scout"
         self.note(started, evaluation, judged)
         for state, seen in judged:
             state.untold.append(seen)
@@ -285,16 +263,10 @@ class _Loop:
 
     def tell(self, standing: Sequence[RequirementState]) -> None:
         """Tell the engines what was simulated since they were told last."""
-        count = max((len(state.untold) for state in standing), default=0)
-        seconds = 0.0
         for state in standing:
             evaluations, state.untold = state.untold, []
-            told = [engine for engine in (state.engine, state.scout) if engine is not None and evaluations]
-            seconds += sum(self.steps.tell(engine, evaluations) for engine in told)
-        if count:
-            self.costs = self.costs.told(self.untold_scouts / count, seconds)
-            self.untold_scouts = 0
-            self.think(seconds)
+            if evaluations:
+                self.think(self.steps.tell(state.engine, evaluations))
 
     def think(self, seconds: float) -> None:
         """Add to the time spent in engines."""
@@ -312,7 +284,6 @@ class _Loop:
             simulations=self.spent.simulations + 1,
             simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
             failures=self.spent.failures + failed,
-            scouts=self.spent.scouts + (started.proposer == "scout"),
         )
         self.emit(
             Evaluated(
@@ -401,7 +372,6 @@ class _Loop:
             findings=() if found is not None else state.findings(self.levels),
             directory=self.directory,
             remarks=state.remarks,
-            objective=self.objective or ("time" if self.spent.scouts else "simulations"),
         )
 
 

@@ -26,8 +26,6 @@ _LLM_ENGINES = ("llm", "hybrid")
 _SEED_STRIDE = 1_000_003
 # The same for the engine that aims at a condition beside one that searches for a violation.
 _AIM_SEED = 500_009
-# The same for the cheap proposals beside an engine.
-_SCOUT_SEED = 250_007
 
 
 def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
@@ -49,21 +47,6 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
         return [_numerical(request.engine or DEFAULT_ENGINE, *each) for each in seeded]
     chat = chat or open_chat(request.llm, max_cost=request.budget.cost)
     return [_led_by_llm(request, request.llm, *each, chat) for each in seeded]
-
-
-def make_scouts(request: RunRequest, problems: Sequence[Problem]) -> list[Engine]:
-    """Make what proposes beside the engines of a request if time counts, one per problem; else nothing.
-
-    Raises:
-        SpecError: if time is the objective of a search that cannot have it.
-    """
-    _check_objective(request)
-    if request.objective == "simulations" or request.llm is not None or request.levels:
-        return []
-    from falsifier.engines.scout import Scout
-
-    seeds = [request.seed + _SCOUT_SEED + i * _SEED_STRIDE for i in range(len(problems))]
-    return [Scout(problem, seed=seed) for problem, seed in zip(problems, seeds, strict=True)]
 
 
 def told_problems(
@@ -101,11 +84,10 @@ def check_names(request: RunRequest) -> None:
     """Reject unknown names, without importing an engine or looking for a key.
 
     Raises:
-        SpecError: for an unknown engine or prompt variant, an engine that does not fit the language model, or
-            time as the objective of a search that cannot have it.
+        SpecError: for an unknown engine or prompt variant, or an engine that does not fit the language
+            model.
     """
     engine, llm = request.engine, request.llm
-    _check_objective(request)
     if llm is None:
         if engine in _LLM_ENGINES:
             raise SpecError(f"the engine {engine!r} needs a language model: add --llm NAME")
@@ -119,12 +101,6 @@ def check_names(request: RunRequest) -> None:
     if llm.fallback in _LLM_ENGINES:
         raise SpecError(f"--fallback {llm.fallback}: choose an engine that does not use a language model")
     check_engine(llm.fallback or DEFAULT_ENGINE)
-
-
-def _check_objective(request: RunRequest) -> None:
-    if request.objective == "time" and (request.llm is not None or request.levels):
-        what = "a search that refines its inputs" if request.llm is None else "a search with a language model"
-        raise SpecError(f"{what} counts simulations: drop --objective time, or limit its time with --seconds")
 
 
 def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:

@@ -11,7 +11,6 @@ from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.moves import Objective
 
 # A negative price, or one that is not a number, would switch off the limit on the cost.
 _Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -88,10 +87,6 @@ class RunRequest(_Strict):
     seed: int = Field(default=0, ge=0)
     budget: Budget = Budget()
     jobs: int = Field(default=1, ge=1)
-    objective: Objective | None = Field(
-        default="simulations",
-        description="What counts; null: time as long as a simulation takes less of it than a proposal.",
-    )
     keep: Keep = "history"
     levels: tuple[int, ...] = Field(
         default=(),

@@ -20,7 +20,6 @@ class RequirementState:
     Attributes:
         problem: what is to be falsified.
         engine: searches for a violation.
-        scout: makes cheap proposals beside the engine; None: nobody does.
         evaluations: all so far, without trajectories.
         doubtful: violations that were not confirmed.
         best: evaluation with the smallest robustness, with its trajectory.
@@ -31,7 +30,6 @@ class RequirementState:
 
     problem: Problem
     engine: Engine
-    scout: Engine | None = None
     evaluations: list[Evaluation] = field(default_factory=list)
     doubtful: list[Confirmation] = field(default_factory=list)
     best: Evaluation | None = None

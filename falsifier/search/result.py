@@ -11,7 +11,6 @@ from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
 from falsifier.search.levels import Level
-from falsifier.search.moves import Objective
 from falsifier.stl.margins import signed
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
@@ -38,7 +37,6 @@ class Result:
         findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
         remarks: what the engine says of how it worked, such as how many samples are a fallback's.
-        objective: what counted, simulations or time.
         unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
 
@@ -57,7 +55,6 @@ class Result:
     directory: Path | None = None
     unrecorded: str = ""
     remarks: tuple[str, ...] = ()
-    objective: Objective = "simulations"
 
     def __repr__(self) -> str:
         # All trajectories and variables would fill pages of a terminal.

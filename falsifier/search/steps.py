@@ -14,7 +14,6 @@ from falsifier.evaluation.workers import start
 from falsifier.llm.messages import Chat
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.moves import Move
 from falsifier.search.proposals import proposals
 
 
@@ -34,15 +33,6 @@ class Steps(Protocol):
     @property
     def unrepeated(self) -> Spent:
         """What the recorded part spent on questions to a language model that are not played back."""
-        ...
-
-    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
-        """Return what to do next.
-
-        Args:
-            settled: number of evaluations so far.
-            decide: decides it from what was measured.
-        """
         ...
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -78,10 +68,6 @@ class Live:
     replayed: int = 0
     seconds: float = 0.0
     unrepeated: Spent = field(default_factory=Spent)
-
-    def move(self, settled: int, decide: Callable[[], Move]) -> Move:
-        """Decide; the number of evaluations is for replay only."""
-        return decide()
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Ask the engine, and measure the time."""

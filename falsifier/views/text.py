@@ -30,8 +30,6 @@ def result_text(result: Result) -> str:
         lines.append(f"  confirmed      {result.counterexample.reason}")
     elif result.status != "failed":
         lines.append(f"  reason         {result.reason}")
-    if result.objective == "time":
-        lines.append(f"  objective      time; {_scouted(result)}")
     lines.append(f"  requirement    {result.problem.requirement.formula}")
     if shown is not None:
         lines += evaluation_lines(result.problem, shown)
@@ -59,13 +57,6 @@ def result_text(result: Result) -> str:
     if result.status == "failed":
         lines.append(f"failed: {result.reason}")
     return "\n".join(map(one_line, lines))
-
-
-def _scouted(result: Result) -> str:
-    scouts = result.spent.scouts
-    if not scouts:
-        return "the engine proposed all of them, as a simulation took longer than a proposal"
-    return f"{scouts} of the simulations were of cheap proposals beside the engine"
 
 
 def _untested(result: Result) -> str:
@@ -118,7 +109,6 @@ def result_json(result: Result) -> dict[str, Any]:
         "formula": str(result.problem.requirement.formula),
         "status": result.status,
         "reason": result.reason,
-        "objective": result.objective,
         "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
         "best": result.best and evaluation_json(result.best),
         "parameterization": "refined"

@@ -44,12 +44,11 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
         name(Method("sobol")),
         name(Method("uniform", parameterization="free")),
         name(Method("uniform", profile="instance2")),
-        name(Method("uniform", objective="time")),
         name(Method("uniform"), seed=1),
         name(Method("uniform"), budget=6),
         name(Method("uniform"), target="other/AT.toml:AT1"),
     }
-    assert len(others | {base}) == 8
+    assert len(others | {base}) == 7
     assert name(Method("uniform")) == base
     unsafe = name(Method(llm="ollama_chat/gpt-oss:20b", variant="MP4"))
     assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
@@ -59,7 +58,6 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     fixed, free = Method("uniform"), Method("uniform", parameterization="free")
     assert fixed != free
     assert (fixed.label, free.label) == ("uniform", "uniform, free")
-    assert Method("uniform", objective="time").label == "uniform, objective time"
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
         "hybrid + gpt-5-mini high MP4, instance2"
     )

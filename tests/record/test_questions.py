@@ -13,7 +13,6 @@ def asked(first: int, *candidates: dict[str, str]) -> AskedRecord:
         candidates=list(candidates),
         seconds=0.0,
         requirement="R",
-        told=first,
         elapsed=0.0,
     )
 

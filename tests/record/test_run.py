@@ -3,7 +3,6 @@
 import json
 from collections import deque
 from pathlib import Path
-from typing import Any
 
 import pytest
 from numpy import int64
@@ -71,19 +70,6 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
     assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}
     falsify([impossible(), hard()], "corners", budget=2, directory=tmp_path / "shared")
     assert manifest.read(tmp_path / "shared").names == ("NEVER", "HARD")
-
-
-def test_simulations_count_if_their_number_is_limited(tmp_path: Path) -> None:
-    def counted(**options: Any) -> object:
-        place = tmp_path / str(len(list(tmp_path.iterdir())))
-        falsify(lag_problem(), "corners", directory=place, **options)
-        return manifest.read(place).request.objective
-
-    assert counted() == counted(budget=5) == counted(budget=Budget(5, seconds=9.0)) == "simulations"
-    assert counted(budget=5, objective="time") == counted(objective="time") == "time"
-    assert counted(budget=Budget(None, seconds=9.0)) is None
-    with pytest.raises(SpecError, match="expected 'simulations' or 'time', got 'money'"):
-        falsify(lag_problem(), objective="money")  # type: ignore[call-overload]
 
 
 def test_a_budget_may_be_a_number_of_simulations() -> None:

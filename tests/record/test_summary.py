@@ -43,7 +43,7 @@ def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) 
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     summary = Summary()
     assert status(summary) == "waiting"
-    summary.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", told=0, elapsed=0.1))
+    summary.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", elapsed=0.1))
     assert status(summary) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         summary.add(evaluated(i, robustness))

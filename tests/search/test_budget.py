@@ -3,7 +3,7 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.llm.messages import Usage
-from falsifier.search.budget import DEFAULT_SECONDS, DEFAULT_SIMULATIONS, Budget, Spent, budget_of
+from falsifier.search.budget import Budget, Spent
 
 
 @pytest.mark.parametrize(
@@ -39,14 +39,6 @@ def test_a_budget_needs_a_positive_limit() -> None:
         Budget(None)
     with pytest.raises(SpecError, match="simulations: expected a whole number, at least 1, got 0"):
         Budget(0)
-
-
-def test_time_as_the_objective_does_not_limit_simulations_by_default() -> None:
-    assert budget_of(None) == Budget(DEFAULT_SIMULATIONS)
-    assert budget_of(None, 5.0) == Budget(DEFAULT_SIMULATIONS, 5.0)
-    assert budget_of(None, objective="time") == Budget(None, DEFAULT_SECONDS)
-    assert budget_of(None, 5.0, objective="time") == Budget(None, 5.0)
-    assert budget_of(7, objective="time") == Budget(7)
 
 
 def test_whole_numbers_of_numpy_become_ints() -> None:

@@ -12,7 +12,7 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError, SpecError
 from falsifier.llm.replay import ScriptedChat
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import check_names, make_engines, make_scouts, told_problems
+from falsifier.search.make_engines import check_names, make_engines, told_problems
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 
@@ -41,19 +41,6 @@ def test_a_language_model_alone_leads_and_with_the_hybrid_advises() -> None:
     assert isinstance(llm, LLMEngine) and llm.name == "script MP4"
     (hybrid,) = make_engines(request("hybrid", "script"), [PROBLEM], CHAT)
     assert isinstance(hybrid, Hybrid)
-
-
-def test_where_time_may_count_each_requirement_has_a_scout() -> None:
-    problems = [lag_problem(name="A"), lag_problem(name="B")]
-    assert make_scouts(request(), problems) == []
-    one, other = make_scouts(request().model_copy(update={"objective": None}), problems)
-    assert one.ask(4)[3].key != other.ask(4)[3].key
-    timed = {"objective": "time"}
-    assert len(make_scouts(request().model_copy(update=timed), problems)) == 2
-    with pytest.raises(SpecError, match="a search with a language model counts simulations"):
-        make_scouts(request(llm="script").model_copy(update=timed), problems)
-    with pytest.raises(SpecError, match="a search that refines its inputs counts simulations"):
-        make_scouts(request().model_copy(update={**timed, "levels": (0, 5)}), problems)
 
 
 def test_several_requirements_have_engines_that_draw_different_points() -> None:

@@ -1,6 +1,5 @@
 from falsifier.engines.uniform import Uniform
 from falsifier.llm.replay import ScriptedChat
-from falsifier.search.moves import Ask
 from falsifier.search.steps import Live
 from falsifier.testing import lag_problem
 
@@ -12,7 +11,6 @@ def test_every_step_is_carried_out() -> None:
     evaluations = [wait() for wait in steps.start(problem, candidates)]
     assert [e.candidate for e in evaluations] == candidates
     assert steps.tell(Uniform(problem, seed=1), evaluations) > 0
-    assert steps.move(3, lambda: Ask("engine", 2)) == Ask("engine", 2)
     worst = min(evaluations, key=lambda e: e.robustness or 0.0)
     assert steps.confirm(problem, worst, 0).robustness == worst.robustness
     chat = ScriptedChat([])

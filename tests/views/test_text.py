@@ -54,15 +54,6 @@ def test_a_counterexample_is_told_with_its_verdict_inputs_and_reason(found: Resu
     assert "files" not in text, "nothing was recorded"
 
 
-def test_if_time_counted_the_cheap_proposals_are_told(found: Result) -> None:
-    assert "objective" not in result_text(found)
-    timed = replace(found, objective="time", spent=replace(found.spent, scouts=2))
-    assert "  objective      time; 2 of the simulations were of cheap proposals" in result_text(timed)
-    dear = replace(timed, spent=replace(found.spent, scouts=0))
-    assert "as a simulation took longer than a proposal" in result_text(dear)
-    assert (result_json(timed)["objective"], result_json(timed)["spent"]["scouts"]) == ("time", 2)
-
-
 def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:
     result = falsify(impossible(), "uniform", budget=1)
     text = result_text(result)

@@ -218,7 +218,6 @@ def _row(run: Run) -> dict[str, Any]:
         "variant": run.method.variant,
         "parameterization": run.method.parameterization,
         "profile": run.method.profile,
-        "objective": run.method.objective,
         "seed": run.seed,
         "status": run.status,
         "falsified": run.falsified,

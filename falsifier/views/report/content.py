@@ -192,7 +192,6 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
-        ("--objective", None if request.objective == "simulations" else "time"),
         ("--seconds", budget.seconds),
         ("--max-tokens", budget.tokens),
         ("--max-cost", budget.cost),

@@ -88,7 +88,6 @@ def test_loading_reads_each_line_once_and_passes_over_the_candidates(
                 candidates=[candidate],
                 seconds=1e-4,
                 requirement="EASY",
-                told=i,
                 elapsed=0.02 * i,
             )
             done = EvaluatedRecord(

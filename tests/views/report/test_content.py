@@ -35,8 +35,8 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --input u=0:1:3 --stop-time 5.0 --engine uniform "
         "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
-    quick = request.model_copy(update={"objective": "time", "budget": Budget(None, 9.0)})
-    assert run_command(quick).endswith("--objective time --seconds 9.0 --seed 3 --jobs 2")
+    quick = request.model_copy(update={"budget": Budget(None, 9.0)})
+    assert run_command(quick).endswith("--engine uniform --seconds 9.0 --seed 3 --jobs 2")
 
 
 def test_a_models_search_can_be_repeated_too() -> None:
