@@ -12,9 +12,8 @@ from types import MappingProxyType
 from falsifier.context import modelica
 from falsifier.context.levels import Definitions
 from falsifier.context.simulink import Diagram, names_text, structure_text
-from falsifier.context.simulink.conditions import diagram_thresholds
-from falsifier.context.simulink.definitions import definitions
-from falsifier.context.simulink.upstream import upstream
+from falsifier.context.simulink.diagram import upstream
+from falsifier.context.simulink.expressions import definitions, diagram_thresholds
 from falsifier.context.sources import Source, constants_of, read_source
 from falsifier.context.statements import Statement, assignments, lines_told, reached
 from falsifier.context.thresholds import Threshold, thresholds, within

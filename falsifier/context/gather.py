@@ -13,7 +13,7 @@ from falsifier.context.forms import Form, Readable, of_diagram, of_source, parse
 from falsifier.context.levels import levels_of
 from falsifier.context.sentry import Sentry
 from falsifier.context.simulink import Diagram, read_diagram
-from falsifier.context.simulink.parts import read_parts
+from falsifier.context.simulink.sections import read_parts
 from falsifier.context.sources import Source
 from falsifier.context.thresholds import Threshold
 from falsifier.context.values import SIMULINK, Compared, Context, Excerpt, Level

@@ -5,11 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End, Wire
-from falsifier.context.simulink.mdl import is_text_package, parse_mdl, text_parts
 from falsifier.context.simulink.parameters import meaningful
-from falsifier.context.simulink.parts import as_tree, read_parts
+from falsifier.context.simulink.sections import (
+    Node,
+    as_tree,
+    is_text_package,
+    parse_mdl,
+    read_parts,
+    text_parts,
+)
 from falsifier.context.simulink.stateflow import read_charts
-from falsifier.context.simulink.tree import Node
 from falsifier.errors import SpecError
 
 _MAX_TEXT_BYTES = 128 << 20

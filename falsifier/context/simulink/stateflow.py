@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from falsifier.context.simulink.diagram import Chart, ChartData, State, Transition
-from falsifier.context.simulink.tree import Node
+from falsifier.context.simulink.sections import Node
 
 _MAX_NESTING = 100  # of states
 _KINDS = ("state", "transition", "data", "junction")

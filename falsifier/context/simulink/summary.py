@@ -2,8 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram, End
-from falsifier.context.simulink.upstream import Place
+from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram, End, Place
 from falsifier.core.words import counted
 
 # What leads to each port of each block: its source and the signal's name.

@@ -1,7 +1,6 @@
 from falsifier.context.simulink.diagram import ChartData, State, Transition
-from falsifier.context.simulink.mdl import parse_mdl
+from falsifier.context.simulink.sections import Node, parse_mdl
 from falsifier.context.simulink.stateflow import read_charts
-from falsifier.context.simulink.tree import Node
 from tests.fixtures import simulink
 
 SCRIPT = "function y = f(u)\ny = u > 3;"

@@ -1,9 +1,8 @@
 from pathlib import Path
 
-from falsifier.context.simulink.diagram import BlockSystem, Chart, Diagram
+from falsifier.context.simulink.diagram import BlockSystem, Chart, Diagram, upstream
 from falsifier.context.simulink.reader import read_diagram
 from falsifier.context.simulink.summary import names_text, structure_text
-from falsifier.context.simulink.upstream import upstream
 from tests.fixtures import simulink
 
 

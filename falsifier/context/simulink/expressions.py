@@ -1,10 +1,9 @@
-"""Comparisons in a block diagram: in the labels of charts, and in blocks that compare a signal."""
+"""Comparisons in a block diagram, and what its blocks make of their inputs, as expressions."""
 
 import re
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram
-from falsifier.context.simulink.upstream import Place
+from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram, Place
 from falsifier.context.thresholds import Threshold, at_breakpoints, thresholds, within
 
 # Of an If block, u1 is what leads to its first port, not a signal of that name.
@@ -18,6 +17,14 @@ _TABLES: Mapping[str, Mapping[str, str]] = {
 }
 # A constant may state its type: single(5), int8(3).
 _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
+# Blocks whose output is their input later, in another type, or after some time.
+_LISTED = """
+    DataTypeConversion SignalConversion RateTransition ZeroOrderHold UnitDelay Memory Delay InitialCondition
+    TransportDelay VariableTransportDelay RateLimiter Quantizer TransferFcn DiscreteTransferFcn DiscreteFilter
+    Saturate Saturation DeadZone Backlash Goto
+"""
+_FOLLOWING = frozenset(_LISTED.split())
+_MAX_BLOCKS = 20_000
 
 
 def diagram_thresholds(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[Threshold]:
@@ -173,3 +180,63 @@ def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
 
 def _relation(operator: str) -> str:
     return operator.replace("~=", "!=")
+
+
+def definitions(diagram: Diagram) -> Mapping[str, str]:
+    """Return expressions by the names of signals, as far as gains, sums and the like make them.
+
+    A name that stands for different expressions in two systems is left out.
+    """
+    found: dict[str, str] = {}
+    ambiguous = set()
+    blocks = 0
+    fed, all_fed = feeding(diagram), feeding(diagram, named=False)
+    for path, system in diagram.root.walk():
+        blocks += len(system.blocks)
+        if blocks > _MAX_BLOCKS:
+            break
+        for name, expression in _of(system, fed.get(path, {}), all_fed.get(path, {})):
+            if name != expression and found.setdefault(name, expression) != expression:
+                ambiguous.add(name)
+    return {name: text for name, text in found.items() if name not in ambiguous}
+
+
+def _of(system: BlockSystem, fed: Mapping[str, str], all_fed: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    leading = sources(system, fed)
+    own = {block.name: block for block in system.blocks if not block.is_off}
+    outports = set(system.ports("Outport"))
+    for wire in system.wires:
+        block = own.get(wire.source.block) if wire.source is not None else None
+        if block is None:
+            continue
+        expression = all_fed.get(block.name) or _made(block, leading.get(block.name, {}))
+        outport = next((end.block for end in wire.targets if end.block in outports), "")
+        for name in (wire.name, outport, block.name):
+            if name and expression:
+                yield name, expression
+
+
+def _made(block: Block, inputs: Mapping[str, str]) -> str:
+    """Return the expression of a block's output; empty if it is not known."""
+    first = inputs.get("1", "")
+    if block.type == "Inport":
+        return quoted(block.name)
+    if not first:
+        return ""
+    if block.type in _FOLLOWING:
+        return first
+    if block.type == "Gain":
+        return f"({block.parameter('Gain')}) * ({first})"
+    if block.type == "Abs":
+        return f"abs({first})"
+    if block.type == "MinMax":
+        return f"{block.parameter('Function') or 'min'}({', '.join(inputs.values())})"
+    if block.type == "Sum":
+        return _sum(block.parameter("Inputs") or "++", inputs)
+    return ""
+
+
+def _sum(signs: str, inputs: Mapping[str, str]) -> str:
+    listed = "+" * int(signs) if signs.isdigit() and int(signs) < 100 else re.sub(r"[^+-]", "", signs)
+    terms = [f"{sign} ({inputs[str(i)]})" for i, sign in enumerate(listed, start=1) if str(i) in inputs]
+    return " ".join(terms) if len(terms) == len(listed) else ""

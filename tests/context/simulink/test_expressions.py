@@ -3,7 +3,6 @@ from pathlib import Path
 import pytest
 
 from falsifier.context.levels import Definitions, levels_of
-from falsifier.context.simulink.conditions import comparisons, diagram_thresholds
 from falsifier.context.simulink.diagram import (
     Block,
     BlockSystem,
@@ -13,10 +12,41 @@ from falsifier.context.simulink.diagram import (
     End,
     Transition,
     Wire,
+    upstream,
 )
+from falsifier.context.simulink.expressions import comparisons, definitions, diagram_thresholds
 from falsifier.context.simulink.reader import read_diagram
-from falsifier.context.simulink.upstream import upstream
 from tests.fixtures import simulink
+
+
+def wire(source: str, target: str, port: int = 1, name: str = "") -> Wire:
+    return Wire(End(source, "1"), (End(target, str(port)),), name)
+
+
+INNER = BlockSystem(
+    (Block("Inport", "e", number=1), Block("Abs", "Size"), Block("Outport", "size", number=1)),
+    (wire("e", "Size"), wire("Size", "size")),
+)
+ROOT = BlockSystem(
+    (
+        Block("Inport", "u", number=1),
+        Block("Constant", "Set", (("Value", "single(5)"),)),
+        Block("Gain", "Twice", (("Gain", "2"),)),
+        Block("Sum", "Error", (("Inputs", "|+-"),)),
+        Block("UnitDelay", "Last value"),
+        Block("SubSystem", "Judge", system=INNER),
+        Block("Product", "Unknown"),
+        Block("Terminator", "End"),
+    ),
+    (
+        wire("u", "Twice", name="raw"),
+        wire("Set", "Error"),
+        wire("Twice", "Error", 2),
+        wire("Error", "Last value"),
+        wire("Last value", "Judge"),
+        wire("Unknown", "End", name="p"),
+    ),
+)
 
 
 def test_blocks_and_charts_that_compare(tmp_path: Path) -> None:
@@ -114,3 +144,21 @@ def test_breakpoints_of_tables_are_levels_of_what_leads_there() -> None:
     assert found.text == "u leads to a table with the breakpoints 0, 2.5, 1e1"
     levels = levels_of([found], Definitions(), {"m.u": (1.0, 20.0)})
     assert [level.value for level in levels] == [2.5, 10.0]
+
+
+def test_names_stand_for_what_blocks_make() -> None:
+    found = definitions(Diagram("m", ROOT))
+    assert found["raw"] == "u"
+    assert found["Twice"] == "(2) * (u)"
+    assert found["Error"] == "+ (5) - (Twice)"
+    assert found["Last value"] == "Error"
+    assert found["e"] == "'Last value'"  # an inport within is what leads to its block
+    assert found["Size"] == "abs(e)"
+    assert "p" not in found
+
+
+def test_a_name_with_two_meanings_is_left_out() -> None:
+    blocks = (Block("Inport", "e"), Block("Gain", "Size", (("Gain", "3"),)), Block("Outport", "o"))
+    other = BlockSystem(blocks, (wire("e", "Size"), wire("Size", "o")))
+    root = BlockSystem((*ROOT.blocks, Block("SubSystem", "Second", system=other)), ROOT.wires)
+    assert "Size" not in definitions(Diagram("m", root))

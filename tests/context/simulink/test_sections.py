@@ -3,10 +3,63 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.context.simulink import parts
-from falsifier.context.simulink.parts import as_tree, read_parts
+from falsifier.context.simulink import sections
+from falsifier.context.simulink.sections import (
+    Node,
+    as_tree,
+    is_text_package,
+    parse_mdl,
+    read_parts,
+    text_parts,
+)
 from falsifier.errors import FalsifierError, ModelError, SpecError
 from tests.fixtures import simulink
+
+LEAF = Node("P", {"Name": "x"})
+TREE = Node("Block", {"SID": "1"}, (Node("System", {}, (LEAF,)), Node("Line")))
+
+
+def test_values_are_found_under_the_first_name_that_is_there() -> None:
+    assert TREE.get("SSID", "SID") == "1"
+    assert TREE.get("id") == ""
+
+
+def test_sections_are_found_by_kind_and_walked_from_outside() -> None:
+    assert TREE.first("System") is TREE.all("System")[0]
+    assert TREE.first("Chart") is None
+    assert [node.kind for node in TREE.walk()] == ["Block", "System", "P", "Line"]
+
+
+def test_sections_values_and_pieces_of_text() -> None:
+    text = 'Model {\n  Name "a \\"b\\"\\n"\n  "c"\n  Points [1, 2]\n  Simulink.X {\n    $Id 2\n  }\n}\n'
+    model = parse_mdl(text, "a.mdl").children[0]
+    assert model.values == {"Name": 'a "b"\nc', "Points": "[1, 2]"}
+    assert (model.children[0].kind, model.children[0].values) == ("Simulink.X", {"$Id": "2"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('Model {\n  Name "a"\n', "the section Model of line 1 is not closed"),
+        ("}\n", "line 1: a section is closed that was not opened"),
+        ('Model {\n  Name "a\n}\n', "line 2: expected NAME VALUE"),
+        ("Model {\n  ???\n}\n", "line 2: expected NAME VALUE"),
+        ('Model {\n  "piece"\n}\n', "line 2: expected"),
+        ("A {\n" * 300, "nested more than 200 deep"),
+    ],
+)
+def test_errors_name_the_line(text: str, message: str) -> None:
+    with pytest.raises(SpecError, match=f"a.mdl: .*{message}".replace("?", r"\?")):
+        parse_mdl(text, "a.mdl")
+
+
+def test_text_parts_are_those_of_the_package() -> None:
+    text = simulink.text_package()
+    assert is_text_package(text)
+    assert not is_text_package(simulink.MDL)
+    parts = text_parts(text)
+    assert parts["simulink/systems/system_root.xml"].decode() == simulink.ROOT.rstrip()
+    assert "metadata/thumbnail.png" not in parts  # binary
 
 
 def tree_of(path: Path) -> None:
@@ -58,7 +111,7 @@ def test_damaged_archives_are_named(tmp_path: Path) -> None:
 def test_bombs_and_parts_that_are_too_large_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parts, "_MAX_PART_BYTES", 1 << 20)
+    monkeypatch.setattr(sections, "_MAX_PART_BYTES", 1 << 20)
     with zipfile.ZipFile(tmp_path / "a.slx", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("simulink/blockdiagram.xml", bytes(3 << 20))
     with pytest.raises(SpecError, match=r"blockdiagram\.xml has 3 MiB, more than 1"):
@@ -72,7 +125,7 @@ def test_bombs_and_parts_that_are_too_large_are_refused(
 def test_parts_that_multiply_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, message: str
 ) -> None:
-    monkeypatch.setattr(parts, limit, 99)
+    monkeypatch.setattr(sections, limit, 99)
     twice = '<System><System Ref="system_{0}"/><System Ref="system_{0}"/></System>'
     systems = {f"simulink/systems/system_{i}.xml": twice.format(i + 1) for i in range(20)}
     last = {"simulink/systems/system_20.xml": "<System/>"}
