@@ -1,17 +1,14 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 
-from falsifier.context.decoding import text_of
-from falsifier.context.fmu_files import NAME_THEM, inside
-from falsifier.context.forms import Form, Readable, of_diagram, of_source, parsed
+from falsifier.context.excerpts import Form, Readable, of_diagram, of_text, parsed
+from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.levels import levels_of
-from falsifier.context.sentry import Sentry
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
 from falsifier.context.sources import Source
@@ -125,14 +122,13 @@ def _levels(sources: Iterable[_Source], ranges: Mapping[str, tuple[float, float]
 
 
 def _library(files: Iterable[_File]) -> Mapping[str, Source]:
-    """Return what sources say, by their text; of one that cannot be read, its form says why."""
+    """Return what sources say, by their text."""
     found: dict[str, Source] = {}
     for file in files:
         if isinstance(file.content, str):
-            with suppress(SpecError):
-                source = parsed(file.content, file.name)
-                if source is not None:
-                    found[file.content] = source
+            source = parsed(file.content, file.name)
+            if source is not None:
+                found[file.content] = source
     return found
 
 
@@ -141,7 +137,7 @@ def _readable(
 ) -> Readable:
     if not isinstance(file.content, str):
         return of_diagram(file.content, seeds)
-    return of_source(file.content, file.name, seeds, signals, is_named=file.is_named, library=library)
+    return of_text(file.content, file.name, seeds, signals, is_named=file.is_named, library=library)
 
 
 def _look_again(source: _Source, text: str, sentry: Sentry) -> None:

@@ -10,8 +10,7 @@ from itertools import islice, product
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.context.thresholds import Threshold, number_in
-from falsifier.context.tokens import tokens_of
+from falsifier.context.thresholds import Threshold, number_in, tokens_of
 from falsifier.context.values import Level
 
 Array = NDArray[np.float64]
@@ -220,7 +219,7 @@ def _as_python(text: str, names: list[str]) -> str:
     """Return an expression with placeholders for its names; of ``a->b`` only the last one counts."""
     words: list[str] = []
     is_member = False
-    for token in tokens_of(text, "an expression"):
+    for token in tokens_of(text):
         if token.text == "->" and words:
             words.pop()
         elif token.text == "." and words and words[-1].startswith("_"):

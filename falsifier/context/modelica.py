@@ -1,11 +1,12 @@
-"""Classes of Modelica files: the one that matters, and what the blocks of the standard library in it do."""
+"""What Modelica compares: in the class that declares the signals, and in blocks of the standard library."""
 
 import re
-from collections import deque
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from falsifier.context.sources import Component, Source
-from falsifier.context.thresholds import Threshold, at_breakpoints, number_in
+from falsifier.context.levels import Definitions
+from falsifier.context.sources import Component, Scope, Source
+from falsifier.context.thresholds import Threshold, at_breakpoints, number_in, thresholds, within
 
 # Comparisons by the type's name; names in braces are inputs, other names parameters.
 _COMPARING: Mapping[str, tuple[str, ...]] = {
@@ -44,87 +45,104 @@ _ROW = re.compile(r"(?:^\s*\[|;)\s*([-+]?[\d.]++(?:[eE][-+]?\d++)?)")
 _WORD = re.compile(r"\{(\w+)\}|\b[a-zA-Z]\w*\b")
 
 
-def class_for(source: Source, library: Sequence[Source], names: Iterable[str]) -> list[str]:
-    """Return the class of a file that declares most of these names, the last one on ties, and its bases.
+def modelica_comparisons(
+    source: Source, library: Sequence[Source], names: Collection[str]
+) -> tuple[list[Threshold], Mapping[str, str], Definitions]:
+    """Return what a file compares, values of its parameters, and what its variables are equal to.
 
     Args:
         source: the file.
-        library: all files that were read.
-        names: the names.
+        library: all files that were read: a class may extend one of another file.
+        names: names that the class of the model declares. Variables of other classes are not the model's
+            signals of the same name.
     """
-    wanted = frozenset(names)
-    files = (*library, source)
-    bases = {name: extended for s in files for name, extended in s.bases.items()}
-    has = {name: wanted.intersection(found) for s in files for name, found in s.components.items()}
-    best, most = list[str](), 0
-    for name in dict.fromkeys(statement.scope for statement in source.statements):
-        merged, queue = [name], deque(bases.get(name, ()))
-        while queue and len(merged) < _MAX_BASES:
-            base = _last(queue.popleft())
-            if (base in has or base in bases) and base not in merged:
-                merged.append(base)
-                queue += bases.get(base, ())
-        count = len(frozenset[str]().union(*(has.get(each, frozenset()) for each in merged)))
-        if count >= max(most, 1):
+    scopes = {name: scope for each in (*library, source) for name, scope in each.scopes.items()}
+    main = _class_with_bases(source, scopes, frozenset(names))
+    constants = _constants(main, scopes, library)
+    declared = {name: element for each in main for name, element in scopes[each].components.items()}
+    leading = {port: text for each in main for port, text in scopes[each].leading.items()}
+    found: list[Threshold] = []
+    for name, scope in source.scopes.items():
+        is_main = name in main
+        ports = leading if is_main else scope.leading
+        values = constants if is_main else _constants([name], scopes, library)
+        texts = [*scope.texts, *_comparisons(scope.components, ports)]
+        limits = [*thresholds(texts, values, source.shown, is_dotted=True)]
+        limits += _tables(scope.components, ports, values, source.shown)
+        found += limits if is_main else [within(limit, dict.fromkeys(limit.names, "")) for limit in limits]
+    known = definitions_of(scopes[name] for name in main)
+    made = dict(_outputs(declared, leading))
+    return found, constants, Definitions({**made, **leading, **known.equal}, known.fed)
+
+
+def definitions_of(scopes: Iterable[Scope]) -> Definitions:
+    """Return what variables are equal to at all times, and what each depends on in one step.
+
+    A variable with several statements, or one under a condition, equals no single expression.
+    """
+    values: dict[str, list[str]] = defaultdict(list)
+    fed: dict[str, set[str]] = defaultdict(set)
+    for scope in scopes:
+        for name, texts in scope.values.items():
+            values[name] += texts
+            fed[name] |= scope.uses[name]
+    equal = {name: texts[0] for name, texts in values.items() if len(texts) == 1 and texts[0]}
+    return Definitions(equal, {name: frozenset(used) for name, used in fed.items()})
+
+
+def _class_with_bases(source: Source, scopes: Mapping[str, Scope], names: frozenset[str]) -> list[str]:
+    """Return the class of a file that declares most of these names, the last one on ties, and its bases."""
+    best, most = list[str](), 1
+    for name in source.scopes:
+        merged = [name]
+        for each in merged:  # grows
+            merged += [base for base in scopes[each].bases if base in scopes and base not in merged]
+            del merged[_MAX_BASES:]
+        count = len({n for each in merged for n in names.intersection(scopes[each].components)})
+        if count >= most:
             best, most = merged, count
     return best
 
 
-def used_classes(names: Iterable[str], main: Collection[str], library: Iterable[Source]) -> list[str]:
-    """Return other classes that some names stand for, and those that these use in turn."""
-    uses: dict[str, set[str]] = {}
+def _constants(
+    names: Iterable[str], scopes: Mapping[str, Scope], library: Iterable[Source]
+) -> dict[str, str]:
+    """Return values of parameters with those that modifiers give them: which holds is not told apart."""
+    found = {n: dict.fromkeys(v) for name in names for n, v in scopes[name].constants.items()}
     for source in library:
-        for statement in source.statements:
-            uses.setdefault(statement.scope, set()).update(statement.uses)
-        for scope, declared in source.components.items():
-            uses.setdefault(scope, set()).update(_last(element.kind) for element in declared.values())
-    queue = deque(names)
-    used: dict[str, None] = {}
-    while queue:
-        name = queue.popleft()
-        if name in uses and name not in main and name not in used:
-            used[name] = None
-            queue += sorted(uses[name])
-    return list(used)
+        for name in found.keys() & source.modified.keys():
+            found[name] |= dict.fromkeys(source.modified[name])
+    return {name: " or ".join(values) for name, values in found.items()}
 
 
 def _last(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def comparisons(
-    declared: Mapping[str, Component], leading: Mapping[str, str], kept: Collection[str] | None
-) -> Iterator[tuple[str, int]]:
-    """Return what components compare, with their lines.
-
-    Args:
-        declared: the elements of a class.
-        leading: what leads to the inputs of components.
-        kept: names of those to look at; None: all.
-    """
+def _comparisons(declared: Mapping[str, Component], leading: Mapping[str, str]) -> Iterator[tuple[str, int]]:
+    """Return what the components of a class compare, by what leads to them, with their lines."""
     for name, element in declared.items():
-        for text in _COMPARING.get(_last(element.kind), ()) if kept is None or name in kept else ():
+        for text in _COMPARING.get(_last(element.kind), ()):
             yield _filled(text, name, element, leading), element.line
 
 
-def tables(
+def _tables(
     declared: Mapping[str, Component],
     leading: Mapping[str, str],
-    kept: Collection[str] | None,
     constants: Mapping[str, str],
     shown: str,
 ) -> Iterator[Threshold]:
     """Return the breakpoints of tables, as far as they stand in the source."""
     for name, element in declared.items():
         source = next((leading[p] for p in (f"{name}.u", f"{name}.u[1]") if p in leading), "")
-        if _last(element.kind) in _TABLES and source and (kept is None or name in kept):
+        if _last(element.kind) in _TABLES and source:
             text = element.modifiers.get("table", "")
             found = [row for row in _ROW.findall(constants.get(text, text)) if number_in(row) is not None]
             if found:
                 yield at_breakpoints(source, found, f"{shown}:{element.line}")
 
 
-def outputs(declared: Mapping[str, Component], leading: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+def _outputs(declared: Mapping[str, Component], leading: Mapping[str, str]) -> Iterator[tuple[str, str]]:
     """Return expressions of the outputs of components, by their names: ``gain.y``."""
     for name, element in declared.items():
         if _last(element.kind) in _MADE:

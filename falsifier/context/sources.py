@@ -1,54 +1,60 @@
-"""Modelica and C sources in one pass: statements with the names that they set and use, and constants.
+"""Modelica and C sources: what each class or function declares, sets and compares.
 
-Nothing is resolved that a compiler would resolve. What is read serves three ends: which values are compared,
-what named constants are worth, and which lines to tell first if a file is too long to be told.
+Nothing is resolved that a compiler would resolve. Statements end at semicolons and, in C, at braces; what is
+not closed ends with the file.
 """
 
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain, pairwise
 
-from falsifier.context.statements import Statement
-from falsifier.context.tokens import CLOSING, OPENING, Token, parts, tokens_of, written
-
-_LISTED_C = """
-    if else for while do switch case default break continue return goto sizeof struct union enum
-    typedef static const volatile extern inline register void char short int long float double
-    signed unsigned bool true false NULL auto restrict _Bool real_T boolean_T int32_T uint32_T
-    uint8_T int8_T int16_T uint16_T int_T time_T fmi2Real fmi2Boolean fmi2Integer fmi3Float64
-    fmi3Boolean fmi3Int32
-"""
-_LISTED_MODELICA = """
-    if then else elseif elsewhen when for while loop in end and or not true false initial each time
-    return break parameter constant input output discrete flow stream final inner outer replaceable
-    redeclare equation algorithm Real Integer Boolean String
-"""
-# Names that say nothing, in C and in Modelica.
-_KEYWORDS = (frozenset(_LISTED_C.split()), frozenset(_LISTED_MODELICA.split()))
-_LISTED_FUNCTIONS = """
-    der pre edge change terminal sample noEvent smooth min max abs sqrt sin cos tan asin acos atan
-    atan2 exp log log10 sign floor ceil integer mod div rem sum product size fill zeros ones connect
-    reinit assert terminate homotopy delay Integer Real Boolean String enumeration semiLinear
-    cardinality initial
-"""
-_FUNCTIONS = (_KEYWORDS[False], frozenset(_LISTED_FUNCTIONS.split()))
-_CONDITIONS = frozenset(("if", "for", "while", "switch", "when", "elseif", "elsewhen"))
-_BRANCHES = frozenset(("else", "elseif", "elsewhen"))
-_JUMPS = frozenset(("case", "default", "break", "continue", "goto", "return"))
-_ASSIGNING = frozenset(("=", ":=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="))
-_SECTIONS = frozenset(("equation", "algorithm", "public", "protected"))
-_CLASS_WORDS = frozenset(
-    ("model", "block", "class", "package", "record", "connector", "function", "operator", "type")
+# Comments, texts and names in quotes may contain any sign. Patterns take what they have looked at, so that
+# time grows with the length of a file.
+_SILENT = re.compile(
+    r"""//[^\n]*+|/\*.*?(?:\*/|\Z)|"(?:[^"\\]|\\.)*+(?:"|\\?\Z)|(?P<name>'(?:[^'\\\n]|\\.){1,200}')""",
+    re.DOTALL,
 )
-_CLASS_PREFIXES = frozenset(
-    ("partial", "encapsulated", "expandable", "pure", "impure", "final", "replaceable", "redeclare")
+_DIRECTIVE = re.compile(r"^[ \t]*+#(?:[^\n\\]|\\.)*+", re.MULTILINE | re.DOTALL)
+_DEFINE = re.compile(r"\s*#\s*define\s+(\w+)[ \t]+(.*)", re.DOTALL)
+_CLASS = (
+    r"(?:(?:partial|encapsulated|expandable|pure|impure|final|replaceable|redeclare|operator)\s+)*"
+    r"(?:model|block|class|package|record|connector|function|type)\s+(?P<name>\w++)(?!\s*=)"
 )
-_UNTOLD = frozenset(("annotation", "import", "external", "within"))
-_GIVEN = frozenset(("input", "parameter", "constant", "const"))
-_END = Token("sign", "", 0, 0, 0)
-_MAX_VALUE = 40  # tokens of a modifier
-_MAX_DEPTH = 20  # of structures within structures
+# What may stand before a statement.
+_MODELICA_HEAD = re.compile(
+    rf"\s*(?:(?P<section>(?:initial\s+)?(?:equation|algorithm)\b|public\b|protected\b)|{_CLASS}|else\b"
+    r"|(?P<condition>if|for|while|when|elseif|elsewhen)\b(?P<test>.*?)\b(?:then|loop)\b)",
+    re.DOTALL,
+)
+_C_HEAD = re.compile(
+    r"\s*(?:else\b|do\b|case\b[^:;]*:|[^\W\d]\w*+\s*:(?!=)|(?P<condition>if|for|while|switch)\b)"
+)
+_PREFIX = (
+    r"(?:final|inner|outer|replaceable|redeclare|parameter|constant|discrete|flow|stream|input|output)\s+"
+)
+_MODELICA_DECLARATION = re.compile(
+    rf"(?P<words>(?:{_PREFIX})*)(?P<kind>\.?[^\W\d][\w.]*+)(?:\s*\[[^\]]*\])?\s++(?P<rest>[^\W\d].*)",
+    re.DOTALL,
+)
+_C_DECLARATION = re.compile(
+    r"(?P<words>(?:[^\W\d]\w*+[\s*]++)*?)(?P<kind>[^\W\d]\w*+)[\s*]++"
+    r"(?P<rest>[^\W\d]\w*+\s*(?:[=,\[].*)?)$",
+    re.DOTALL,
+)
+_UNDECLARED = re.compile(r"(?:return|goto|case|break|continue|import|external|within|annotation|end)\b")
+_UNCHANGING = frozenset(("parameter", "constant", "const"))
+_ASSIGNING = r"(?<![<>=!])[-+*/%&|^:]?=(?!=)"
+# Of a.b, the name is a in Modelica and b in C.
+_MODELICA_NAME = re.compile(r"(?<![\w.])[^\W\d]\w*+(?!\s*\()")
+_C_NAME = re.compile(r"\b[^\W\d]\w*+(?!\s*(?:\(|\.|->))")
+_WORD = re.compile(r"[^\W\d]\w*+")
+_PATH = re.compile(r"\s*([^\W\d]\w*+(?:\.[^\W\d]\w*+)*+)")
+_FOR = re.compile(r"[\s}]*(?:else\s+)?for\b")
+_BRACKET = re.compile(r'"(?:[^"\\]|\\.)*+"?|[][(){}]')
+_MAX_CHARACTERS = 4_000_000  # far more than a model of 10,000 lines has
+_MAX_VALUE = 400  # characters of a modifier
+_MAX_DEPTH = 20  # of structures within structures, and of modifiers within modifiers
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +73,31 @@ class Component:
 
 
 @dataclass(slots=True)
+class Scope:
+    """A class of Modelica, a function of C, or what stands outside of all functions.
+
+    Attributes:
+        texts: its statements and conditions, with their lines in the file.
+        own: names that a function declares, except copies of others of the same name.
+        constants: values of its constants and parameters.
+        bases: the classes that it extends.
+        components: what a class declares, by name.
+        leading: what leads to inputs of its components, such as ``limiter.u``.
+        values: what each name is set to; empty text if that depends on a condition, or is no plain value.
+        uses: names in the statements that set a name.
+    """
+
+    texts: list[tuple[str, int]] = field(default_factory=list)
+    own: set[str] = field(default_factory=set)
+    constants: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    bases: list[str] = field(default_factory=list)
+    components: dict[str, Component] = field(default_factory=dict)
+    leading: dict[str, str] = field(default_factory=dict)
+    values: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    uses: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
+
+
+@dataclass(slots=True)
 class Source:
     """One file.
 
@@ -74,13 +105,8 @@ class Source:
         text: its text.
         shown: what messages call it.
         is_modelica: whether it is Modelica.
-        statements: what it says, in order.
-        own: names that each function declares, except copies of others of the same name.
-        constants: values of the constants and parameters of each class, outside classes of all.
-        bases: what each class extends.
+        scopes: its classes or functions by name; the empty name has what stands outside of functions.
         modified: values that modifiers such as ``Base(limit = 8)`` give to names, anywhere in it.
-        components: what each class declares, by name.
-        leading: what leads to inputs of the components of each class, such as ``limiter.u``.
         structures: types and names of the fields of each structure of C, as it is declared.
         filled: types and values of the variables that are declared with values in braces.
     """
@@ -88,428 +114,275 @@ class Source:
     text: str
     shown: str
     is_modelica: bool
-    statements: list[Statement] = field(default_factory=list)
-    own: dict[str, set[str]] = field(default_factory=lambda: defaultdict(set))
-    constants: dict[str, dict[str, list[str]]] = field(
-        default_factory=lambda: defaultdict(lambda: defaultdict(list))
-    )
-    bases: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
+    scopes: dict[str, Scope] = field(default_factory=lambda: defaultdict(Scope))
     modified: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
-    components: dict[str, dict[str, Component]] = field(default_factory=lambda: defaultdict(dict))
-    leading: dict[str, dict[str, str]] = field(default_factory=lambda: defaultdict(dict))
     structures: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
-    filled: list[tuple[str, Sequence[Token]]] = field(default_factory=list)
+    filled: list[tuple[str, str]] = field(default_factory=list)
 
-
-def read_source(text: str, shown: str, *, is_modelica: bool) -> Source:
-    """Return what a file says; what is not closed ends with it.
-
-    Raises:
-        SpecError: if it is too long.
-    """
-    reader = _Reader(Source(text, shown, is_modelica))
-    for token, after in pairwise(chain(tokens_of(text, shown), (_END,))):
-        reader.take(token, after)
-    reader.end_statement()
-    return reader.found
-
-
-def names_in(tokens: Iterable[Token], *, is_modelica: bool) -> frozenset[str]:
-    """Return the names in a text: of ``a.b`` the first one in Modelica, the last member in C."""
-    found = set()
-    before = _END
-    for token, after in pairwise(chain(tokens, (_END,))):
-        is_function = after.text == "("
-        is_left = before.text != "." if is_modelica else after.text not in ("->", ".")
-        unsaid = (_FUNCTIONS if is_function else _KEYWORDS)[is_modelica]
-        if token.kind == "name" and (is_function or is_left) and token.text not in unsaid:
-            found.add(token.text)
-        before = token
-    return frozenset(found)
+    @property
+    def names_set(self) -> set[str]:
+        """The names to which anything in it gives a value."""
+        return {name for scope in self.scopes.values() for name in scope.values}
 
 
 @dataclass(slots=True)
-class _Open:
-    """A class, function, structure, condition or loop whose statements are being read."""
+class _Block:
+    """A class, function, structure or condition whose statements are being read."""
 
-    head: Statement
-    first: Statement  # of a branch, the head of the first one
-    word: str
+    word: str  # class, function, struct or condition; empty outside of all
     scope: str
-    is_conditional: bool = False
+    names: Sequence[str] = ()  # of a structure
     fields: list[tuple[str, str]] = field(default_factory=list)
 
 
-class _Reader:
-    """Goes through the tokens of a file once."""
+def read_source(text: str, shown: str, *, is_modelica: bool) -> Source | None:
+    """Return what a file says; None if it is too long to be read."""
+    if len(text) > _MAX_CHARACTERS:
+        return None
+    found = Source(text, shown, is_modelica)
+    plain = _SILENT.sub(lambda each: _blank(each, keeps_names=is_modelica), text)
+    if is_modelica:
+        _read_modelica(found, plain)
+    else:
+        for directive in _DIRECTIVE.finditer(plain):
+            defined = _DEFINE.match(directive[0])
+            if defined:
+                found.scopes[""].constants[defined[1]].append(_one_line(defined[2].replace("\\\n", " ")))
+        _read_c(found, _DIRECTIVE.sub(lambda each: "\n" * each[0].count("\n"), plain))
+    return found
 
-    def __init__(self, found: Source) -> None:
-        self.found = found
-        self.open: list[_Open] = []
-        self.current: list[Token] = []
-        self.brackets: list[str] = []
-        self.previous: _Open | None = None  # the condition to which an else belongs
-        self.leading = ""  # what a statement of Modelica has been so far: the beginning of a class, or not
-        self.is_initial = False  # whether equations hold at the beginning only
 
-    def take(self, token: Token, after: Token) -> None:
-        """Read one token, before which everything was read."""
-        text, current = token.text, self.current
-        first = current[0].text if current else text
-        if token.kind == "directive":
-            self._directive(token)
-        elif text == ";" and not self._is_inside(first):
-            self.end_statement()
-        elif self.brackets:
-            current.append(token)
-            if text in OPENING:
-                self.brackets.append(text)
-            elif text in CLOSING:
-                self.brackets.pop()
-        elif self.found.is_modelica:
-            self._modelica(token, after, first)
+def without_annotations(text: str) -> str:
+    """Return Modelica as written, without its annotations."""
+    told, end = "", 0
+    for found in re.finditer(r"(?<!\s)\s*\bannotation\s*\(", text):
+        if found.start() >= end:
+            told += text[end : found.start()]
+            end = _closing(text, found.end() - 1)
+    return told + text[end:]
+
+
+def _blank(found: re.Match[str], *, keeps_names: bool) -> str:
+    """Return what stands for a comment or text, with as many lines."""
+    return found[0] if keeps_names and found["name"] else " " + "\n" * found[0].count("\n")
+
+
+def _read_modelica(found: Source, text: str) -> None:
+    blocks = [_Block("", "")]
+    is_initial = False  # whether equations hold at the beginning only
+    for statement, line, _ in _pieces(text, is_modelica=True):
+        at = 0
+        while head := _MODELICA_HEAD.match(statement, at):
+            at = head.end()
+            if head["name"]:
+                blocks.append(_Block("class", head["name"]))
+            elif head["condition"]:
+                found.scopes[blocks[-1].scope].texts.append((_one_line(head["test"]), line))
+                if not head["condition"].startswith("else"):
+                    blocks.append(_Block("condition", blocks[-1].scope))
+            if head["section"] or head["name"]:
+                is_initial = (head["section"] or "").startswith("initial")
+        rest = re.split(r"\bannotation\b", statement[at:], maxsplit=1)[0]
+        line += statement.count("\n", 0, at + len(rest) - len(rest.lstrip()))
+        rest = rest.strip()
+        block = blocks[-1]
+        ending = re.match(r"end\b\s*(if|for|while|when)?", rest)
+        if ending:
+            while not ending[1] and len(blocks) > 1 and blocks[-1].word == "condition":
+                blocks.pop()
+            if len(blocks) > 1 and (blocks[-1].word == "condition") == bool(ending[1]):
+                blocks.pop()
+        elif rest.startswith("extends") and (base := _PATH.match(rest[len("extends") :])):
+            found.scopes[block.scope].bases.append(base[1].rpartition(".")[2])
+            _modified(found, rest)
+        elif block.scope:
+            _read_statement(found, block, rest, line, is_always=block.word == "class" and not is_initial)
+
+
+def _read_c(found: Source, text: str) -> None:
+    blocks = [_Block("", "")]
+    closed: list[tuple[str, str]] | None = None  # fields of the structure that ended last
+    for statement, line, sign in _pieces(text, is_modelica=False):
+        if closed is not None and statement.isidentifier():  # typedef struct { ... } P;
+            found.structures[statement] = closed
+            blocks[-1].fields.append((statement, statement))
+            statement = ""
+        closed = None
+        block, at = blocks[-1], 0
+        while head := _C_HEAD.match(statement, at):
+            at = _closing(statement, head.end()) if head["condition"] else head.end()
+        rest = statement[at:].strip()
+        if sign != "{":
+            is_always = block.word != "condition" and not at
+            _read_statement(found, block, rest, line, is_always=is_always, head=statement[:at])
         else:
-            self._c(token, after, first)
+            blocks.append(_opened(block, rest, is_condition=at > 0))
+            found.scopes[block.scope].texts.append((_one_line(statement[:at]), line))
+        if sign == "}" and len(blocks) > 1:
+            ended = blocks.pop()
+            if ended.word == "struct":
+                closed = ended.fields
+                found.structures.update(dict.fromkeys(ended.names, closed))
 
-    def _is_inside(self, first: str) -> bool:
-        """Whether a semicolon here ends nothing: in a matrix, the head of a loop, a value."""
-        if self.found.is_modelica:
-            return "[" in self.brackets[-1:]
-        return bool(self.brackets) and (first in ("for", "else") or "{" in self.brackets[-1:])
 
-    def _modelica(self, token: Token, after: Token, first: str) -> None:
-        text = token.text
-        self.current.append(token)
-        is_first = len(self.current) == 1
-        if text in OPENING:
-            self.brackets.append(text)
-        elif text in _SECTIONS and self.open and (is_first or first == "initial"):
-            self.is_initial = first == "initial"
-            self._add(follows=True)
-        elif (is_first and text == "else") or (first in _CONDITIONS and text in ("then", "loop")):
-            if first in _BRANCHES and self.open and self.open[-1].is_conditional:
-                self.previous = self.open.pop()
-            self._head(first)
-        elif is_first or self.leading:
-            self._class_begins(token, after, is_first=is_first)
+def _opened(around: _Block, head: str, *, is_condition: bool) -> _Block:
+    """Return what a brace of C opens, by what stands before it."""
+    called = re.search(r"([^\W\d]\w*+)\s*\(", head)
+    if is_condition:
+        return _Block("condition", around.scope)
+    if called and not around.scope:
+        return _Block("function", called[1])
+    if re.match(r"(static\s+|const\s+)*(struct|union|typedef)\b", head):
+        names = [name for name in re.findall(r"\w+", head) if name not in ("struct", "union", "typedef")]
+        return _Block("struct", around.scope, names[-1:])
+    return _Block(around.word, around.scope)
 
-    def _class_begins(self, token: Token, after: Token, *, is_first: bool) -> None:
-        """Follow the words before a declaration, up to the name of a class."""
-        leading = "prefixes" if is_first else self.leading
-        self.leading = ""
-        if leading == "named":
-            self._head("class", self.current[-2].text)
-        elif leading in ("prefixes", "class") and token.text in _CLASS_WORDS:
-            self.leading = "class"
-        elif leading == "class" and after.text != "=":
-            self.leading = "named" if after.kind == "text" else ""
-            if not self.leading:
-                self._head("class", token.text)
-        elif leading == "prefixes" and token.text in _CLASS_PREFIXES:
-            self.leading = leading
 
-    def _c(self, token: Token, after: Token, first: str) -> None:
-        text = token.text
-        if text == "}":
-            self.end_statement()
-            self.current.append(token)
-            self._close(after)
-            return
-        self.current.append(token)
-        if text == "{" and len(self.current) > 1 and self.current[-2].text == "=":
-            self.brackets.append(text)
-        elif text == "{":
-            words = [t.text for t in self.current]
-            name = next((a.text for a, b in pairwise(self.current) if b.text == "(" and a.kind == "name"), "")
-            if first in (*_CONDITIONS, "else", "do"):
-                self._head(first)
-            elif name and not (self.open and self.open[-1].scope):
-                self._head("function", name)
-            else:
-                self._head("struct" if {"struct", "union", "typedef"} & set(words) else "{")
-        elif text in OPENING:
-            self.brackets.append(text)
-        elif text == ":" and (first in ("case", "default") or len(self.current) == 2):
-            self._add(follows=True)
+def _read_statement(
+    found: Source, block: _Block, text: str, line: int, *, is_always: bool, head: str = ""
+) -> None:
+    """Read what declares or sets something."""
+    scope, names = found.scopes[block.scope], _MODELICA_NAME if found.is_modelica else _C_NAME
+    if text or head:
+        scope.texts.append((_one_line(f"{head} {text}"), line))
+    form = _MODELICA_DECLARATION if found.is_modelica else _C_DECLARATION
+    declaration = None if _UNDECLARED.match(text) else form.match(text)
+    words = {*declaration["words"].split(), declaration["kind"]} if declaration else set[str]()
+    for part in _split(declaration["rest"]) if declaration else [text]:
+        left, sign, value = _sides(part)
+        met = (_WORD if declaration else names).findall(re.sub(r"\[[^\]]*\]", "", left))
+        if declaration and met:
+            _declare(found, block, declaration["kind"], met[0], left, value, words, line)
+        if value and not words & _UNCHANGING:
+            is_plain = is_always and sign in ("=", ":=") and (declaration or left[-1:] not in (")", "]"))
+            for name in met[:1] if declaration or found.is_modelica else met[-1:]:
+                scope.values[name].append(value if is_plain else "")
+                scope.uses[name].update(names.findall(f"{head} {text}"))
+    if found.is_modelica and not declaration:
+        scope.leading.update(_leads(text, scope))
 
-    def _directive(self, token: Token) -> None:
-        words = token.text.replace("\\\n", " ").strip().lstrip("#").split(None, 2)
-        inner = list(tokens_of(words[2], "")) if len(words) == 3 and "(" not in words[1] else []
-        if inner and words[0] == "define":
-            value = written(words[2], inner[0].start, inner[-1].end)
-            self.found.constants[""][words[1]].append(value)
-            uses = names_in(inner, is_modelica=False)
-            self.found.statements.append(
-                Statement(self.found.text, token.start, token.end, token.line, sets=frozenset([words[1]]),
-                          uses=uses, is_declaration=True, is_given=True)
-            )  # fmt: skip
 
-    def _head(self, word: str, scope: str = "") -> None:
-        around = self.open[-1] if self.open else None
-        previous = self.previous if word in _BRANCHES else None
-        tokens = self.current
-        is_condition = word not in ("class", "function", "struct")
-        uses = names_in(tokens, is_modelica=self.found.is_modelica) if is_condition else frozenset[str]()
-        head = self._add(
-            uses=uses, scope=scope, outer=previous.head if previous else around.head if around else None
-        )
-        is_conditional = word in ("else", "do", *_CONDITIONS) or (
-            around is not None and around.is_conditional
-        )
-        word = "if" if word in _BRANCHES else word
-        scope = scope or (around.scope if around else "")
-        self.open.append(_Open(head, previous.first if previous else head, word, scope, is_conditional))
-        self.previous = None
+def _declare(
+    found: Source, block: _Block, kind: str, name: str, left: str, value: str, words: set[str], line: int
+) -> None:
+    """Note what a declaration says of a name."""
+    scope = found.scopes[block.scope]
+    if found.is_modelica:
+        scope.components[name] = Component(kind, _modified(found, left), line)
+        if value and words & _UNCHANGING:
+            scope.constants[name].append(value)
+    elif "typedef" in words:
+        found.structures.setdefault(name, [(kind, "")])
+    elif block.word == "struct":
+        block.fields.append((kind, name))
+    elif block.scope and "extern" not in words and name not in _C_NAME.findall(value):
+        scope.own.add(name)
+    elif value.startswith("{"):
+        found.filled.append((kind, value))
+    elif value and "const" in words:
+        found.scopes[""].constants[name].append(value)
 
-    def _close(self, after: Token) -> None:
-        """End what is open, with the statement that is being read."""
-        if not self.open or not self.current:
-            self.current = []
-            return
-        popped = self.open.pop()
-        self._add(follows=True, outer=popped.first, scope=popped.scope)
-        if popped.word == "struct":
-            listed = tokens_of(popped.head.text, "")
-            names = [t.text for t in listed if t.kind == "name" and t.text not in _KEYWORDS[False]]
-            for name in (*names[:1], after.text):  # struct P_ { ... }; and typedef struct { ... } P;
-                if name.isidentifier():
-                    self.found.structures[name] = popped.fields
-            if self.open and after.kind == "name":
-                self.open[-1].fields.append((after.text, after.text))
-        self.previous = popped if after.text == "else" else None
 
-    def _add(
-        self,
-        *,
-        sets: Iterable[str] = (),
-        uses: frozenset[str] = frozenset(),
-        outer: Statement | None = None,
-        scope: str = "",
-        value: tuple[int, int] | None = None,
-        follows: bool = False,
-        is_declaration: bool = False,
-        is_given: bool = False,
-        is_told: bool = True,
-    ) -> Statement:
-        """End the statement that is being read."""
-        tokens, around = self.current, self.open[-1] if self.open else None
-        cut = next((i for i, t in enumerate(tokens) if i and t.text == "annotation"), 0)
-        statement = Statement(
-            self.found.text, tokens[0].start, tokens[cut - 1].end, tokens[0].line,
-            scope or (around.scope if around else ""),
-            outer or (around.head if around else None), frozenset(sets), uses, value, follows,
-            is_declaration, is_given, is_told, tokens[-1].end if cut else 0,
-        )  # fmt: skip
-        if not self.found.is_modelica or statement.scope:  # outside of classes is nothing to tell
-            self.found.statements.append(statement)
-        self.current = []
-        self.brackets = []
-        return statement
+def _modified(found: Source, text: str, depth: int = 0) -> dict[str, str]:
+    """Note the values that modifiers give to names; return those directly within the first bracket."""
+    opening = text.find("(")
+    direct: dict[str, str] = {}
+    if opening < 0 or depth > _MAX_DEPTH:
+        return direct
+    for part in _split(text[opening + 1 : _closing(text, opening) - 1]):
+        left, _, value = _sides(part)
+        names = _WORD.findall(left.partition("(")[0])  # each final start(...) = 3
+        if names and 0 < len(value) <= _MAX_VALUE:
+            direct[names[-1]] = value
+            found.modified[names[-1]].append(value)
+        _modified(found, left, depth + 1)
+    return direct
 
-    def end_statement(self) -> None:
-        """End a statement without others in it."""
-        tokens = self.current
-        self.leading = ""
-        self.brackets = []
-        first = tokens[0].text if tokens else ""
-        if not tokens:
-            return
-        if self.found.is_modelica and first == "end":
-            is_inner = len(tokens) > 1 and tokens[1].text in _CONDITIONS
-            while not is_inner and len(self.open) > 1 and self.open[-1].word != "class":
-                self.open.pop()
-            if is_inner and not (self.open and self.open[-1].is_conditional):
-                self.current = []
-            self._close(_END)
-        elif first in _UNTOLD:
-            self._add(is_told=False)
-        elif self.found.is_modelica and first == "extends":
-            self.found.bases[self.open[-1].scope if self.open else ""].append(_path(tokens[1:]))
-            self._modified(tokens)
-            self._add(follows=True)
-        elif first in _JUMPS and first != "return":
-            self._add(follows=True)
+
+def _leads(text: str, scope: Scope) -> Iterator[tuple[str, str]]:
+    """Return what leads to an input of a component, which the library calls u, u1, ... or reference."""
+    left, _, right = _sides(text)
+    is_connection = text.startswith("connect")
+    if is_connection:
+        sides = [path[1] for part in _split(left.partition("(")[2]) if (path := _PATH.match(part))]
+        pairs = [(sides[0], sides[1]), (sides[1], sides[0])] if len(sides) == 2 else []
+    else:
+        path = _PATH.match(left)
+        pairs = [(path[1], right)] if path and right else []
+    for port, source in pairs:
+        _, dot, last = port.rpartition(".")
+        declared = scope.components.get(port)
+        is_input = dot and (last.rstrip("0123456789") == "u" or last == "reference")
+        if is_input or (is_connection and declared is not None and declared.kind.endswith("Output")):
+            yield port, source
+
+
+def _pieces(text: str, *, is_modelica: bool) -> Iterator[tuple[str, int, str]]:
+    """Return statements with their lines, and the sign that ends each: a semicolon, or a brace of C.
+
+    A bracket that is not closed ends with its statement, except matrices of Modelica, loops and values of C.
+    """
+    begin, line, opened = 0, 1, list[str]()
+    for found in re.finditer(r"=\s*\{|[][(){};]", text):
+        sign, at = found[0][-1], found.start()
+        if sign == ";":
+            kept = "[" if is_modelica else "{(" if _FOR.match(text, begin) else "{"
+            is_end = not opened or opened[-1] not in kept
         else:
-            self._plain(tokens)
-
-    def _plain(self, tokens: Sequence[Token]) -> None:
-        """Read what sets, declares or calls something."""
-        told = _before(tokens, "annotation")
-        body = _without_heads(told)
-        around = self.open[-1] if self.open else None
-        scope = around.scope if around else ""
-        kind = _kind(body)
-        words = {t.text for t in body[:4]} if kind else set[str]()
-        sets: set[str] = set()
-        value = None
-        for part in parts(body, ",") if kind else [list(body)]:
-            left, right = _sides(part)
-            right = [t for t in right if t.kind != "text"]
-            names = _set(left, is_modelica=self.found.is_modelica, is_declaration=bool(kind))
-            sets |= names
-            value = (right[0].start, right[-1].end) if right else value
-            for name in names if kind else ():
-                self._declared(scope, name, kind, right, words, part)
-        if body and body[0].text == "return":
-            sets = {scope}
-        elif self.found.is_modelica:
-            self._leading(body, scope)
-        uses = names_in(told, is_modelica=self.found.is_modelica)
-        is_always = not (around and around.is_conditional) and len(body) == len(told) and not self.is_initial
-        is_plain = len(sets) == 1 and is_always and _is_equal(body)
-        previous = self.previous if tokens[0].text == "else" else None
-        statement = self._add(
-            sets=sets,
-            uses=uses - sets if kind else uses,  # what is declared together has nothing else in common
-            outer=previous.head if previous else None,
-            value=value if is_plain and not words & {"parameter", "constant"} else None,
-            is_declaration=bool(kind),
-            is_given=bool(kind) and bool(value or words & _GIVEN or kind.endswith("Input")),
-        )
-        is_if = tokens[0].text in ("if", "else")
-        self.previous = _Open(statement, statement, "if", scope) if is_if else None
-
-    def _declared(
-        self, scope: str, name: str, kind: str, value: Sequence[Token], words: set[str], part: Sequence[Token]
-    ) -> None:
-        """Note what a declaration says of a name."""
-        text = written(self.found.text, value[0].start, value[-1].end) if value else ""
-        if "typedef" in words:
-            self.found.structures.setdefault(name, [(kind, "")])
-        elif self.open and self.open[-1].word == "struct":
-            self.open[-1].fields.append((kind, name))
-        elif self.found.is_modelica:
-            modifiers = dict(self._modified(part))
-            self.found.components[scope][name] = Component(kind, modifiers, part[0].line)
-            if text and words & {"parameter", "constant"}:
-                self.found.constants[scope][name].append(text)
-        elif scope and "extern" not in words and name not in names_in(value, is_modelica=False):
-            self.found.own[scope].add(name)
-        elif value and value[0].text == "{":
-            self.found.filled.append((kind, value))
-        elif value and "const" in words:
-            self.found.constants[""][name].append(text)
-
-    def _modified(self, tokens: Sequence[Token]) -> Iterator[tuple[str, str]]:
-        """Note the values that modifiers give to names; return those directly within the first bracket."""
-        opened: list[int] = []
-        last = 0  # where the bracket began that was closed last
-        outer: list[tuple[str, str]] = []
-        for i, token in enumerate(tokens):
-            if token.text in OPENING:
-                opened.append(i)
-            elif token.text in CLOSING and opened:
-                last = opened.pop()
-            elif token.text == "=" and opened:
-                name = tokens[last - 1] if tokens[i - 1].text == ")" else tokens[i - 1]  # p(min = 0) = 4
-                value = _inside(tokens[i + 1 : i + 1 + _MAX_VALUE])
-                if value:
-                    text = written(self.found.text, value[0].start, value[-1].end)
-                    self.found.modified[name.text].append(text)
-                    outer += [(name.text, text)] if len(opened) == 1 else []
-        return iter(outer)
-
-    def _leading(self, tokens: Sequence[Token], scope: str) -> None:
-        """Note what leads to an input of a component, which the library calls u, u1, ... or reference."""
-        left, right = _sides(tokens)
-        if tokens and tokens[0].text == "connect":
-            sides = [_path(part) for part in parts(tokens[2:-1], ",")]
-            pairs = [sides[:2], sides[1::-1]] if len(sides) == 2 else []
-        else:
-            pairs = [[_path(left), written(self.found.text, right[0].start, right[-1].end)]] if right else []
-        for port, source in pairs:
-            _, dot, last = port.rpartition(".")
-            declared = self.found.components[scope].get(port)
-            kind = declared.kind if declared else ""
-            is_input = dot and (last.rstrip("0123456789") == "u" or last == "reference")
-            if is_input or (kind.endswith("Output") and tokens[0].text == "connect"):
-                self.found.leading[scope][port] = source
+            is_end = not is_modelica and not opened and found[0] in ("{", "}")
+        if is_end:
+            piece = text[begin:at]
+            blank = len(piece) - len(piece.lstrip())
+            yield piece.strip(), line + piece.count("\n", 0, blank), sign
+            line += text.count("\n", begin, found.end())
+            begin, opened = found.end(), []
+        elif sign in "([{":
+            opened.append(sign)
+        elif sign != ";" and opened:
+            opened.pop()
+    blank = len(text) - begin - len(text[begin:].lstrip())
+    yield text[begin:].strip(), line + text.count("\n", begin, begin + blank), ""
 
 
-def _without_heads(tokens: Sequence[Token]) -> Sequence[Token]:
-    """Return the tokens behind ``else if (...)`` and the like."""
-    i = 0
-    while i < len(tokens) and tokens[i].text in ("else", "if", "for", "while", "switch", "do"):
-        i += 1
-        depth = 0
-        while i < len(tokens) and (depth or tokens[i].text == "("):
-            depth += (tokens[i].text in OPENING) - (tokens[i].text in CLOSING)
-            i += 1
-            if not depth:
-                break
-    return tokens[i:]
-
-
-def _kind(tokens: Sequence[Token]) -> str:
-    """Return the type in a declaration, which begins with two names; empty if a statement is none."""
-    words: list[str] = []
-    is_member, depth = False, 0
-    for token in tokens:
-        depth += (token.text == "[") - (token.text == "]")
-        if token.kind == "name" and not depth:
-            if is_member:
-                words[-1] += f".{token.text}"
-            else:
-                words.append(token.text)
-        elif (not depth and token.text not in ("]", "*", ".")) or not words:
-            break
-        is_member = token.text == "."
-    return words[-2] if len(words) > 1 and words[0] not in _JUMPS else ""
-
-
-def _set(tokens: Sequence[Token], *, is_modelica: bool, is_declaration: bool) -> frozenset[str]:
-    """Return what is declared or stands on the left of a sign; of a call, all names."""
-    if not is_declaration and tokens and tokens[-1].text == ")":
-        return names_in(tokens, is_modelica=is_modelica)
-    paths: list[list[str]] = []
-    is_member, depth = False, 0
-    for token in tokens:
-        depth += (token.text in OPENING) - (token.text in CLOSING)
-        if not depth and token.kind == "name" and token.text not in _KEYWORDS[is_modelica]:
-            if not is_member:
-                paths.append([])
-            paths[-1].append(token.text)
-        is_member = bool(paths) and token.text in (".", "->")
-    if is_declaration:
-        return frozenset(paths[-1][-1:] if paths else [])
-    return frozenset(path[0 if is_modelica else -1] for path in paths)
-
-
-def _sides(tokens: Sequence[Token]) -> tuple[Sequence[Token], Sequence[Token]]:
+def _closing(text: str, at: int) -> int:
+    """Return the place behind the bracket that closes the first one from a place on."""
     depth = 0
-    for i, token in enumerate(tokens):
-        depth += (token.text in OPENING) - (token.text in CLOSING)
-        if token.text in _ASSIGNING and depth == 0:
-            return tokens[:i], tokens[i + 1 :]
-    return tokens, []
+    for found in _BRACKET.finditer(text, at):
+        depth += (found[0] in "([{") - (found[0] in ")]}")
+        if depth <= 0 and found[0] in ")]}":
+            return found.end()
+    return len(text)
 
 
-def _is_equal(tokens: Sequence[Token]) -> bool:
-    """Whether a name, and not its derivative or an element of it, is equal to something."""
-    left, right = _sides(tokens)
-    sign = tokens[len(left)].text if right else ""
-    return sign in ("=", ":=") and left[-1].kind == "name"
-
-
-def _path(tokens: Sequence[Token]) -> str:
-    """Return the name ``a.b.c`` at the beginning."""
-    names = [tokens[0].text] if tokens else []
-    names += [b.text for a, b in pairwise(tokens) if a.text == "." and b.kind == "name"]
-    return ".".join(names)
-
-
-def _inside(tokens: Sequence[Token]) -> Sequence[Token]:
-    """Return the tokens before a comma, or before the bracket that closes what is around them."""
+def _outside(text: str, sign: str) -> Iterator[re.Match[str]]:
+    """Return where a sign stands outside of brackets."""
     depth = 0
-    for i, token in enumerate(tokens):
-        depth += (token.text in OPENING) - (token.text in CLOSING)
-        if depth < 0 or (token.text == "," and depth == 0):
-            return tokens[:i]
-    return tokens
+    for found in re.finditer(rf"[(\[{{]|[)\]}}]|(?P<sign>{sign})", text):
+        if found["sign"] is None:
+            depth += 1 if found[0] in "([{" else -1
+        elif depth == 0:
+            yield found
 
 
-def _before(tokens: Sequence[Token], word: str) -> Sequence[Token]:
-    return next((tokens[:i] for i, token in enumerate(tokens) if token.text == word), tokens)
+def _split(text: str) -> Iterator[str]:
+    """Return what stands between the commas that are outside of brackets."""
+    begin = 0
+    for comma in _outside(text, ","):
+        yield text[begin : comma.start()].strip()
+        begin = comma.end()
+    yield text[begin:].strip()
+
+
+def _sides(text: str) -> tuple[str, str, str]:
+    """Return what stands before an assignment or equation, its sign, and its value in one line."""
+    sign = next(_outside(text, _ASSIGNING), None)
+    if sign is None:
+        return text, "", ""
+    return text[: sign.start()].strip(), sign[0], _one_line(text[sign.end() :])
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def constants_of(sources: Sequence[Source], signals: Iterable[str]) -> Mapping[str, str]:
@@ -521,40 +394,34 @@ def constants_of(sources: Sequence[Source], signals: Iterable[str]) -> Mapping[s
     """
     found: dict[str, dict[str, None]] = defaultdict(dict)
     structures = {name: fields for s in sources for name, fields in s.structures.items()}
-    changing = {name.rpartition(".")[2] for name in signals}
-    changing |= {
-        name for s in sources for each in s.statements if not each.is_declaration for name in each.sets
-    }
+    changing = {name.rpartition(".")[2] for name in signals}.union(*(s.names_set for s in sources))
     for source in sources:
-        for name, texts in source.constants[""].items():
+        for name, texts in source.scopes[""].constants.items():
             found[name] |= dict.fromkeys(texts)
         for kind, values in source.filled:
-            for name, value in _fields(source.text, kind, values, structures):
+            for name, value in _fields(kind, values, structures):
                 if name not in changing:
                     found[name][value] = None
     return {name: " or ".join(texts) for name, texts in found.items()}
 
 
 def _fields(
-    text: str,
-    kind: str,
-    values: Sequence[Token],
-    structures: Mapping[str, Sequence[tuple[str, str]]],
-    depth: int = 0,
+    kind: str, values: str, structures: Mapping[str, Sequence[tuple[str, str]]], depth: int = 0
 ) -> Iterator[tuple[str, str]]:
     """Return names and values of the fields of a structure, from ``{ 1, { 2, 3 }, .x = 4 }``."""
     fields = structures.get(kind, ())
     if len(fields) == 1 and not fields[0][1]:  # another name of this structure
         fields = structures.get(fields[0][0], ())
     at = 0
-    for part in parts(values[1:-1], ","):
-        if len(part) > 3 and part[0].text == "." and part[2].text == "=":
-            at = next((i for i, (_, name) in enumerate(fields) if name == part[1].text), at)
-            part = part[3:]
+    for part in _split(values.strip()[1:-1]):
+        left, _, right = _sides(part)
+        if right and left.startswith("."):
+            at = next((i for i, (_, name) in enumerate(fields) if name == left[1:].strip()), at)
+            part = right
         if at < len(fields) and part:
             inner, name = fields[at]
-            if part[0].text != "{":
-                yield name, written(text, part[0].start, part[-1].end)
+            if not part.startswith("{"):
+                yield name, part
             elif depth < _MAX_DEPTH:
-                yield from _fields(text, inner, part, structures, depth + 1)
+                yield from _fields(inner, part, structures, depth + 1)
         at += 1

@@ -5,8 +5,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from math import isinf
-
-from falsifier.context.tokens import CLOSING, OPENING, Token, tokens_of, written
+from typing import NamedTuple
 
 _RELATIONS = ("<", "<=", ">", ">=", "==", "!=", "<>")
 _SIGNS = ("<", ">", "==", "!=")
@@ -18,6 +17,37 @@ _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
 _NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
 _MAX_LENGTH = 160
 _SHOWN_VALUES = 12
+OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
+# Every alternative either takes what it has looked at or gives up after a limited number of characters, so
+# that time grows with the length of a text.
+_TOKEN = re.compile(
+    r"""
+    (?P<blank>\s++)
+  | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
+  | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+
+             |(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?[a-zA-Z]*+)
+  | (?P<name>[^\W\d]\w*+|'(?:[^'\\\n]|\\.){1,200}')
+  | (?P<text>"(?:[^"\\]|\\.)*+(?:"|\\?\Z))
+  | (?P<sign><=|>=|==|!=|<>|:=|&&|\|\||->|\+\+|--|[-+*/%&|^]=|.)
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+
+
+class Token(NamedTuple):
+    """One word, number, text or sign.
+
+    Attributes:
+        kind: ``name``, ``number``, ``text`` or ``sign``.
+        text: as written.
+        start: its first character, from 0.
+        end: the character behind it.
+    """
+
+    kind: str
+    text: str
+    start: int
+    end: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +87,7 @@ def thresholds(
     for text, line in texts:
         if not any(sign in text for sign in _SIGNS):
             continue
-        tokens = list(tokens_of(text, file))
+        tokens = list(tokens_of(text))
         for i, token in enumerate(tokens):
             if token.text in _RELATIONS:
                 first, last = _first(tokens, i), _last(tokens, i)
@@ -140,12 +170,16 @@ def _threshold(
     variables = paths.keys() - known.keys()
     if not variables or not values:
         return None
-    shown = written(text, tokens[0].start, tokens[-1].end)
+    shown = _written(text, tokens)
     if len(shown) > _MAX_LENGTH:
         return None
     stated = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
-    before, behind = (written(text, side[0].start, side[-1].end) for side in (left, right))
+    before, behind = _written(text, left), _written(text, right)
     return Threshold(frozenset(variables), f"{shown}{stated}", before, behind, named, place)
+
+
+def _written(text: str, tokens: Sequence[Token]) -> str:
+    return " ".join(text[tokens[0].start : tokens[-1].end].split())
 
 
 def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[str, str]]:
@@ -187,3 +221,10 @@ def _ends(token: Token, depth: int, closing: Collection[str]) -> bool:
     """Whether an operand ends before a token."""
     text = token.text
     return depth == 0 and (text in closing or text in _BOUNDARIES or text in _RELATIONS)
+
+
+def tokens_of(text: str) -> Iterator[Token]:
+    """Return the tokens of an expression of any of the languages, without blanks and comments."""
+    for found in _TOKEN.finditer(text):
+        if found.lastgroup not in ("blank", "comment"):
+            yield Token(found.lastgroup or "", found[0], found.start(), found.end())

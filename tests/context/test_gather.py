@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.context.gather import MAX_CHARACTERS, MAX_TOTAL, gather
-from falsifier.context.values import Context
+from falsifier.context.values import Compared, Context, Named
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from tests.fixtures import simulink
@@ -28,17 +28,13 @@ def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
     others = [c.text for c in context.comparisons if not c.signals]
     assert "pause * period >= settling (period = 0.1, settling = 1.5)" in others
     first, second = context.excerpts
-    assert (first.form, first.sha256) == (
-        "what the requirement depends on",
-        sha256(LIMP.read_bytes()).hexdigest(),
-    )
+    assert (first.form, first.sha256) == ("whole", sha256(LIMP.read_bytes()).hexdigest())
     assert second.form == "structure, as far as the requirement depends on it"
 
 
 def test_a_source_of_one_component_is_found_by_the_names_of_a_system(tmp_path: Path) -> None:
     signals = ["bath.trips", "bath.disagreement", "other.disagreement"]
     context = gather([str(LIMP)], [], seeds=["bath.trips"], signals=signals)
-    assert context.excerpts[0].form == "what the requirement depends on"
     assert context.of("bath.disagreement") == context.of("other.disagreement") != ()
 
 
@@ -62,12 +58,10 @@ def test_a_long_model_fits(tmp_path: Path) -> None:
         + "\n  w = 2 * u;\n  y = if w > 7.25 then 1 else 0;\nend Big;\n"
     )
     context = gather([str(path)], [], seeds=["y"], signals=["y", "u"])
-    assert context.excerpts[0].form == "what the requirement depends on"
-    assert "w > 7.25" in context.excerpts[0].text
-    assert "x17" not in context.excerpts[0].text
-    deep = gather([str(path)], [], seeds=["x599"], signals=["x599", "u"]).excerpts[0]
-    assert deep.form.endswith("because the rest is too long")
-    assert len(deep.text) <= MAX_CHARACTERS
+    (excerpt,) = context.excerpts
+    assert excerpt.form == "lines with the requirement's signals, because the rest is too long"
+    assert "w > 7.25" in excerpt.text
+    assert len(excerpt.text) <= MAX_CHARACTERS
 
 
 def test_all_files_together_fit(tmp_path: Path) -> None:
@@ -189,9 +183,9 @@ def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
 
 def test_long_names_are_shortened(tmp_path: Path) -> None:
     name = "M" * 50_000
-    (tmp_path / "a.mo").write_text(f"model {name}\n  Real trips;\nequation\n  trips = 1;\nend {name};\n")
-    (excerpt,) = read(tmp_path / "a.mo").excerpts
-    assert excerpt.text == f"class {'M' * 194}... (50,006 characters)"
+    (tmp_path / "a.mdl").write_text(f'Model {{\nName "{name}"\nSystem {{\n}}\n}}\n')
+    (excerpt,) = read(tmp_path / "a.mdl").excerpts
+    assert excerpt.text == f"{'M' * 200}... (50,000 characters)"
 
 
 def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
@@ -200,10 +194,23 @@ def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
     (tmp_path / "plant.mo").write_text(
         "model Plant\n  extends Lib.Base;\nequation\n  trips = if power > limit then 1 else 0;\nend Plant;\n"
     )
-    alone = read(tmp_path / "plant.mo").excerpts[0]
-    assert "no class declares a signal" in alone.form
-    _, both = read(tmp_path / "base.mo", tmp_path / "plant.mo").excerpts
-    assert both.form == "what the requirement depends on"
-    assert "parameter Real limit = 3;" in both.text
+    assert read(tmp_path / "plant.mo").of("power") == ()
     context = read(tmp_path / "plant.mo", tmp_path / "base.mo")
     assert "power > limit (limit = 3)" in context.of("power")
+
+
+def test_what_is_known_of_a_signal() -> None:
+    context = Context(comparisons=(Compared(("u",), "u > 3", "a.mo:1"), Compared((), "x > 1", "a.mo:2")))
+    assert context.of("u") == ("u > 3",)
+    assert context.of("x") == ()
+
+
+def test_nothing_named_is_false() -> None:
+    assert not Named()
+    assert Named(("a.md",))
+    assert Named(fmu=True)
+
+
+def test_a_checked_file_alone_is_not_overlooked() -> None:
+    assert Named.of(["checked:a.md"])
+    assert not Named.of(["none"])

@@ -1,150 +1,92 @@
+"""What is compared in sources, by what each file says, and the levels that follow."""
+
 import pytest
 
-from falsifier.context.forms import Readable, of_source, parsed
+from falsifier.context.excerpts import Readable, of_text, parsed
 from falsifier.context.levels import levels_of
 from falsifier.context.sources import Source
 from falsifier.core.files import bundled
 
+MODEL = """model M
+ parameter Real p = 3;
+ input Real u;
+ Real y;
+equation
+ y = if u > p then 1 else 0;
+end M;"""
+
+
+def read(text: str, shown: str, seed: str, *more: str) -> Readable:
+    return of_text(text, shown, [seed], [seed, *more])
+
+
+def found(text: str, shown: str, seed: str, *more: str) -> list[str]:
+    return [threshold.text for threshold in read(text, shown, seed, *more).found]
+
+
+def levels(readable: Readable) -> list[float]:
+    return [level.value for level in levels_of(readable.found, readable.known, {"u": (0.0, 10.0)})]
+
+
+def source(text: str, shown: str) -> Source:
+    parsed_source = parsed(text, shown)
+    assert parsed_source is not None
+    return parsed_source
+
+
 C = """
-#include <math.h>
 #define ENTER 9.5 /* K */
-#define UNUSED 3
 #define SQUARE(x) ((x) * (x))
 static const double LEAVE = 0.2;
-static double hidden;
-typedef struct { double speed; } Y;
-double limit(double x);
 double limit(double x) { return x > 100 ? 100 : x; }
-static void idle(void) { nothing(); }
 static void control(Model *m) {
-  double e = m->wanted - m->temperature;
+  double e = m->wanted - m->temperature; // "quoted
   if (m->disagreement > ENTER) {
     m->limp = 1;
-    m->age = m->time - m->ended;
   } else if (m->limp && m->disagreement < LEAVE)
     m->limp = 0;
-  else {
-    m->log++;
-  }
   switch (m->limp) {
     case 1:
       m->power = limit(30);
       break;
     default:
-      m->power = limit(e * 5);
+      m->power = e > 5;
   }
   for (int i = 0; i < 3; i++) m->buf[i] = 0;
 }
-void step(Model *m) {
-  control(m);
-  m->out.trips += m->temperature >= 64.0;
-}
-void plant(Model *m) { m->temperature = m->temperature + m->power * 0.1; }
-"""
-MODELICA = """
-within Lib;
-package P "A package"
-  import SI = Modelica.Units;
-  partial model Base
-    parameter Real limit(min = 0) = 2 * 3 "Where it ends";
-  end Base;
-  function f
-    input Real a;
-    output Real b;
-  algorithm
-    b := if a > 3 then a else 0;
-  end f;
-  model M "A model"
-    extends Base(limit = 7);
-    type Mode = enumeration(Off, On);
-    input Real u, v[3](each start = 1);
-    output Real y = if u > limit then 1 else 0 "Result" annotation(Dialog(tab = "x"));
-    Real idle(min = 0);
-    Mode mode;
-  protected
-    Real x(start = 1);
-  initial equation
-    x = 0;
-  equation
-    der(x) = f(u);
-    if u > 3 then
-      mode = Mode.On;
-    elseif x > 4 then
-      mode = Mode.Off;
-    else
-      mode = pre(mode);
-    end if;
-    idle = 2 * y;
-  algorithm
-    annotation(experiment(StopTime = 1));
-  end M;
-end P;
 """
 
 
-def read(text: str, shown: str, seed: str, *more: str) -> Readable:
-    return of_source(text, shown, [seed], [seed, *more])
-
-
-def first_of(readable: Readable) -> list[str]:
-    return [line.strip() for line in readable.forms[0].text().splitlines()]
-
-
-def source(text: str, shown: str) -> Source:
-    found = parsed(text, shown)
-    assert found is not None
-    return found
-
-
-def test_of_c_only_what_the_signal_depends_on_is_told() -> None:
-    lines = first_of(read(C, "a.c", "model.trips"))
-    for line in (
-        "#define ENTER 9.5 /* K */",
-        "static const double LEAVE = 0.2;",
-        "double limit(double x) { return x > 100 ? 100 : x; }",
-        "if (m->disagreement > ENTER) {",
-        "m->limp = 1;",
-        "} else if (m->limp && m->disagreement < LEAVE)",
-        "case 1:",
-        "break;",
-        "control(m);",
-        "m->out.trips += m->temperature >= 64.0;",
-    ):
-        assert line in lines, lines
-    for word in ("UNUSED", "hidden", "idle", "buf", "log", "age", "SQUARE"):
-        assert word not in " ".join(lines)
-    assert "statements left out" in lines[-1]
-
-
-def test_of_modelica_only_what_the_signal_depends_on_is_told() -> None:
-    lines = first_of(read(MODELICA, "a.mo", "mode", "y", "u"))
-    for line in ("input Real u, v[3](each start = 1);", "elseif x > 4 then", "der(x) = f(u);", "end if;"):
-        assert line in lines, lines
-    assert "type Mode = enumeration(Off, On);" in lines
-    assert "b := if a > 3 then a else 0;" in lines, "a function that is used is told"
-    assert not any("idle" in line or "output Real y" in line for line in lines)
-    assert 'output Real y = if u > limit then 1 else 0 "Result";' in first_of(read(MODELICA, "a.mo", "idle"))
-
-
-def test_a_condition_around_a_call_counts_and_a_loop_is_told_with_its_end() -> None:
-    text = "void f(M *m) {\n m->y = 1;\n}\nvoid g(M *m) {\n if (m->u > 5) {\n  f(m);\n }\n m->z = 2;\n}\n"
-    assert first_of(read(text, "a.c", "y"))[:-1] == [
-        "void f(M *m) {", "m->y = 1;", "}", "void g(M *m) {", "if (m->u > 5) {", "f(m);", "}", "...", "}"
-    ]  # fmt: skip
-    loop = "model M\n Real y, k;\nalgorithm\n while k > 3 loop\n  y := 1;\n end while;\nend M;\n"
-    assert first_of(read(loop, "a.mo", "y"))[2:] == [
-        "algorithm",
-        "while k > 3 loop",
-        "y := 1;",
-        "end while;",
-        "end M;",
+def test_comparisons_of_c_with_their_lines() -> None:
+    told = read(C, "a.c", "limp", "disagreement")
+    assert [(t.text, t.place) for t in told.found] == [
+        ("x > 100", "a.c:5"),
+        ("m->disagreement > ENTER (ENTER = 9.5)", "a.c:8"),
+        ("m->disagreement < LEAVE (LEAVE = 0.2)", "a.c:10"),
+        ("e > 5", "a.c:16"),
+        ("i < 3", "a.c:19"),
     ]
+    assert told.known.equal == {"e": "m->wanted - m->temperature"}
 
 
-def test_an_unknown_that_nothing_sets_is_met_in_equations() -> None:
-    text = "model M\n input Real u;\n Real i;\n Real other;\nequation\n u = 2 * i;\n{}end M;\n"
-    assert "u = 2 * i;" in first_of(read(text.format(""), "a.mo", "i"))
-    assert "other = i;" not in first_of(read(text.format(" other = i;\n i = 2 * u;\n"), "a.mo", "i"))
+def test_classes_conditions_and_sections_of_modelica() -> None:
+    text = (
+        'within Lib;\npackage P "A package"\n import SI = Modelica.Units;\n partial model Base\n'
+        '  parameter Real limit(min = 0) = 2 * 3 "Where it ends";\n end Base;\n'
+        " function f\n  input Real a;\n output Real b;\n algorithm\n  b := if a > 3 then a else 0;\n end f;\n"
+        ' model M "A model; with a sign"\n  extends Base(limit = 7);\n  type Mode = enumeration(Off, On);\n'
+        '  input Real u, v[3](each start = 1);\n  output Real y = if u > limit then 1 else 0 "Result";\n'
+        "  Real x;\n  Real w;\n protected\n  Mode mode;\n initial equation\n  x = 5;\n equation\n"
+        "  der(x) = u;\n  w = 2 * u;\n  if u > 4 then\n   mode = Mode.On;\n"
+        "  elseif w > 8.5 then\n   mode = Mode.Off;\n  end if;\n end M;\nend P;\n"
+    )
+    told = read(text, "a.mo", "y", "u")
+    assert [(t.text, sorted(t.names)) for t in told.found] == [
+        ("a > 3", []), ("u > limit (limit = 2 * 3 or 7)", ["u"]), ("u > 4", ["u"]), ("w > 8.5", ["w"])
+    ]  # fmt: skip
+    assert told.known.equal["w"] == "2 * u"
+    assert not {"x", "mode"} & told.known.equal.keys()
+    assert levels(told) == [4.0, 4.25, 6.0, 7.0]
 
 
 @pytest.mark.parametrize(
@@ -163,26 +105,22 @@ def test_an_unknown_that_nothing_sets_is_met_in_equations() -> None:
     ],
 )
 def test_what_is_not_closed_or_nested_deep_is_told_all_the_same(text: str, shown: str) -> None:
-    readable = read(text, shown, "y")
-    assert readable.forms[0].name == "what the requirement depends on"
-    assert "y" in readable.forms[0].text()
+    assert read(text, shown, "y").forms[0].text() == text.strip()
 
 
 def test_every_bundled_source_is_read() -> None:
     folder = bundled("fmus").parent / "modelica"
     for path in sorted(folder.glob("*/*.mo")):
         if path.name not in ("package.mo", "Tables.mo"):
-            found = source(path.read_text(encoding="utf-8"), path.name)
-            assert found.components.get(path.stem) or found.bases.get(path.stem), path
+            text = source(path.read_text(encoding="utf-8"), path.name)
+            assert text.scopes[path.stem].components or text.scopes[path.stem].bases, path
 
 
 def test_constants_are_resolved() -> None:
     text = "#ifdef A\n#define L 5\n#else\n#define L 9\n#endif\nvoid f(M *m) { m->y = m->u > L; }"
-    (told,) = read(text, "a.c", "y").found
-    assert told.text == "m->u > L (L = 5 or 9)"
-    assert first_of(read(text, "a.c", "y"))[:2] == ["#define L 5", "#define L 9"]
-    (told,) = read("const double L = 0.5; void f(M *m) { m->y = m->u > L; }", "a.c", "y").found
-    assert told.text == "m->u > L (L = 0.5)"
+    assert found(text, "a.c", "y") == ["m->u > L (L = 5 or 9)"]
+    text = "const double L = 0.5; void f(M *m) { m->y = m->u > L; }"
+    assert found(text, "a.c", "y") == ["m->u > L (L = 0.5)"]
 
 
 HEADER = """
@@ -204,17 +142,16 @@ def test_fields_of_generated_c_have_the_values_of_another_file(values: str) -> N
     data = f"P_ctrl_T ctrl_P = {{ {values} }};\nExtU ctrl_U = {{ 0.0 }};\n"
     step = "void step(void) { ctrl_Y.y = ctrl_U.u > ctrl_P.limit || ctrl_U.u < ctrl_P.inner.low; }"
     library = {text: source(text, "a.c") for text in (HEADER, data, step)}
-    readable = of_source(step, "a.c", ["y"], ["y", "u"], library=library)
+    readable = of_text(step, "a.c", ["y"], ["y", "u"], library=library)
     assert [t.text for t in readable.found] == [
         "ctrl_U.u > ctrl_P.limit (limit = 9.5)", "ctrl_U.u < ctrl_P.inner.low (low = 0.5)"
     ]  # fmt: skip
-    levels = levels_of(readable.found, readable.known, {"u": (0.0, 10.0)})
-    assert [level.value for level in levels] == [0.5, 9.5]
+    assert levels(readable) == [0.5, 9.5]
 
 
 def test_what_a_structure_gives_first_to_a_signal_is_no_constant() -> None:
     text = "typedef struct { real_T u; } U; U in = { 3.0 };\nvoid f(void) { out.y = in.u > 5; }"
-    assert [t.text for t in read(text, "a.c", "y", "u").found] == ["in.u > 5"]
+    assert found(text, "a.c", "y", "u") == ["in.u > 5"]
 
 
 def test_what_a_variable_equals_has_one_statement_under_no_condition() -> None:
@@ -227,5 +164,88 @@ def test_what_a_variable_equals_has_one_statement_under_no_condition() -> None:
     assert readable.known.equal["d"] == "2 * a"
     assert readable.known.equal["a"] == "u - 1"
     assert not {"e", "x"} & readable.known.equal.keys()
-    levels = levels_of(readable.found, readable.known, {"u": (0.0, 10.0)})
-    assert [level.value for level in levels] == [3.0, 6.0]  # d > 4, and the state x follows its input
+    assert levels(readable) == [3.0, 6.0]  # d > 4, and the state x follows its input
+
+
+def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
+    derived = f"{MODEL}\nmodel D\n extends M(p = 8);\nend D;"
+    assert found(derived, "a.mo", "y") == ["u > p (p = 3 or 8)"]
+    part = f"{MODEL}\nmodel D\n M m(p(min = 0) = 4);\n M n(p = f(1, 2), u = 5);\n Real z;\nend D;"
+    assert found(part, "a.mo", "y") == ["u > p (p = 3 or 4 or f(1, 2))"]
+
+
+def test_a_local_variable_is_not_the_signal_of_its_name() -> None:
+    text = (
+        "void step(M *m) {\n double u = noise();\n double v = m->v;\n double w;\n"
+        " if (u > 3) m->y = 1;\n if (v > 4) m->y = 2;\n if (m->u > 5) m->y = 3;\n if (w > 6) m->y = 4;\n"
+        " extern double out; unsigned int a, b[2];\n if (out > 7 || a > 8 || b[0] > 9) m->y = 5;\n}\n"
+    )
+    names = {t.right: set(t.names) for t in of_text(text, "a.c", ["y"], ["y", "u", "v", "w"]).found}
+    assert names == {"3": set(), "4": {"v"}, "5": {"u"}, "6": set(), "7": {"out"}, "8": set(), "9": set()}
+
+
+@pytest.mark.parametrize(
+    ("declared", "expected"),
+    [("double y;", [2.5]), ("double x, y, z[3];", [2.5]), ("real_T *y;", [2.5]), ("double y = 0;", [])],
+)
+def test_a_variable_that_is_declared_before_it_is_set_gives_a_level(
+    declared: str, expected: list[float]
+) -> None:
+    text = f"double f(double u) {{\n {declared}\n y = 2 * u;\n if (y > 0x5) out = 1;\n}}\n"
+    assert levels(read(text, "a.c", "out", "u")) == expected
+
+
+def test_variables_of_other_classes_are_not_the_signals_of_their_names() -> None:
+    model = (
+        "model Sub\n input Real u;\n Boolean high = u > 3;\nend Sub;\n"
+        "model M\n input Real u;\n Real y;\n Sub sub(u = y);\nequation\n"
+        " y = if sub.high then u else 0;\nend M;\n"
+    )
+    (limit,) = of_text(model, "a.mo", ["y"], ["y", "u"]).found
+    assert (limit.text, limit.names) == ("u > 3", frozenset())
+
+
+def model(declared: str, equations: str) -> str:
+    return f"""model M
+  import Modelica.Blocks.*;
+  Modelica.Blocks.Interfaces.RealInput u annotation(Placement(extent = {{{{0, 0}}, {{1, 1}}}}));
+  output Boolean y;
+  parameter Real top = 7;
+  {declared}
+equation
+  {equations}
+  y = part.y;
+end M;
+"""
+
+
+@pytest.mark.parametrize(
+    ("declared", "equations", "told", "expected"),
+    [
+        ("Logical.Hysteresis part(uLow = 2, uHigh = top);", "connect(u, part.u);",
+         ["u > top (top = 7)", "u < 2"], [2.0, 7.0]),
+        ("Logical.GreaterThreshold part(threshold = 4);", "connect(part.u, u);", ["u > 4"], [4.0]),
+        ("Logical.LessEqualThreshold part;", "part.u = u - 3;", ["u - 3 <= 0"], [3.0]),
+        ("Logical.OnOffController part(bandwidth = 2, reference = 5);", "connect(u, part.u);",
+         ["u > 5 + 2 / 2", "u < 5 - 2 / 2"], [4.0, 6.0]),
+        ("Math.Gain g(k = 2); Logical.GreaterThreshold part(threshold = 5);",
+         "connect(u, g.u); connect(g.y, part.u);", ["g.y > 5"], [2.5]),
+        ("Tables.CombiTable1Ds part(table = [0, 1; 2.5, 3; 30, 4]);", "connect(u, part.u);",
+         ["u leads to a table with the breakpoints 0, 2.5, 30"], [0.0, 2.5]),
+        ("Nonlinear.Limiter part(uMax = 6);", "connect(u, part.u);", ["u > 6", "u < -(6)"], [6.0]),
+    ],
+)  # fmt: skip
+def test_blocks_of_the_standard_library_compare_what_leads_to_them(
+    declared: str, equations: str, told: list[str], expected: list[float]
+) -> None:
+    readable = of_text(model(declared, equations), "a.mo", ["y"], ["y", "u"])
+    assert [t.text for t in readable.found] == told
+    assert levels(readable) == pytest.approx(expected)
+
+
+def test_a_component_is_not_the_signal_of_its_variable() -> None:
+    text = (
+        "model M\n Sub sub;\n input Real u;\n Real y;\nequation\n y = if sub.u > 3 then 1 else u;\nend M;\n"
+    )
+    (limit,) = of_text(text, "a.mo", ["y"], ["y", "u"]).found
+    assert limit.names == {"sub.u"}

@@ -1,4 +1,4 @@
-from falsifier.context.thresholds import number_in, thresholds, within
+from falsifier.context.thresholds import number_in, thresholds, tokens_of, within
 
 
 def found(text: str, **constants: str) -> list[str]:
@@ -46,3 +46,11 @@ def test_names_within_stand_for_others_outside() -> None:
     seen = within(one, {"d": "speed", "t": "", "other": "x"})
     assert (seen.text, seen.names) == ("d - t > 3 (d = speed)", frozenset({"speed"}))
     assert seen.constants == {"d": "speed", "t": ""}
+
+
+def test_kinds_of_tokens_of_all_languages() -> None:
+    tokens = list(tokens_of('/* two\nlines */ x.y >= 1.5e-3f; // end\n\'a b\' "t\\"" :='))
+    assert [(t.kind, t.text) for t in tokens] == [
+        ("name", "x"), ("sign", "."), ("name", "y"), ("sign", ">="), ("number", "1.5e-3f"), ("sign", ";"),
+        ("name", "'a b'"), ("text", '"t\\""'), ("sign", ":=")
+    ]  # fmt: skip

@@ -1,9 +1,12 @@
-"""What lies inside an FMU beside its binaries: documentation, sources, texts, terminals, annotations."""
+"""Files as they are named: their text, what lies inside an FMU, and secrets in them, which are refused."""
 
-from collections.abc import Iterator
+import codecs
+import re
+from collections.abc import Collection, Iterator
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
+from falsifier.core.secrets import line_of_held_secret, line_of_secret
 from falsifier.errors import SpecError
 from falsifier.fmu.description import UNREADABLE, open_archive, read_xml
 
@@ -18,6 +21,16 @@ _MAX_BYTES = 4 << 20
 _MAX_FILES = 400
 # What to do about a file inside an FMU that cannot be told: it cannot be left out alone.
 NAME_THEM = "unpack the FMU, and name the files that matter with --context FILE instead of --context fmu"
+# The mark of UTF-32 begins like that of UTF-16.
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+# Control characters that no editor writes: what is not UTF-8 and has them is binary.
+_CONTROL = re.compile(r"[\x01-\x08\x0e-\x19\x1c-\x1f]")
 
 
 def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
@@ -98,3 +111,88 @@ def _annotation(element: Element, of: str) -> str:
         if inner is not element
     ]
     return f"{of}annotation {kind}: {'; '.join(values)} {text}".strip()
+
+
+def text_of(content: bytes) -> str | None:
+    """Return the text of a file by the mark it begins with, else UTF-8, Windows-1252 or Latin-1.
+
+    None for binary data.
+
+    >>> text_of("5 K".encode("utf-16")), text_of(bytes([53, 176])), text_of(bytes(4))
+    ('5 K', '5°', None)
+    """
+    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
+    try:
+        text = content.decode(encoding)
+    except UnicodeDecodeError:
+        if encoding != "utf-8":
+            return None
+        text = _western(content)
+        if _CONTROL.search(text):
+            return None
+    return None if "\0" in text else text
+
+
+def _western(content: bytes) -> str:
+    """Return the text in Windows-1252, which has quotes and dashes where Latin-1 has control characters."""
+    try:
+        return content.decode("cp1252")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+class Sentry:
+    """Looks at every text of a file before it is told, and notes what the user allowed.
+
+    Attributes:
+        notes: what was allowed, one sentence per text.
+    """
+
+    def __init__(self, checked: Collection[str]) -> None:
+        self._checked = frozenset(checked)
+        self.notes: list[str] = []
+        self._unused = set(checked)
+
+    def look(self, text: str, shown: str, file: str, otherwise: str) -> None:
+        """Refuse a text that looks like a secret.
+
+        Args:
+            text: what is to be told, or what that is made of.
+            shown: the place, for messages.
+            file: the file, by the name that a user would give.
+            otherwise: what to do if it is a secret.
+
+        Raises:
+            SpecError: naming file and line, never the line's text.
+        """
+        self._unused.discard(file)
+        line = line_of_held_secret(text)
+        if line is not None:
+            raise SpecError(
+                f"context {shown}: line {line} has the value of an environment variable that is named like a "
+                f"key, token or password, so nothing is sent; {otherwise}"
+            )
+        line = line_of_secret(text)
+        if line is None:
+            return
+        if file not in self._checked:
+            raise SpecError(
+                f"context {shown}: line {line} looks like a key, token or password, so nothing is sent; "
+                f"{otherwise}; if it is none, allow this file with --context 'checked:{file}', or with "
+                f"checked = ['{file}'] in the spec's [context]"
+            )
+        note = f"context {shown}: line {line} looks like a key, token or password, and was allowed"
+        if note not in self.notes:
+            self.notes.append(note)
+
+    def refuse_unused(self) -> None:
+        """Refuse names of checked files at which nothing was looked: they may be misspelt.
+
+        Raises:
+            SpecError: naming them.
+        """
+        if self._unused:
+            raise SpecError(
+                f"context: checked names {', '.join(sorted(self._unused))}, which is not read; use the "
+                "file's name as in the message about it, or drop it"
+            )

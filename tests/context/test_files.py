@@ -1,0 +1,118 @@
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from falsifier.context import files
+from falsifier.context.files import Sentry, inside, text_of
+from falsifier.errors import SpecError
+
+DESCRIPTION = """<fmiModelDescription fmiVersion="3.0"><Annotations>
+<Annotation type="org.x"><limit value="3"/>
+</Annotation></Annotations><ModelVariables><Float64 name="u"><Annotations><Annotation type="t">deep
+</Annotation></Annotations></Float64></ModelVariables></fmiModelDescription>"""
+TERMINALS = """<fmiTerminalsAndIcons><Terminals><Terminal name="bus" matchingRule="plug" description="CAN">
+<TerminalMemberVariable memberName="v" variableName="bus_v"/></Terminal></Terminals></fmiTerminalsAndIcons>"""
+
+
+def write(path: Path, **more: str) -> Path:
+    files = {
+        "modelDescription.xml": DESCRIPTION,
+        "terminalsAndIcons/terminalsAndIcons.xml": TERMINALS,
+        "documentation/index.html": "<p>hello</p>",
+        "documentation/logo.png": "x",
+        "sources/model.c": "int a;",
+        "sources/fmi2Functions.h": "int b;",
+        "resources/map.txt": "1 2",
+        "resources/map.csv": "1,2",
+        "binaries/linux64/m.so": "x",
+    } | more
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+    return path
+
+
+def test_only_what_may_say_something_is_opened(tmp_path: Path) -> None:
+    found = {name: content.decode() for name, content in inside(write(tmp_path / "m.fmu"))}
+    assert sorted(found) == [
+        "documentation/index.html",
+        "modelDescription.xml",
+        "resources/map.txt",
+        "sources/model.c",
+        "terminalsAndIcons/terminalsAndIcons.xml",
+    ]
+    assert found["terminalsAndIcons/terminalsAndIcons.xml"] == "terminal bus (plug), CAN: v = bus_v"
+    assert found["modelDescription.xml"].splitlines() == [
+        "annotation org.x: limit value=3",
+        "u: annotation t:  deep",
+    ]
+
+
+def test_too_large_too_many_and_damaged_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(SpecError, match=r"m\.fmu: documentation/a\.md has 5 MiB, more than 4"):
+        list(inside(write(tmp_path / "m.fmu", **{"documentation/a.md": "x" * (5 << 20)})))
+    with pytest.raises(SpecError, match=r"modelDescription\.xml: refused"):
+        list(inside(write(tmp_path / "m.fmu", **{"modelDescription.xml": "<!DOCTYPE a><a/>"})))
+    monkeypatch.setattr(files, "_MAX_FILES", 2)
+    with pytest.raises(SpecError, match="5 documents and sources, more than 2"):
+        list(inside(write(tmp_path / "m.fmu")))
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32", "latin-1"])
+def test_text_is_read_in_the_encodings_that_tools_write(encoding: str) -> None:
+    assert text_of("limit = 64 °C".encode(encoding)) == "limit = 64 °C"
+
+
+@pytest.mark.parametrize("mark", [b"\xfe\xff", b"\x00\x00\xfe\xff"])
+def test_marks_of_big_endian_text(mark: bytes) -> None:
+    assert text_of(mark + "5 K".encode("utf-16-be" if len(mark) == 2 else "utf-32-be")) == "5 K"
+
+
+@pytest.mark.parametrize("content", [b"\x7fELF\0\1", b"\xff\xfe\0", b"\xef\xbb\xbf\xff", b"\xff\xfe\0\0\xff"])
+def test_binary_data_is_no_text(content: bytes) -> None:
+    assert text_of(content) is None
+
+
+def test_quotes_and_dashes_of_windows_are_kept() -> None:
+    assert text_of("limit – 5 “km/h”".encode("cp1252")) == "limit – 5 “km/h”"
+
+
+def test_what_has_control_characters_and_is_not_utf_8_is_binary() -> None:
+    assert text_of(bytes(range(1, 256))) is None
+
+
+ALARM = "gain = 3\npassword: operators know it\n"
+
+
+def test_a_line_like_a_key_is_refused_with_what_to_do() -> None:
+    with pytest.raises(
+        SpecError, match=r"a\.md: line 2 looks like a key.*leave it out; if it is none.*checked:a\.md"
+    ):
+        Sentry(()).look(ALARM, "a.md", "a.md", "leave it out")
+
+
+def test_an_allowed_line_is_noted_once() -> None:
+    sentry = Sentry(["a.md"])
+    for _ in range(2):
+        sentry.look(ALARM, "a.md", "a.md", "leave it out")
+    sentry.refuse_unused()
+    assert sentry.notes == ["context a.md: line 2 looks like a key, token or password, and was allowed"]
+
+
+def test_only_the_named_file_is_allowed() -> None:
+    with pytest.raises(SpecError, match=r"b\.md: line 2"):
+        Sentry(["a.md"]).look(ALARM, "b.md", "b.md", "leave it out")
+
+
+def test_the_value_of_a_key_is_never_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PLANT_API_KEY", "quite an ordinary value")
+    with pytest.raises(SpecError, match=r"a\.md: line 1 has the value of an environment variable"):
+        Sentry(["a.md"]).look("quite an ordinary value", "a.md", "a.md", "leave it out")
+
+
+def test_a_checked_name_that_is_not_read_is_refused() -> None:
+    sentry = Sentry(["a.md", "misspelt.md"])
+    sentry.look("fine", "a.md", "a.md", "leave it out")
+    with pytest.raises(SpecError, match=r"checked names misspelt\.md"):
+        sentry.refuse_unused()
