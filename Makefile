@@ -30,11 +30,12 @@ types: types-linux types-win32 types-darwin
 types-linux: .venv/test
 	$(BIN)/mypy
 
-# Only these modules can differ between systems: tests/core/test_operating_system.py checks that no other one uses
-# what not all systems have.
+# Only these modules can differ between systems: all that import what not all systems have in full, and those that
+# ask which system it is.
 types-win32 types-darwin: types-%: .venv/test
 	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$* --follow-imports silent \
-		$$(grep -rlE 'sys\.platform|operating_system' --include='*.py' falsifier)
+		$$(grep -rlE 'sys\.platform|operating_system|^ *(import|from) (os|signal|socket|subprocess|ctypes)\b' \
+			--include='*.py' falsifier)
 
 # Compiles the loops once, where tests side by side would each do it.
 compiled: .venv/test

@@ -19,12 +19,3 @@ def test_what_is_simulated_is_the_key_whoever_proposed_it() -> None:
 def test_it_goes_through_json_whole() -> None:
     candidate = Candidate({"a": HELD, "b": FREE}, {"p": 0.1 + 0.2}, "llm MP5", "because of x < 1")
     assert Candidate.from_json(json.loads(json.dumps(candidate.to_json()))) == candidate
-
-
-def test_what_the_plain_form_leaves_out_is_empty() -> None:
-    assert Candidate.from_json({}) == Candidate()
-    signals = {"u": {"times": [0], "values": [1], "interpolation": "constant"}}
-    read = Candidate.from_json({"signals": signals, "parameters": {"p": 3}})
-    assert read.signals["u"] == Signal((0,), (1,), "constant")
-    assert read.parameters == {"p": 3.0}
-    assert isinstance(read.parameters["p"], float)

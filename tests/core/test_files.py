@@ -1,6 +1,5 @@
 import os
 import tempfile
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -64,12 +63,6 @@ def test_what_a_killed_process_has_left_is_removed_by_its_exact_name(tmp_path: P
     remove_partial(tmp_path / "none", r"\d+")
 
 
-def test_specs_and_fmus_come_with_the_package() -> None:
-    spec = tomllib.loads((bundled("specs") / "AT.toml").read_text())
-    assert (bundled("specs") / spec["model"]["fmu"]).is_file()
-    assert (bundled("fmus") / "AT.fmu").is_file()
-
-
 def test_what_lies_inside_the_package_goes_before_what_lies_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -91,11 +84,3 @@ def test_a_temporary_folder_that_others_can_write_to_is_not_used(
     assert own is not None and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)
     assert own_temporary_folder("falsifier-test") is None
-
-
-def test_without_a_temporary_folder_there_is_no_private_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse() -> str:
-        raise FileNotFoundError("No usable temporary directory found")
-
-    monkeypatch.setattr("tempfile.gettempdir", refuse)
-    assert own_temporary_folder("falsifier-numba") is None

@@ -1,5 +1,4 @@
 import math
-import pickle
 from typing import Any
 
 import numpy as np
@@ -59,11 +58,6 @@ def test_a_function_is_a_model() -> None:
 @pytest.mark.parametrize(("given", "level"), [({}, 0.0), ({"inflow": 3.0, "area": 1.0}, 3.0)])
 def test_an_input_without_a_signal_is_constant(given: dict[str, float], level: float) -> None:
     assert FunctionModel(tank, INFO).simulate({}, given, EXPERIMENT)["level"][-1] == pytest.approx(level)
-
-
-def test_it_travels_between_processes() -> None:
-    model = pickle.loads(pickle.dumps(FunctionModel(tank, INFO)))
-    assert model.simulate(INFLOW, {}, EXPERIMENT)["level"][-1] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,3 @@
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,19 +12,6 @@ def test_an_exit_code_or_a_signal_is_named() -> None:
     assert posix.exit_text(3) == "it exited with code 3"
     assert posix.exit_text(-11) == "signal SIGSEGV"
     assert posix.exit_text(-250) == "signal 250"
-
-
-def in_child(code: str) -> str:
-    """What a process prints that runs this code."""
-    program = [sys.executable, "-c", "from falsifier.core import posix\n" + code]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    return subprocess.run(program, env=environment, stdout=-1, text=True, check=True, timeout=HANG).stdout
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="this is a service of Linux")
-def test_hidden_memory_is_not_dumped() -> None:
-    code = "posix.hide_memory()\nimport ctypes\nprint(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0))"
-    assert in_child(code) == "0\n"
 
 
 def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
@@ -48,14 +32,3 @@ def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
         program.send(b"end\n", HANG)
         assert program.ends_within(HANG)
         assert program.end() == 5
-
-
-def test_a_program_that_hangs_is_ended_at_once(tmp_path: Path) -> None:
-    policy = encoded(
-        Policy(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", "echo here >&3; sleep 1000")
-    )
-    with posix_files.sealed_file(8) as output, posix_files.sealed_file(8) as shared:
-        path = [str(worker_program(tmp_path))]
-        program = posix.Program(path, {}, output.fileno(), policy, shared.fileno())
-        assert program.wait(HANG)
-        assert program.end() == -9

@@ -47,28 +47,6 @@ def test_a_lock_is_not_taken_through_a_link(tmp_path: Path) -> None:
     assert not (tmp_path / "elsewhere").exists()
 
 
-def test_a_part_of_a_file_is_read_without_moving_its_position() -> None:
-    with posix_files.sealed_file(10) as file:
-        os.write(file.fileno(), b"abcdef")
-        assert posix_files.read_at(file.fileno(), 2, 1) == b"bc"
-        assert os.lseek(file.fileno(), 0, os.SEEK_CUR) == 6
-
-
-def test_a_file_takes_the_place_of_another_one(tmp_path: Path) -> None:
-    for name in ("old", "new"):
-        (tmp_path / name).write_text(name)
-    posix_files.replace(tmp_path / "new", tmp_path / "old")
-    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("old", "new")]
-
-
-def test_a_folder_that_others_may_write_to_is_not_private(tmp_path: Path) -> None:
-    assert posix_files.is_own(tmp_path)
-    tmp_path.chmod(0o700)
-    assert posix_files.is_private(tmp_path)
-    tmp_path.chmod(0o720)
-    assert not posix_files.is_private(tmp_path)
-
-
 def test_a_tree_deeper_than_recursion_goes_is_removed(tmp_path: Path) -> None:
     root = tmp_path / "deep"
     root.mkdir()

@@ -18,15 +18,6 @@ ROLL = ParameterRange("roll", 0.63, 0.89)
 SPACE = SearchSpace((THROTTLE, BRAKE), (ROLL,), 50.0)
 
 
-def test_dimensions_name_control_points_and_parameters() -> None:
-    dimensions = SPACE.dimensions
-    assert [d.name for d in dimensions] == ["throttle"] * 7 + ["brake"] * 3 + ["roll"]
-    assert dimensions[1].time == pytest.approx(50 / 6)
-    assert dimensions[8].time == pytest.approx(50 / 3)
-    assert dimensions[-1].time is None
-    assert SPACE.bounds.shape == (11, 2)
-
-
 @given(st.lists(st.floats(0, 1), min_size=11, max_size=11))
 def test_decode_and_encode_are_inverse(unit: list[float]) -> None:
     low, high = SPACE.bounds.T
@@ -34,12 +25,6 @@ def test_decode_and_encode_are_inverse(unit: list[float]) -> None:
     candidate = SPACE.decode(vector, origin="test")
     np.testing.assert_allclose(SPACE.encode(candidate), vector, rtol=0, atol=1e-12)
     assert Candidate.from_json(candidate.to_json()) == candidate
-
-
-def test_admitted_signals_bear_the_hold_of_their_input() -> None:
-    candidate = SPACE.decode(SPACE.bounds[:, 0])
-    assert candidate.signals["throttle"].hold == 0.05
-    assert candidate.signals["brake"].hold is None
 
 
 def test_rounding_is_clipped_and_more_is_refused() -> None:
@@ -76,13 +61,6 @@ def test_a_free_parameterization_is_checked_against_its_limits() -> None:
         free.admit(Candidate({"u": Signal((0.0, 11.0), (0.0, 1.0))}))
 
 
-def test_equal_simulations_have_equal_keys() -> None:
-    a = SPACE.decode(SPACE.bounds[:, 0], origin="a", rationale="because")
-    b = SPACE.decode(SPACE.bounds[:, 0], origin="b")
-    assert a.key == b.key
-    assert a.key != SPACE.decode(SPACE.bounds[:, 1]).key
-
-
 GEAR = InputRange(
     "gear",
     1.0,
@@ -103,12 +81,6 @@ def test_whole_numbers_are_admitted_whole(gear: float, count: float) -> None:
     assert candidate.parameters["count"] in (1.0, 2.0, 3.0)
     assert space.admit(candidate) == candidate
     assert space.decode(space.encode(candidate)) == candidate
-
-
-def test_the_nearest_item_is_taken() -> None:
-    space = SearchSpace((GEAR,), (COUNT,), 10.0)
-    assert space.decode([1.9, 2.1, 5.2, 2.6]).signals["gear"].values == (1.0, 3.0, 7.0)
-    assert space.decode([1.9, 2.1, 5.2, 2.6]).parameters["count"] == 3.0
 
 
 def test_bounds_are_allowed_numbers() -> None:

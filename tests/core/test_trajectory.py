@@ -20,11 +20,6 @@ def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
     assert loaded["x"].tobytes() == TRAJECTORY["x"].tobytes()
 
 
-def test_values_at_a_time() -> None:
-    assert TRAJECTORY.at(0.52) == pytest.approx({"x": 0.25, "y": -0.5})
-    assert TRAJECTORY.step == pytest.approx(0.1)
-
-
 def test_missing_signals_and_unequal_lengths_are_named() -> None:
     with pytest.raises(MonitorError, match=r"no signal 'z'.*known: x, y"):
         TRAJECTORY["z"]

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from tests.fmu.fixtures import isolated, ramp, run
+from tests.fmu.fixtures import ME, isolated, ramp, run
+from tests.fmu.support import END
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
 Floats = NDArray[np.float64]
@@ -39,12 +40,6 @@ def test_a_smaller_communication_step_keeps_the_output_grid(name: str) -> None:
     np.testing.assert_allclose(got["x"], expected, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", LAGS)
-def test_start_values_and_parameters_are_set_before_the_start(name: str) -> None:
-    got = run(isolated(name), ("x",), parameters={"x": 4.0, "T": 0.5})
-    np.testing.assert_allclose(got["x"], 4.0 * np.exp(-got.times / 0.5), atol=1e-5)
-
-
 @pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
 def test_every_type_goes_in_rounded_and_comes_out(name: str) -> None:
     model = isolated(name)
@@ -61,18 +56,6 @@ def test_every_type_goes_in_rounded_and_comes_out(name: str) -> None:
         }.get(variable.kind, np.rint(raw))
         np.testing.assert_allclose(got[variable.name][1:], expected, err_msg=variable.name)
     model.close()
-
-
-@pytest.mark.parametrize(
-    ("kind", "low", "high"), [("Int8", -128, 127), ("UInt8", 0, 255), ("Int16", -32768, 32767)]
-)
-def test_integers_keep_their_limits(kind: str, low: int, high: int) -> None:
-    model = isolated("Echo_3")
-    for value in (low, high):
-        got = run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (float(value),))})
-        assert got[f"out_{kind}"][-1] == value
-    with pytest.raises(SimulationError, match=rf"do not fit 'in_{kind}', .* from {low} to {high}"):
-        run(model, (f"out_{kind}",), signals={f"in_{kind}": Signal((0.0,), (high + 1.0,))})
 
 
 def test_elements_of_arrays_are_driven_set_and_recorded_alone() -> None:
@@ -110,3 +93,26 @@ def test_events_inside_of_steps(name: str) -> None:
     assert got["bounces"][got.index(0.45)] == 0 and got["bounces"][got.index(0.5)] == 1
     flight = 0.5 - np.sqrt(2 / 9.81)
     assert got["v"][got.index(0.5)] == pytest.approx(0.7 * np.sqrt(2 * 9.81) - 9.81 * flight, abs=0.12)
+
+
+def test_parameters_that_do_not_fit_are_refused_before_the_simulation() -> None:
+    with pytest.raises(SimulationError, match=r"'misdeed'") as caught:
+        run(isolated("Misdeeds_2"), ("y",), parameters={"misdeed": 1e12})
+    assert caught.value.time == 0.0
+
+
+def test_where_an_input_is_driven_its_range_is_looked_at_over_the_whole_time() -> None:
+    signal = Signal((0.0, 0.5, 0.7), (0.0, 300.0, 0.0), "constant")
+    with pytest.raises(SimulationError, match=r"from 0 to 300 .*'in_UInt8'"):
+        run(isolated("Echo_3"), ("out_UInt8",), signals={"in_UInt8": signal})
+
+
+def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time() -> None:
+    with pytest.raises(SimulationError, match=r"terminated the simulation at t = 0\.6 s"):
+        run(isolated("Misdeeds_3"), ("y",), parameters={"misdeed": END})
+
+
+@pytest.mark.parametrize("interface", ["co-simulation", ME])
+def test_the_first_sample_is_that_of_time_zero(interface: str) -> None:
+    got = run(isolated("Lag_2", interface), ("x", "y"), signals={"u": ramp(1.0)}, parameters={"x": 4.0})  # type: ignore[arg-type]
+    assert (got["x"][0], got["y"][0]) == (4.0, 4.0)

@@ -80,14 +80,6 @@ def test_a_failed_instantiation_tells_the_models_words_and_that_it_needs_its_too
     model.close()
 
 
-def test_messages_of_all_simulations_on_request() -> None:
-    speaking = FmuModel(fixtures.path("Silent_2"), logging=True)
-    with pytest.raises(SimulationError) as caught:
-        run(speaking, ("y",), signals=FAILS)
-    assert caught.value.log
-    speaking.close()
-
-
 @pytest.mark.parametrize("name", ["Table_1", "Table_2", "Table_3"])
 def test_strings_can_be_set(name: str, tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()
@@ -137,14 +129,6 @@ def test_two_names_of_one_input_are_one_input() -> None:
     assert info.notes == ("two names of one input: plant.u = u; use the second",)
     with pytest.raises(ModelError, match=r"'plant\.u' cannot be set: it is another name of 'u'"):
         run(isolated("Aliases_3"), ("y",), parameters={"plant.u": 1.0})
-
-
-def test_a_formula_may_use_either_name() -> None:
-    problem = Problem.from_fmu(fixtures.path("Aliases_3"), "G[0,10] (plant.u + plant.y <= 30)")
-    assert problem.space.names == ("u",)
-    assert problem.requirement.formula.signals == ("u", "plant.y")
-    assert simulate(problem, {"u": 10.0}).robustness == pytest.approx(10.07, abs=0.05)
-    problem.model.close()
 
 
 def test_clocks_and_binary_variables_are_ignored_and_named() -> None:

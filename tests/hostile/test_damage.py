@@ -142,27 +142,6 @@ def test_a_damaged_counterexample_file_is_never_another_counterexample(tmp_path:
             one_line_of(error)
 
 
-def test_a_doubled_and_a_lost_line_shift_no_verdict(tmp_path: Path) -> None:
-    Standing().run(tmp_path)
-    path = tmp_path / "journal.jsonl"
-    lines = path.read_bytes().splitlines(keepends=True)
-    for wrong in ([*lines[:4], lines[3], *lines[4:]], [*lines[:3], *lines[4:]]):
-        path.write_bytes(b"".join(wrong))
-        with pytest.raises(JournalError, match="lines are missing or doubled"):
-            Standing().resume(tmp_path)
-
-
-def test_a_damaged_trajectory_counts_as_missing(tmp_path: Path) -> None:
-    wanted = outcome(Standing().run(tmp_path))
-    paths = sorted((tmp_path / "trajectories").iterdir())
-    assert len(paths) == 8
-    for path in paths:
-        path.write_bytes(flip(path.read_bytes(), Random(1)))
-    assert outcome(Standing().resume(tmp_path)) == wanted
-    assert len(repair(tmp_path)) == 8
-    assert not list((tmp_path / "trajectories").glob("*.npz"))
-
-
 def test_a_journal_without_its_manifest_is_refused(tmp_path: Path) -> None:
     Standing().run(tmp_path)
     (tmp_path / "manifest.json").unlink()
@@ -204,24 +183,6 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         assert done.exit_code == 0, done.output
         resume_campaign(tmp_path / "c")
         assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
-
-
-def test_a_dropped_evaluation_of_a_finished_run_is_repeated_by_its_campaign(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    work_in_threads(monkeypatch)
-    run_campaign(request("hard", seeds=1, budget=40), tmp_path)
-    (run,) = (tmp_path / "runs").iterdir()
-    wanted = outcomes(tmp_path)
-    assert wanted[0][1] == "falsified"
-    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    first = next(i for i, line in enumerate(lines) if b'"kind":"evaluated"' in line)
-    lines[first] = flip(lines[first][60:-2], Random(1)).join([lines[first][:60], lines[first][-2:]])
-    (run / "journal.jsonl").write_bytes(b"".join(lines))
-    repair(run)
-    assert outcomes(tmp_path) != wanted
-    resume_campaign(tmp_path)
-    assert outcomes(tmp_path) == wanted
 
 
 def test_a_damaged_campaign_file_gives_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

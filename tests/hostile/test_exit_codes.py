@@ -4,23 +4,19 @@ import os
 import resource
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import load
 from falsifier.cli import run as command
 from falsifier.record.journal import Journal
 from falsifier.record.run import falsify
 from falsifier.search.events import Confirmed, Event, RunEnded
-from falsifier.testing import lag_problem
-from tests.command import ROOT, falsifier
-from tests.problems import easy, impossible
+from tests.command import ROOT
+from tests.problems import easy
 
-Array = NDArray[np.float64]
 FALSIFIED = ("run", "python:tests.problems:easy", "--engine", "corners", "--quiet")
 STANDS = ("run", "python:tests.problems:impossible", "--engine", "corners", "--budget", "3", "--quiet")
 
@@ -66,23 +62,6 @@ def test_a_disk_that_is_full_from_the_start_is_a_failure_of_the_machine(tmp_path
     assert started(*FALSIFIED, "--out", "run", shell="", cwd=tmp_path, before=full) == 3
 
 
-def overflowing(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Rise to the largest numbers there are."""
-    return {"x": np.where(times < 5, -1.7e308, 1.7e308)}
-
-
-def overflow():  # type: ignore[no-untyped-def]
-    """Falsified at once, by outputs whose difference overflows."""
-    return lag_problem("G[0,10] (x <= 1)", response=overflowing, name="OVERFLOW")
-
-
-def test_outputs_at_the_end_of_the_range_of_floats_are_falsified_and_drawn(tmp_path: Path) -> None:
-    done = falsifier("run", "python:tests.hostile.test_exit_codes:overflow", "--out", "run", cwd=tmp_path)
-    assert done.code == 1, done.err
-    assert "Traceback" not in done.err
-    assert (tmp_path / "run" / "counterexample.json").is_file()
-
-
 def test_a_picture_that_cannot_be_drawn_is_a_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -117,14 +96,3 @@ def test_a_search_that_can_no_longer_be_recorded_has_found_what_it_found(
         command._finish([result], as_json=False)
     assert end.value.code == 1
     assert "could not be recorded" in capsys.readouterr().err
-
-
-def test_a_record_that_fails_in_the_middle_of_the_search_ends_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(journal: Journal, event: Event) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Journal, "__call__", full)
-    with pytest.raises(OSError, match="No space left"):
-        falsify(impossible(), "corners", budget=3, directory=tmp_path / "run")

@@ -217,11 +217,6 @@ def test_where_fmus_cannot_be_confined_a_process_with_secrets_hides_its_memory(t
     assert script(UNCONFINED, tmp_path, SOME_API_KEY="hidden").stdout == "0\n"
 
 
-def test_a_process_without_secrets_stays_open_to_debuggers(tmp_path: Path) -> None:
-    body = UNCONFINED.replace("go()", "os.environ.clear()\ngo()")
-    assert script(body, tmp_path).stdout == "1\n"
-
-
 # The worker is gone when the next simulation starts, without a failure that would be repeated at once.
 GONE = """
 from falsifier.fmu.process import REGISTRY
@@ -236,14 +231,6 @@ def test_a_crash_while_a_replacement_loads_is_one_failed_simulation(tmp_path: Pa
     first, replacement, last = script(body, tmp_path, HOSTILE_FMU=f"{how}-2").stdout.splitlines()
     assert (first, last) == ("10.0", "10.0")
     assert re.match(r"SimulationError crashed: .*crashed while it was loaded", replacement)
-
-
-@pytest.mark.parametrize("how", ["crash", "exit"])
-def test_a_repetition_that_cannot_be_loaded_leaves_the_failure_as_it_was(tmp_path: Path, how: str) -> None:
-    body = f"print(tried(), tried({CRASH}), tried(), sep='\\n')"
-    first, crashed, last = script(body, tmp_path, HOSTILE_FMU=f"{how}-2").stdout.splitlines()
-    assert (first, last) == ("10.0", "10.0")
-    assert re.match(r"SimulationError crashed: .*: the FMU's process crashed", crashed)
 
 
 def test_a_hang_while_a_replacement_loads_ends_at_the_time_limit(tmp_path: Path) -> None:

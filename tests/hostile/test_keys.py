@@ -151,13 +151,6 @@ def test_an_address_in_the_environment_is_used_with_its_password_and_shown_witho
     assert PASSWORD not in seen
 
 
-@pytest.mark.parametrize("option", ["--llm", "--engine", "--budget", "--no-such-option"])
-def test_an_address_in_the_wrong_place_is_not_repeated_either(tmp_path: Path, option: str) -> None:
-    done = falsifier("run", "AT1", f"{option}=http://me:{PASSWORD}@host/v1", cwd=tmp_path)
-    assert done.code == 2
-    assert PASSWORD not in done.out + done.err
-
-
 @given(st.text(LETTERS + "/:@-_.", min_size=6, max_size=20), st.text(LETTERS + "/:-_.", max_size=20))
 def test_credentials_in_an_address_are_found_and_addresses_without_them_stay(word: str, path: str) -> None:
     # Digits and a slash would be a port and a path.

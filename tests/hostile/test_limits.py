@@ -51,15 +51,6 @@ def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str, tmp_pat
     assert f"--price {price}: prices must be finite and not negative" in result.err
 
 
-@given(st.sampled_from(["seconds", "cost"]), st.floats())
-def test_a_limit_is_positive_and_finite_or_refused(name: str, limit: float) -> None:
-    if 0 < limit < math.inf:
-        Budget(**{name: limit})  # type: ignore[arg-type]
-    else:
-        with pytest.raises(SpecError, match=f"budget: {name}: expected a (positive|finite) number, got"):
-            Budget(**{name: limit})  # type: ignore[arg-type]
-
-
 @given(st.sampled_from(["simulations", "tokens"]), st.one_of(st.integers(), st.floats()))
 def test_a_number_of_things_is_whole_and_positive_or_refused(name: str, limit: float) -> None:
     if isinstance(limit, int) and limit >= 1:
@@ -112,11 +103,6 @@ def test_nothing_is_asked_again_beyond_the_limit_on_the_tokens() -> None:
     assert "130 tokens" in result.reason
 
 
-def test_nothing_is_asked_again_beyond_the_limit_on_the_cost() -> None:
-    result, requests = run(answers("no candidate"), cost=0.13)
-    assert (result.status, requests) == ("failed", 1)
-
-
 def test_negative_counts_of_a_server_do_not_extend_a_run() -> None:
     result, requests = run(
         answers("no candidate", prompt_tokens=-1000, completion_tokens=-1000, total_tokens=-2000), tokens=1
@@ -148,16 +134,6 @@ def test_a_date_without_the_servers_clock_is_compared_with_this_machines() -> No
     assert found is not None and 9 * 3600 < found <= 10 * 3600
 
 
-def test_a_date_in_the_past_is_now() -> None:
-    assert stated(format_datetime(NOW, usegmt=True)) == 0.0
-
-
 @pytest.mark.parametrize(("value", "seconds"), [("7", 7.0), ("-5", 0.0), ("nan", None), ("inf", None)])
 def test_a_number_is_taken_if_it_is_one(value: str, seconds: float | None) -> None:
     assert stated(value) == seconds
-
-
-@given(st.text(max_size=40), st.text(max_size=40))
-def test_any_text_is_a_time_to_wait_or_none(value: str, date: str) -> None:
-    found = stated(value, date=date)
-    assert found is None or 0 <= found < math.inf

@@ -41,7 +41,6 @@ from falsifier.search.result import Result
 from falsifier.stl import parse
 from falsifier.stl.names import name_text
 from falsifier.testing import lag_problem
-from falsifier.views.plotting import plot_evaluation, save_figure
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
 from tests.counterexamples.export.support import confirmed
@@ -190,14 +189,6 @@ def test_reports_show_names_as_text(name: str, tmp_path: Path, plain_run: Path) 
         result_text(plain_result).splitlines()
     )
     assert json.loads(json.dumps(result_json(result)))["requirement"] == name
-
-
-@pytest.mark.parametrize("name", ["$\\frac{a}{b$", "x" * 5000, "漢字"])
-def test_pictures_are_drawn_whatever_the_name(name: str, tmp_path: Path) -> None:
-    found = falsify(named(name), "corners", budget=3).counterexample
-    assert found is not None
-    save_figure(plot_evaluation(found.problem, found.evaluation), tmp_path / "x.png")
-    assert (tmp_path / "x.png").stat().st_size > 1000
 
 
 # -- scripts for other tools ------------------------------------------------------------------------------

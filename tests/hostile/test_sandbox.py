@@ -139,14 +139,6 @@ def test_files_of_others_cannot_be_changed(place: Place, how: str) -> None:
     assert (place.home / "victim").stat().st_mtime_ns == times
 
 
-@pytest.mark.parametrize("how", ["create", "overwrite", "rename", "truncate", "delete"])
-def test_nor_can_those_beside_its_folder(place: Place, how: str) -> None:
-    (place.root / "victim").write_text("content")
-    before = content(place.root)
-    assert place.run(CHANGE, HOW[how], at=place.root).split()[0] == "0"
-    assert content(place.root) == before
-
-
 OTHER = """
 model.close()
 other = FmuModel(Path(fmu).with_name("Lag_2.fmu"))

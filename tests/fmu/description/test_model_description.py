@@ -1,13 +1,14 @@
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
 
-from falsifier.core.files import bundled
+from falsifier.core.model import Variable
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description.model_description import Description, parse, read_description
+from falsifier.fmu.description.notes import notes
+from falsifier.fmu.description.variables import Slot, with_aliases_marked
 from tests.fmu import fixtures
 
 ALL = sorted(p.stem for p in fixtures.FOLDER.glob("*.fmu"))
@@ -70,18 +71,6 @@ def test_enumerations_tell_their_literals(name: str) -> None:
     assert info["in_Enumeration"].kind == "enumeration"
 
 
-def test_elements_of_arrays_are_variables() -> None:
-    info = read_info(fixtures.path("Arrays_3"))
-    assert [v.name for v in info.inputs] == ["u[1]", "u[2]"]
-    assert [(v.name, v.start) for v in info.parameters][:4] == [
-        ("A[1,1]", 0.0),
-        ("A[1,2]", 1.0),
-        ("A[2,1]", -1.0),
-        ("A[2,2]", 0.0),
-    ]
-    assert [v.name for v in info.variables if v.is_state] == ["x[1]", "x[2]"]
-
-
 ROLES = """
 <fmiModelDescription fmiVersion="2.0" modelName="M" guid="g"><CoSimulation modelIdentifier="M"/>
 <ModelVariables>
@@ -101,14 +90,6 @@ def test_what_cannot_be_set_says_why() -> None:
     assert "computes its initial value" in slots["y"].refusal
     assert "time" in slots["t"].refusal
     assert slots["p"].refusal == ""
-
-
-def test_strings_and_unknown_names_are_refused() -> None:
-    description = described(ROLES)
-    with pytest.raises(ModelError, match="'s' is a string"):
-        description.slot("s")
-    with pytest.raises(ModelError, match="no variable 'q'"):
-        description.slot("q")
 
 
 def test_array_sizes_from_structural_parameters_and_aliases() -> None:
@@ -139,14 +120,27 @@ def test_wrong_descriptions_are_named(text: str, message: str) -> None:
         described(text)
 
 
-def test_a_file_that_changed_is_read_again(tmp_path: Path) -> None:
-    copy = tmp_path / "model.fmu"
-    copy.write_bytes(fixtures.path("Lag_2").read_bytes())
-    assert read_info(copy).name == "Lag"
-    copy.write_bytes(fixtures.path("Ball_2").read_bytes())
-    assert read_info(copy).name == "Ball"
+def test_one_reference_has_one_name_that_can_be_set_and_an_input_keeps_its_own() -> None:
+    variables = (
+        Variable("start.u", settable=True),
+        Variable("u", causality="input", settable=True),
+        Variable("y", causality="output"),
+        Variable("y2", causality="output"),
+    )
+    slots = {"start.u": Slot(1, "Real"), "u": Slot(1, "Real"), "y": Slot(2, "Real"), "y2": Slot(2, "Real")}
+    marked, changed = with_aliases_marked(variables, slots)
+    assert [(v.name, v.alias_of, v.settable) for v in marked] == [
+        ("start.u", "u", False),
+        ("u", "", True),
+        ("y", "", False),
+        ("y2", "", False),
+    ]
+    assert changed["start.u"].refusal == "it is another name of 'u'; set that one"
 
 
-@pytest.mark.parametrize("name", ["CC", "NN"])
-def test_a_dimensionless_variable_has_no_unit(name: str) -> None:
-    assert "1" not in {v.unit for v in read_info(bundled("fmus") / f"{name}.fmu").variables}
+def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() -> None:
+    root = ElementTree.fromstring(
+        '<fmi><DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/></fmi>'
+    )
+    (said,) = notes(root, (), start_time=0.0, tool="", needs_tool=())
+    assert said == "ignored in the default experiment, as not greater than 0: stopTime = -1, stepSize = 0"

@@ -7,7 +7,9 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError
-from falsifier.fmu.description import needed_libraries
+from falsifier.fmu.description import needed_libraries, wine
+from falsifier.fmu.description.archive import WINDOWS
+from falsifier.fmu.description.libraries import find_libraries, missing_binary_text
 from falsifier.fmu.description.needed_libraries import binary_remarks
 from falsifier.fmu.description.wine import can_run_windows
 from tests.fmu.description.test_elf import library
@@ -74,18 +76,6 @@ def test_libraries_in_the_fmu_are_looked_up_where_it_looks_and_so_are_theirs(
     assert [said.partition(",")[0] for said in found] == ["libhelp.so needs libgone.so"]
     (found_there,) = binary_remarks(fmu(tmp_path, M__so=library(("libhelp.so",)), libhelp__so=helper))
     assert "the FMU contains it, but its library does not look there" in found_there
-
-
-def test_folders_from_the_environment_and_the_library_are_looked_at(
-    tmp_path: Path, installed: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "tool").mkdir()
-    (tmp_path / "tool" / "libtool.so").write_bytes(library())
-    assert binary_remarks(fmu(tmp_path, M__so=library(("libtool.so",), str(tmp_path / "tool")))) == ()
-    given = fmu(tmp_path, M__so=library(("libtool.so",)))
-    assert len(binary_remarks(given)) == 1
-    monkeypatch.setenv("LD_LIBRARY_PATH", f"/none:{tmp_path / 'tool'}")
-    assert binary_remarks(given) == ()
 
 
 def test_the_newest_version_that_the_machine_lacks_is_named(tmp_path: Path, installed: Path) -> None:
@@ -175,13 +165,6 @@ def test_what_a_windows_library_needs_beside_wine_is_named(
     assert said(M=b"") == ("M.dll is not a Windows library; export the FMU again",)
 
 
-def test_of_several_libraries_with_other_names_none_is_guessed(tmp_path: Path) -> None:
-    (said,) = binary_remarks(fmu(tmp_path, a__so=library(), b__so=library()))
-    assert said.startswith(
-        "binaries/linux64 contains a.so, b.so, but not M.so, and the model identifier tells"
-    )
-
-
 def test_a_damaged_binary_is_an_error(tmp_path: Path) -> None:
     copy = tmp_path / "copy.fmu"
     shutil.copy(path("Lag_2"), copy)
@@ -193,3 +176,52 @@ def test_a_damaged_binary_is_an_error(tmp_path: Path) -> None:
     copy.write_bytes(content)
     with pytest.raises(ModelError, match="a binary is damaged"):
         binary_remarks(copy)
+
+
+def test_libraries_of_another_platform_are_found_by_its_folder() -> None:
+    names = ["binaries/win64/model.dll", "binaries/x86_64-windows/model.dll", "binaries/linux64/model.so"]
+    for version, folder in (("2.0", "win64"), ("3.0", "x86_64-windows")):
+        found, _ = find_libraries(names, version, {"co-simulation": "model"}, WINDOWS)
+        assert found["co-simulation"].as_posix() == f"binaries/{folder}/model.dll"
+
+
+@pytest.fixture
+def on_linux(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.fmu.description.archive.this_platform", lambda: "x86_64-linux")
+
+
+@pytest.mark.usefixtures("on_linux")
+@pytest.mark.parametrize(
+    ("platforms", "said"),
+    [
+        (("x86-windows",), "32-bit Windows cannot be run, because Wine is used for 64-bit Windows only"),
+        (("x86_64-darwin", "aarch64-darwin"), "binaries for macOS run only there"),
+        (("x86-linux", "x86-windows"), "a 32-bit binary cannot be loaded here"),
+    ],
+)
+def test_each_kind_of_binary_that_does_not_help_is_told_why(platforms: tuple[str, ...], said: str) -> None:
+    text = missing_binary_text("FMU", platforms, has_sources=False)
+    assert text.startswith(f"no binary for x86_64-linux, only for {', '.join(platforms)}; ")
+    assert said in text and text.count(";") == 2
+    assert text.endswith(" or for 64-bit Windows") == ("x86-windows" in platforms)
+
+
+@pytest.mark.parametrize("character", ["\\", '"'])
+def test_paths_that_windows_programs_cannot_open_are_refused(character: str) -> None:
+    with pytest.raises(ModelError, match="set TMPDIR to another folder"):
+        wine.windows_path(Path(f"/tmp/a{character}b/x.dll"))
+
+
+def test_the_libraries_of_wine_are_found_from_its_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "usr" / "bin" / "wine64"
+    own = tmp_path / "usr" / "lib" / "x86_64-linux-gnu" / "wine" / "x86_64-windows"
+    for place in (program, own / "Kernel32.dll", own / "msvcrt.dll"):
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.touch()
+    monkeypatch.setattr(wine, "find_wine", lambda: program)
+    look = wine.wine_libraries.__wrapped__
+    assert look() == {"kernel32.dll", "msvcrt.dll"}
+    monkeypatch.setattr(wine, "find_wine", lambda: None)
+    assert look() == frozenset()

@@ -41,10 +41,6 @@ def test_outputs_depend_on_the_inputs_that_the_fmu_lists(major: int) -> None:
     assert structure(path(f"Lag_{major}")).inputs_of == {}, "it does not say a word about its output"
 
 
-def test_units_come_with_it() -> None:
-    assert structure(path("Gain_2mm")).units["mm"].factor == 0.001
-
-
 @pytest.mark.parametrize("wrong", ['index="99" dependencies="1"', 'index="3" dependencies="99"'])
 def test_wrong_references_are_one_clear_error(wrong: str, tmp_path: Path) -> None:
     text = archive.read_entry(path("Gain_2"), "modelDescription.xml").decode()
@@ -74,9 +70,3 @@ def test_a_state_that_says_nothing_may_depend_on_all(tmp_path: Path) -> None:
 
 def test_fmus_that_declare_nothing_have_no_entries() -> None:
     assert structure(bundled("fmus") / "AT.fmu").reaching == {}
-
-
-def test_damage_is_named(tmp_path: Path) -> None:
-    text = FMI2.format(derivative="").replace('index="4"', 'index="40"')
-    with pytest.raises(ModelError, match="dependencies in modelDescription"):
-        structure(written(tmp_path, text))

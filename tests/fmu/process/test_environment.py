@@ -1,11 +1,12 @@
 """What FMUs see of the environment."""
 
+import struct
 from pathlib import Path
 
-import pytest
-
-from falsifier.core import operating_system
-from falsifier.fmu.process.program import MORE, protect_secrets, worker_environment
+from falsifier.core.model import ModelInfo
+from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.process import encoding
+from falsifier.fmu.process.program import MORE, worker_environment
 
 GIVEN = {
     "PATH": "/bin",
@@ -32,15 +33,8 @@ def test_further_variables_are_passed_on_by_name_but_no_keys() -> None:
     assert seen["MY_MODEL_DATA"] == "/data" and "OPENAI_API_KEY" not in seen
 
 
-@pytest.mark.parametrize(
-    ("name", "confines", "hides"),
-    [("OPENAI_API_KEY", False, 1), ("OPENAI_API_KEY", True, 0), ("PATH", False, 0), ("PATH", True, 0)],
-)
-def test_memory_is_hidden_if_it_holds_secrets_and_fmus_are_not_confined(
-    monkeypatch: pytest.MonkeyPatch, name: str, confines: bool, hides: int
-) -> None:
-    calls: list[None] = []
-    monkeypatch.setattr(operating_system, "can_confine", lambda: confines)
-    monkeypatch.setattr(operating_system, "hide_memory", lambda: calls.append(None))
-    protect_secrets({name: "value"})
-    assert len(calls) == hides
+def test_a_negated_alias_has_the_other_sign() -> None:
+    info = ModelInfo("M", fmi_version="1.0")
+    slots = {"a": Slot(0, "Real"), "b": Slot(0, "Real", negated=True)}
+    table = encoding.ports(Description(info, "", {}, slots), ["a", "b"])
+    assert struct.unpack("<qqqdqqqqdq", table[-80:])[3::5] == (1.0, -1.0)

@@ -47,13 +47,6 @@ def test_the_folder_of_a_killed_owner_is_swept(temporary: Path) -> None:
     assert list(temporary.iterdir()) == []
 
 
-def test_a_copy_of_the_owner_does_not_keep_the_folder(temporary: Path) -> None:
-    folder = WorkFolder()
-    folder.forget()
-    sweep()
-    assert not folder.path.exists()
-
-
 def test_a_folder_may_be_removed_by_another_process_than_its_owner(temporary: Path) -> None:
     folder = WorkFolder()
     remove_work_folder(folder.path)

@@ -1,15 +1,13 @@
 """How long simulations may take."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu.description import read_description
-from falsifier.fmu.process import patience
-from falsifier.fmu.process.patience import Patience, watching
+from falsifier.fmu.process.patience import Patience
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated
@@ -67,13 +65,6 @@ def test_progress_that_an_fmu_makes_up_ends(monkeypatch: pytest.MonkeyPatch, tol
     assert count < 1000
 
 
-def test_it_is_told_how_far_a_long_simulation_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock, heard = Clock(monkeypatch), []
-    with watching(lambda *told: heard.append(told)):
-        lasts(clock, Patience("m", PLAN), pace=10.0, until=50.0)
-    assert heard == [("m", 40.0, 50.0), ("m", 50.0, 50.0)]
-
-
 def test_a_hang_is_ended_where_no_tenth_of_the_time_is_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("falsifier.fmu.process.plan._DEFAULT_TIME_LIMIT", 0.3)
     model = isolated("Misdeeds_2")
@@ -81,9 +72,3 @@ def test_a_hang_is_ended_where_no_tenth_of_the_time_is_simulated(monkeypatch: py
         model.simulate({}, {"misdeed": HANG}, Experiment(1.0, 0.1, ("y",), tolerance=1e-7))
     assert caught.value.status == "timeout" and caught.value.time == 0.5
     model.close()
-
-
-def test_slow_models_are_told_once(caplog: pytest.LogCaptureFixture) -> None:
-    for seconds in (9.0, 73.4, 70.0):
-        patience.took("Heavy", replace(PLAN, stop_time=50.0), seconds)
-    assert [record.getMessage() for record in caplog.records] == ["Heavy: a simulation of 50 s takes 73 s"]

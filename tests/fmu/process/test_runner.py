@@ -6,14 +6,14 @@ import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from threading import Event, Thread
+from threading import Thread
 
 import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 from falsifier.fmu.description import read_description
-from falsifier.fmu.process import REGISTRY, FmuOrder, Runner
+from falsifier.fmu.process import FmuOrder, Runner
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from tests import patience
 from tests.fmu import fixtures
@@ -184,15 +184,6 @@ except KeyboardInterrupt:
         assert process.stdout.read() == "interrupted 10.0\n"
 
 
-def test_closing_the_registry_removes_the_folder_of_this_process() -> None:
-    run(isolated("Lag_2"), ("y",))
-    root = REGISTRY.workplace().root
-    assert root.is_dir()
-    REGISTRY.close()
-    assert not root.exists()
-    assert len(run(isolated("Lag_2"), ("y",))) == 11
-
-
 def orders(number: int) -> list[FmuOrder]:
     description = read_description(fixtures.path("Lag_2"))
     return [FmuOrder(Path("Lag"), f"{k:064d}", description, "co-simulation") for k in range(number)]
@@ -216,27 +207,6 @@ def test_workers_of_ended_threads_are_ended_when_another_is_needed(ended: list[R
     here = registry.runner(order)
     assert ended == made
     assert registry.runner(order) is here
-    registry.close()
-
-
-def test_workers_of_living_threads_are_kept(ended: list[Runner]) -> None:
-    registry, asked, goes_on = Registry(), Event(), Event()
-
-    def go() -> None:
-        one = registry.runner(orders(1)[0])
-        asked.set()
-        goes_on.wait(patience.HANG)
-        assert registry.runner(orders(1)[0]) is one
-        goes_on.clear()
-
-    thread = Thread(target=go)
-    thread.start()
-    assert asked.wait(patience.HANG)
-    registry.runner(orders(2)[1])
-    assert not ended
-    goes_on.set()
-    thread.join()
-    assert not goes_on.is_set()
     registry.close()
 
 

@@ -18,7 +18,7 @@ from tests.command import ROOT
 from tests.fixtures.fmus.catalogue import FIXTURES, WINDOWS
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, run
-from tests.fmu.support import ABORT, CRASH, DISCARD, END, ERROR, EXIT, HANG, PRINT, TALK
+from tests.fmu.support import CRASH, DISCARD, END, ERROR, EXIT, HANG
 from tests.hostile.test_model_exchange import MISDEEDS
 
 needs_wine = pytest.mark.skipif(
@@ -98,18 +98,6 @@ def test_the_bundled_windows_libraries_are_verified(name: str, interface: Interf
     assert apart(trajectory(FmuModel(path, interface, windows=True), stop), expected) < 1e-12
 
 
-@needs_wine
-def test_a_fixed_element_of_an_array_stays_if_another_one_is_driven() -> None:
-    model, drive = through_wine("Arrays_3"), {"u[1]": Signal((0.0,), (1.0,))}
-    try:
-        for fixed in (2.0, -1.0):
-            got = run(model, ("x[1]",), signals=drive, parameters={"u[2]": fixed}, interval=0.01)
-            exact = np.sin(got.times) + fixed * (1.0 - np.cos(got.times))
-            np.testing.assert_allclose(got["x[1]"], exact, atol=1e-6)
-    finally:
-        model.close()
-
-
 @pytest.fixture(scope="module")
 def misdeeds() -> Iterator[FmuModel]:
     model = through_wine("Misdeeds_2")
@@ -150,59 +138,11 @@ def test_errors_of_model_exchange_are_the_same_too(misdeed: str) -> None:
 
 
 @needs_wine
-@pytest.mark.parametrize("interface", ["co-simulation", ME])
-def test_the_time_limit_is_watched_between_steps(interface: Interface) -> None:
-    model = FmuModel(FOLDER / "Lag_2.fmu", interface)
-    with pytest.raises(SimulationError, match=r"after the time limit of 1e-09 s; slow models") as caught:
-        run(model, ("y",), interval=0.001, time_limit=1e-9)
-    model.close()
-    assert caught.value.status == "timeout" and caught.value.time == pytest.approx(0.1, abs=1e-6)
-
-
-@needs_wine
-@pytest.mark.parametrize("name", ["Misdeeds_1cs", "Misdeeds_3"])
-def test_crashes_are_noticed_in_other_versions_too(name: str) -> None:
-    error = commit(through_wine(name), CRASH)
-    assert error.status == "crashed" and "signal SIGSEGV" in str(error)
-
-
-@needs_wine
-def test_an_abort_is_a_crash_whose_last_words_are_told(misdeeds: FmuModel) -> None:
-    error = commit(misdeeds, ABORT)
-    assert error.status == "crashed" and error.log == ("assertion failed: pressure > 0",)
-
-
-@needs_wine
 def test_a_hang_is_stopped_and_the_next_simulation_runs_in_a_new_process(misdeeds: FmuModel) -> None:
     run(misdeeds, ("y",))
     error = commit(misdeeds, HANG, time_limit=0.3)
     assert error.status == "timeout"
     assert run(misdeeds, ("y",))["y"][-1] == 10
-
-
-@needs_wine
-def test_messages_and_what_is_printed_are_kept(misdeeds: FmuModel) -> None:
-    said = run(misdeeds, ("y",), parameters={"misdeed": TALK, "moment": 0.85})
-    assert said.log == ("warning: valve nearly closed",)
-    printed = run(misdeeds, ("y",), parameters={"misdeed": PRINT, "moment": 0.85})
-    assert printed.log == ("solver: step halved",)
-
-
-@needs_wine
-@pytest.mark.parametrize("name", ["Table_1", "Table_2", "Table_3"])
-def test_string_parameters_name_files_of_this_machine(name: str, tmp_path: Path) -> None:
-    file = tmp_path / "table.txt"
-    file.write_text("2.5\n")
-    signals = {"u": Signal((0.0, 1.0), (0.0, 1.0), "linear")}
-    got = {}
-    for model in (fixtures.isolated(name), through_wine(name)):
-        (text,) = (v.name for v in model.info.variables if v.kind == "string")
-        outputs = tuple(v.name for v in model.info.outputs)
-        experiment = Experiment(1.0, 0.1, outputs, strings=((text, str(file)),))
-        got[model] = [model.simulate(signals, {}, experiment)[name].tolist() for name in outputs]
-        model.close()
-    one, other = got.values()
-    assert one == other and any(any(values) for values in one)
 
 
 def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -235,16 +175,3 @@ def test_a_library_that_is_none_is_refused(tmp_path: Path) -> None:
             archive.writestr(name, b"nothing" if name.endswith(".dll") else data)
     with pytest.raises(ModelError, match="the library cannot be loaded: it is not a 64-bit library"):
         run(FmuModel(broken), ("y",))
-
-
-@needs_wine
-def test_values_that_do_not_fit_are_refused_in_the_same_words() -> None:
-    said = []
-    for model in (fixtures.isolated("Echo_3"), through_wine("Echo_3")):
-        name = next(v.name for v in model.info.inputs if v.type == "UInt8")
-        with pytest.raises(
-            SimulationError, match=r"300 do not fit .* whose type ranges from 0 to 255"
-        ) as caught:
-            run(model, (), signals={name: Signal((0.0, 1.0), (0.0, 300.0), "linear")})
-        said.append(str(caught.value))
-    assert said[0] == said[1]

@@ -1,5 +1,6 @@
 """SSP packages as systems."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import System, read_package
+from falsifier.fmu.description import archive
 from falsifier.fmu.ssp import reader as ssp
 from tests.fmu import packages
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
@@ -113,130 +115,68 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
 
 
-WRONG: list[tuple[str, str]] = [
-    ("<ssd", "SystemStructure.ssd: not well-formed XML"),
-    ("<a/>", "SystemStructure.ssd: expected the SSP element SystemStructureDescription, got a"),
-    (structure(system(PLANT), version="3.0"), "SSP version '3.0'; export it as SSP 1.0 or 2.0"),
-    (structure(""), "it has no System"),
-    (structure(system(PLANT.replace("Plant_2", "Gone"))), "the resource 'resources/Gone.fmu' is missing"),
-    (structure(system(PLANT.replace("resources/", "../"))), "'../Plant_2.fmu' is not inside the package"),
-    (structure(system(PLANT.replace("resources/", "file:///"))), "is not inside the package"),
-    (structure(system(PLANT.replace("Plant_2", "Broken"))), "resources/Broken.fmu: "),
-    (structure(system(PLANT + PLANT)), "two elements are named 'plant'"),
-    (
-        structure(system(PLANT.replace('"plant"', '"a.plant"') + system(PLANT, name="a"))),
-        "two elements are named 'a.plant'",
-    ),
-    (structure(system(PLANT.replace('"plant"', '""'))), "has the name '' and the source"),
-    (structure(system(PLANT.replace("resources/Plant_2.fmu", ""))), "neither may be empty"),
-    (structure(system(PLANT.replace("resources/", "http://["))), "is not a path"),
-    (
-        structure(
-            system(
-                PLANT,
-                '<ssd:Connection startConnector="a" endElement="plant" endConnector="u">'
-                '<ssc:LinearTransformation factor="0"/></ssd:Connection>',
-            )
-        ),
-        "a LinearTransformation has the factor 0",
-    ),
-    (
-        structure('<ssd:System name="a"><ssd:Elements>' * 1500 + "</ssd:Elements></ssd:System>" * 1500),
-        "nested more than 400 deep",
-    ),
-    (
-        structure(system(PLANT.replace('"u"', '"v"'))),
-        "the FMU of plant has no variable for the connector plant.v; ",
-    ),
-    (
-        structure(system(PLANT.replace('"u" kind="input"', '"u" kind="output"'))),
-        "the connector plant.u is of kind output, but the FMU's variable has the causality input",
-    ),
-    (
-        structure(system(PLANT.replace('Real unit="m"', "Boolean"))),
-        "the connector plant.u is of type Boolean, but the FMU's variable of type Real; state the FMU's type",
-    ),
-    (
-        structure(system(PLANT.replace('unit="m"', 'unit="kg"'))),
-        "the connector plant.u is in kg, but the FMU's variable in m",
-    ),
-    (
-        structure(
-            system(PLANT + PI, FEEDBACK.replace('"plant" endConnector="u"', '"plant" endConnector="v"'))
-        ),
-        "the connection pi.y - plant.v names the unknown connector 'plant.v'; known: u, y, T",
-    ),
-    (
-        structure(system(PLANT + PI, FEEDBACK.replace('startElement="pi"', 'startElement="po"'))),
-        "the connection po.y - plant.u names the unknown element 'po'; did you mean 'pi'",
-    ),
-    (
-        structure(system(PLANT + PI, FEEDBACK.replace('Connector="measured"', 'Connector="y"'))),
-        "the connection pi.y - plant.y joins two outputs",
-    ),
-    (
-        structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
-        "plant.u is fed by pi.y and by pi.y; remove one of the connections",
-    ),
-    (
-        structure(system(PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "") + PLANT, FEEDBACK)),
-        "plant.y is in m, pi.measured in K; the package defines no conversion",
-    ),
-    (
-        structure(system(PI.replace("application/x-fmu-sharedlibrary", "application/x-modelica"))),
-        "the component pi is of type application/x-modelica; only FMUs are supported",
-    ),
-    (
-        structure(
-            system(
-                '<ssd:Component name="me" source="SystemStructure.ssd" type="application/x-ssp-definition"/>'
-            )
-        ),
-        "the system contains itself, at me",
-    ),
-    (
-        structure(
-            system(
-                PLANT,
-                before="<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"
-                f"{values('plant.y Real 1')}"
-                "</ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>",
-            )
-        ),
-        "the parameter plant.y cannot be set: the model computes its initial value",
-    ),
-    (
-        structure(system('<ssd:SignalDictionaryReference name="bus" dictionary="d"/>')),
-        "'bus' refers to a signal dictionary, which is not supported",
-    ),
-    (
-        structure(
-            system(
-                PLANT + PI,
-                FEEDBACK.replace(
-                    'endConnector="u"/>', 'endConnector="u"><ssc:IntegerMappingTransformation/>'
-                ).replace(
-                    "IntegerMappingTransformation/>\n", "IntegerMappingTransformation/></ssd:Connection>\n"
-                ),
-            )
-        ),
-        "the element IntegerMappingTransformation is not supported",
-    ),
-    (
-        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="Scheduled" '))),
-        "the implementation of plant is 'Scheduled'; expected one of any, CoSimulation, ModelExchange",
-    ),
-    (
-        structure(system(PLANT.replace("<ssd:Component ", '<ssd:Component implementation="ModelExchange" '))),
-        "components.plant.interface: the FMU offers co-simulation, not model-exchange",
-    ),
-]
+def plant(old: str, new: str) -> str:
+    """A structure with the plant alone, in which something is replaced."""
+    return structure(system(PLANT.replace(old, new)))
 
 
-@pytest.mark.parametrize(("ssd", "message"), WRONG)
-def test_a_wrong_package_is_one_clear_line(ssd: str, message: str, tmp_path: Path) -> None:
+def feedback(old: str, new: str, *, pi: str = PI) -> str:
+    """A structure of both, in whose connections something is replaced."""
+    return structure(system(PLANT + pi, FEEDBACK.replace(old, new)))
+
+
+BOUND = "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>{}</ssd:ParameterValues>"
+BOUND += "</ssd:ParameterBinding></ssd:ParameterBindings>"
+FLAT = """<ssd:Connection startConnector="a" endElement="plant" endConnector="u">
+<ssc:LinearTransformation factor="0"/></ssd:Connection>"""
+MAPPED = FEEDBACK.replace('"u"/>', '"u"><ssc:IntegerMappingTransformation/></ssd:Connection>')
+ITSELF = '<ssd:Component name="me" source="SystemStructure.ssd" type="application/x-ssp-definition"/>'
+DEEP = '<ssd:System name="a"><ssd:Elements>' * 1500 + "</ssd:Elements></ssd:System>" * 1500
+BUS = '<ssd:SignalDictionaryReference name="bus" dictionary="d"/>'
+IN_KELVIN = PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "")
+SCHEDULED, EXCHANGED = (f'<ssd:Component implementation="{each}" ' for each in ("Scheduled", "ModelExchange"))
+WRONG = {
+    "not well-formed XML": "<ssd",
+    "expected the SSP element SystemStructureDescription, got a": "<a/>",
+    "SSP version '3.0'; export it as SSP 1.0 or 2.0": structure(system(PLANT), version="3.0"),
+    "it has no System": structure(""),
+    "the resource 'resources/Gone.fmu' is missing": plant("Plant_2", "Gone"),
+    "'../Plant_2.fmu' is not inside the package": plant("resources/", "../"),
+    "'file:///Plant_2.fmu' is not inside the package": plant("resources/", "file:///"),
+    "is not a path": plant("resources/", "http://["),
+    "resources/Broken.fmu: ": plant("Plant_2", "Broken"),
+    "two elements are named 'plant'": structure(system(PLANT + PLANT)),
+    "has the name '' and the source": plant('"plant"', '""'),
+    "neither may be empty": plant("resources/Plant_2.fmu", ""),
+    "a LinearTransformation has the factor 0": structure(system(PLANT, FLAT)),
+    "nested more than 400 deep": structure(DEEP),
+    "the FMU of plant has no variable for the connector plant.v; ": plant('"u"', '"v"'),
+    "plant.u is of kind output, but the FMU's variable has": plant('"u" kind="input"', '"u" kind="output"'),
+    "plant.u is of type Boolean, but the FMU's variable of type Real": plant('Real unit="m"', "Boolean"),
+    "the connector plant.u is in kg, but the FMU's variable in m": plant('unit="m"', 'unit="kg"'),
+    "names the unknown connector 'plant.v'; known: u, y, T": feedback('Connector="u"', 'Connector="v"'),
+    "names the unknown element 'po'; did you mean 'pi'": feedback('startElement="pi"', 'startElement="po"'),
+    "the connection pi.y - plant.y joins two outputs": feedback('Connector="measured"', 'Connector="y"'),
+    "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
+    "plant.y is in m, pi.measured in K; the package defines no": feedback("", "", pi=IN_KELVIN),
+    "is of type application/x-modelica; only FMUs": structure(
+        system(PI.replace("x-fmu-sharedlibrary", "x-modelica"))
+    ),
+    "the system contains itself, at me": structure(system(ITSELF)),
+    "the parameter plant.y cannot be set": structure(
+        system(PLANT, before=BOUND.format(values("plant.y Real 1")))
+    ),
+    "'bus' refers to a signal dictionary, which is not supported": structure(system(BUS)),
+    "the element IntegerMappingTransformation is not supported": structure(system(PLANT + PI, MAPPED)),
+    "plant is 'Scheduled'; expected one of any, CoSimulation": plant("<ssd:Component ", SCHEDULED),
+    "the FMU offers co-simulation, not model-exchange": plant("<ssd:Component ", EXCHANGED),
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_a_wrong_package_is_one_clear_line(message: str, tmp_path: Path) -> None:
     fmus = ("Plant_2", "Gain_2", "Gain_2kelvin")
-    file = write(tmp_path / "wrong.ssp", ssd, *fmus, more={"resources/Broken.fmu": b"no zip"})
+    file = write(tmp_path / "wrong.ssp", WRONG[message], *fmus, more={"resources/Broken.fmu": b"no zip"})
     with pytest.raises(Exception, match="wrong") as wrong:
         read_package(file)
     assert message in str(wrong.value) and "\n" not in str(wrong.value)
@@ -285,3 +225,38 @@ def test_a_default_experiment_that_ends_before_it_starts_is_refused(tmp_path: Pa
     ssd = structure(system(PLANT + PI, FEEDBACK), after=f"<ssd:DefaultExperiment {times}/>")
     with pytest.raises(SpecError, match=r"DefaultExperiment: the stop time -?\d s must be after the start"):
         read_package(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))
+
+
+@pytest.mark.parametrize("name", ["gone.ssp", "gone.ssd"])
+def test_what_is_not_there_is_said(name: str, tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match=r"gone\.ss.: no such file; give the path of an \.ssp or \.ssd file"):
+        read_package(tmp_path / name)
+
+
+def test_what_is_no_archive_or_has_no_description_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "a.ssp"
+    file.write_bytes(b"no zip")
+    with pytest.raises(SpecError, match=r"a\.ssp: not a readable SSP package, which is a zip archive"):
+        read_package(file)
+    with zipfile.ZipFile(file, "w") as package:
+        package.writestr("readme.txt", "")
+    with pytest.raises(SpecError, match=r"a\.ssp: the package contains no SystemStructure\.ssd"):
+        read_package(file)
+
+
+def test_a_zip_bomb_is_rejected_before_it_is_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archive, "_DENSE_FROM_BYTES", 1 << 20)
+    file = tmp_path / "bomb.ssp"
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as package:
+        package.writestr("SystemStructure.ssd", structure(system(PLANT)))
+        package.writestr("resources/Plant_2.fmu", bytes(2 << 20))
+    with pytest.raises(SpecError, match=r"bomb\.ssp: rejected because .* like a zip bomb"):
+        read_package(file)
+
+
+def test_a_name_that_is_too_long_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "a.ssd").write_text(structure(system(PLANT.replace("resources/", "x" * 300))))
+    with pytest.raises(SpecError, match=r"a\.ssd: the resource 'x+Plant_2\.fmu' is missing"):
+        read_package(tmp_path / "a.ssd")

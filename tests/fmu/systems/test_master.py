@@ -50,12 +50,6 @@ def test_a_component_with_a_step_of_its_own_holds_its_outputs_until_the_next(met
     np.testing.assert_allclose(run(model, "plant.x")["plant.x"], x, atol=1e-9)
 
 
-def test_half_the_communication_step_leaves_own_steps_alone() -> None:
-    model = system({"plant": component("Plant_2", 0.2), "pi": component("Gain_2", 0.2)}, LOOP)
-    coarse, fine = run(model, "plant.x"), run(model, "plant.x", step_size=0.05)
-    np.testing.assert_allclose(coarse["plant.x"], fine["plant.x"], atol=1e-12)
-
-
 def test_linear_extrapolation_makes_the_coupling_one_order_better() -> None:
     """b follows a, whose output is known at both ends of each step."""
     wave = {"a.u": Signal((0.0, 4.0), (0.0, 4.0), "linear")}
@@ -201,18 +195,6 @@ def test_an_output_that_is_nan_after_the_initialisation_is_named_and_not_the_com
     message = r"^ticker: ticker\.sampled is nan at t = 0 s, after the initialisation"
     with pytest.raises(SimulationError, match=message):
         run(model, "plant.y", parameters={"ticker.u": float("nan")})
-
-
-def test_discrete_inputs_of_fmi_3_change_at_events() -> None:
-    """The second Ticker counts its events; its input is continuous, those of Echo are discrete."""
-    model = system(
-        {"a": "Echo_3", "b": "Echo_3"}, {"b.in_Int16": "a.out_Int16", "b.in_Boolean": "a.out_Boolean"}
-    )
-    ramp = {"a.in_Int16": Signal((0.0, 1.0), (0.0, 10.0), "linear"), "a.in_Boolean": Signal((0.0,), (1.0,))}
-    found = run(model, "a.out_Int16", "b.out_Int16", "b.out_Boolean", signals=ramp)
-    np.testing.assert_array_equal(found["b.out_Int16"], found["a.out_Int16"])
-    assert found["a.out_Int16"].tolist() == [0, *range(10)]
-    assert found["b.out_Boolean"].tolist() == [1.0] * 11
 
 
 def test_the_time_limit_counts_for_the_whole_system() -> None:

@@ -8,7 +8,7 @@ from falsifier.errors import SimulationError
 from falsifier.fmu import Connection, Coupling
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, ramp
-from tests.fmu.small_systems import LOOP, component, run, sampled_loop, solved, system
+from tests.fmu.small_systems import LOOP, run, sampled_loop, solved, system
 
 STEPS = 10
 
@@ -125,9 +125,3 @@ def test_the_component_and_the_time_of_a_failure_are_told(misdeed: int, said: st
     with pytest.raises(SimulationError, match=rf"^wild: {said} at t = 0\.[45] s"):
         run(model, "plant.x", parameters={"wild.misdeed": misdeed})
     assert run(model, "wild.x")["wild.x"][-1] == pytest.approx(1.0)
-
-
-def test_slow_and_solved_components_keep_to_the_time_limit() -> None:
-    model = system({"plant": solved("Lag_2"), "pi": component("Gain_2", 0.02)}, LOOP)
-    with pytest.raises(SimulationError, match="after the time limit of"):
-        run(model, "plant.x", stop=1000.0, interval=0.01, time_limit=1e-9)

@@ -51,11 +51,6 @@ def test_outputs_that_still_change_are_named_with_their_changes() -> None:
     assert "after 100 rounds" in found and "pi.y (by 1e-05) and 7 more" in found
 
 
-def test_a_string_is_told_by_its_name_in_the_component() -> None:
-    reply = Reply(Where.TEXT, 3, "0", 0.0, component=NAMES.index("table"))
-    assert told(reply).startswith("table: setting 'fileName' to 'a.txt' returned error")
-
-
 @pytest.mark.parametrize("where", [*Where, 77])
 @pytest.mark.parametrize("text", ["", "x", "1 99 y -1 ٣ 1e999 nan", "9" * 5000])
 @pytest.mark.parametrize("component", [-1, 2, 10**8])

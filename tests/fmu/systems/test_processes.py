@@ -11,7 +11,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Component, Connection, Coupling
 from tests.fmu.small_systems import LOOP, component, pids, run, solved, system
-from tests.fmu.support import ALLOCATE, CRASH, HANG
+from tests.fmu.support import CRASH, HANG
 from tests.patience import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and end with a parent")
@@ -47,19 +47,6 @@ def test_trajectories_are_those_of_one_process_to_the_last_digit(
     np.testing.assert_array_equal(found[0], found[1])
 
 
-def test_values_of_all_types_and_events_pass() -> None:
-    names = ("Float64", "Float32", "Int8", "UInt64", "Boolean", "Enumeration")
-    links = {f"second.in_{n}": f"first.out_{n}" for n in names}
-    model = system({"first": "Echo_3", "second": "Echo_3"}, links, EACH)
-    steps = {"first.in_Int8": (-5, 3), "first.in_Boolean": (1, 0), "first.in_Float32": (2, 1)}
-    signals = {name: Signal((0.0, 0.45), values, "constant") for name, values in steps.items()}
-    found = run(model, "second.out_Int8", "second.out_Boolean", "second.out_Float32", signals=signals)
-    assert found["second.out_Int8"][[1, -1]].tolist() == [-5.0, 3.0]
-    assert found["second.out_Boolean"][[1, -1]].tolist() == [1.0, 0.0]
-    assert found["second.out_Float32"][[1, -1]].tolist() == [2.0, 1.0]
-    model.close()
-
-
 def children(pid: int | str) -> list[str]:
     return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
 
@@ -78,13 +65,6 @@ def test_a_component_that_crashes_is_named_and_the_next_simulation_works() -> No
     assert failed.value.status == "crashed"
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in others))
     assert run(model, "plant.y").times[-1] == 1.0
-    model.close()
-
-
-def test_a_component_that_floods_memory_is_named() -> None:
-    model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, BAD, EACH)
-    with pytest.raises(SimulationError, match=r"^bad: the step returned error .*no memory for the table"):
-        run(model, "plant.y", parameters={"bad.misdeed": ALLOCATE})
     model.close()
 
 

@@ -6,7 +6,7 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu import Coupling, System
+from falsifier.fmu import Component, Coupling, System
 from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
@@ -18,15 +18,6 @@ def test_systems_travel_between_processes_and_are_equal_by_content() -> None:
     assert run(twin, "plant.y")["plant.y"].tolist() == run(model, "plant.y")["plant.y"].tolist()
     for other in (loop(Coupling("jacobi")), loop(pi="Gain_3"), system({"plant": "Plant_2"}, {})):
         assert other != model and other.key != model.key
-
-
-def test_signals_and_parameters_reach_their_components() -> None:
-    model = loop()
-    found = run(
-        model, "plant.x", signals={"pi.r": Signal((0.0,), (2.0,))}, parameters={"pi.k": 0.0, "plant.x": 3.0}
-    )
-    assert found["plant.x"][-1] == pytest.approx(3.0 * 0.6065306597, rel=1e-6), "exp(-1/2)"
-    assert found.units == {"plant.x": "m"}
 
 
 def test_a_connected_input_cannot_be_driven() -> None:
@@ -76,3 +67,36 @@ def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named
     with pytest.raises(Exception, match=r"^bad: the step returned error at t = 0\.5 s.*the tank is empty"):
         run(model, "plant.x", parameters={"bad.misdeed": 9})
     model.close()
+
+
+def test_variables_have_the_names_of_their_components() -> None:
+    info = loop(pi="Gain_3").info
+    assert [v.name for v in info.inputs] == ["pi.r"]
+    assert [v.name for v in info.outputs] == ["plant.y", "pi.y"]
+    assert [v.name for v in info.parameters] == ["plant.T", "plant.gain", "pi.k"]
+    assert info["plant.u"].causality == "local" and not info["plant.u"].settable
+    assert info.fmi_version == "2.0 and 3.0"
+    assert info.components == ("plant", "pi") and info.noun == "system"
+    assert info.description == "System of plant, pi. Connections: pi.y -> plant.u, plant.y -> pi.measured"
+
+
+def test_all_names_of_a_connected_input_are_taken() -> None:
+    info = system({"a": "Plant_2", "b": "Aliases_3"}, {"b.u": "a.y"}).info
+    assert [v.name for v in info.inputs] == ["a.u"]
+    assert info["b.plant.u"].causality == "local"
+
+
+@pytest.mark.parametrize(
+    ("steps", "expected"), [((0.02, 0.05), 0.01), ((1 / 30, 0.01), 1 / 300), ((0.04, 0.02), 0.02)]
+)
+def test_the_default_step_divides_the_steps_of_the_components(
+    steps: tuple[float, float], expected: float
+) -> None:
+    a, b = (component("Plant_2", step) for step in steps)
+    assert system({"a": a, "b": b}, {}).info.step_size == pytest.approx(expected)
+
+
+def test_components_whose_names_make_two_variables_equal_are_refused() -> None:
+    aliases = Component(Path(path("Aliases_3")))  # has a variable plant.u
+    with pytest.raises(Exception, match=r"two variables of the system are named 'a\.plant\.u'"):
+        System({"a": aliases, "a.plant": path("Plant_2")})
