@@ -121,7 +121,7 @@ class RequirementItem(pytest.Item):
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         """Show only the message of an expected failure, without a traceback through the plugin."""
-        from falsifier.core.printable import printable
+        from falsifier.core.literals import printable
         from falsifier.errors import FalsifierError
 
         expected = FalsifiedError | UntestedError | FalsifierError | OSError | MemoryError

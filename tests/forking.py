@@ -42,7 +42,6 @@ _LARGE = ("falsifier", "openai.resources")
 _NEVER = (
     "falsifier.__main__",
     "falsifier.core.windows",
-    "falsifier.core.windows_files",
     "falsifier.engines.botorch_gp",
 )
 _PROGRAM = """

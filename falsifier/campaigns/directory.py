@@ -17,8 +17,7 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier.campaigns.request import CampaignRequest
-from falsifier.core.files import write_whole
-from falsifier.core.sealing import check_seal, seal
+from falsifier.core.files import check_seal, seal, write_whole
 from falsifier.errors import JournalError, rejected
 from falsifier.record.journal import holds_run
 from falsifier.search.request import RunRequest

@@ -18,7 +18,7 @@ from falsifier.cli.streams import (
     settle_streams,
     stop_at_interrupts,
 )
-from falsifier.core.memory import check_memory_limits
+from falsifier.core.operating_system import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean
 from falsifier.views.terminal import warn
 

@@ -1,4 +1,4 @@
-"""File names made from any name, atomic file writes, bundled folders, and a private one for machine code."""
+"""File names made from any name, atomic writes, checksums, bundled and private folders."""
 
 import os
 import re
@@ -14,6 +14,9 @@ from falsifier.core import operating_system
 _LONGEST_NAME = 120
 _HASH_DIGITS = 10
 _LOOKS_HASHED = re.compile(rf"(^|-)[0-9a-f]{{{_HASH_DIGITS}}}$")
+# The end of a JSON object that shows damage: its last key is a checksum of all the text before it.
+_CHECKSUM_DIGITS = 16
+_SEAL = re.compile(rb',\s*"sum":\s*"([0-9a-f]{16})"\s*\}\s*\Z')
 # Names that Windows reserves, with any ending.
 _DEVICES = frozenset(
     ("CON", "PRN", "AUX", "NUL", *(f"{device}{i}" for device in ("COM", "LPT") for i in "0123456789¹²³"))
@@ -106,3 +109,34 @@ def bundled(folder: str) -> Path:
     package = Path(__file__).resolve().parents[1]
     inside = package / folder
     return inside if inside.is_dir() else package.parent / folder
+
+
+def checksum(content: bytes) -> str:
+    """Return the checksum of a content: the first 16 digits of its SHA-256."""
+    return sha256(content).hexdigest()[:_CHECKSUM_DIGITS]
+
+
+def seal(text: str) -> str:
+    r"""Add a checksum to the text of a JSON object that is not empty.
+
+    >>> seal('{"a":1}')
+    '{"a":1,"sum":"f52fcad08a1c96f3"}\n'
+    """
+    body = text.rstrip().removesuffix("}").rstrip()
+    separator = ",\n  " if "\n" in body else ","
+    colon, end = (": ", "\n}") if "\n" in body else (":", "}")
+    return f'{body}{separator}"sum"{colon}"{checksum(body.encode())}"{end}\n'
+
+
+def check_seal(content: bytes) -> None:
+    """Check the checksum of a sealed JSON object.
+
+    Raises:
+        ValueError: if it has none, or the content does not match it.
+    """
+    found = _SEAL.search(content[-100:])
+    if found is None:
+        raise ValueError("it does not end with a checksum")
+    body = content[: found.start() - len(content[-100:])]
+    if checksum(body) != found[1].decode():
+        raise ValueError("its checksum does not match")

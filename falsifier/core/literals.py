@@ -1,4 +1,4 @@
-"""Any text, written so that another language reads exactly this text and nothing else.
+"""Any text, written so that a terminal or another language reads this text and nothing else.
 
 Names come from spec files, FMUs and journals that others wrote. Whatever stands in one, it must not become
 code in a script, a formula in a spreadsheet, or markup in a report. ``repr``, ``shlex`` and the JSON and XML
@@ -14,6 +14,16 @@ _UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u206
 # What cannot be part of a string in any language.
 _UNWRITABLE = re.compile("[\x00\ud800-\udfff]")
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+# Colours, cursor movements and the like; titles, links and clipboard contents with their ends. No character
+# that starts a sequence may occur inside one, so that the search stays linear.
+_SEQUENCES = re.compile(
+    r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]"
+    r"|(?:\x1b[\]PX^_]|[\x90\x98\x9d-\x9f])[^\x07\x1b\x80-\x9f\n]*(?:\x07|\x1b\\|\x9c)"
+)
+# All other control characters except newline and tab, and characters that hide or reorder text.
+_CONTROLS = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\U000e0000-\U000e007f]"
+)
 _FORMULA_STARTS = tuple("=+-@＝＋－＠\t\n")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _MODELICA_PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", re.ASCII)
@@ -21,6 +31,18 @@ _MODELICA_ESCAPES = {
     "\a": "\\a", "\b": "\\b", "\f": "\\f", "\n": "\\n", "\r": "\\r", "\t": "\\t", "\v": "\\v",
     '"': '\\"', "'": "\\'", "\\": "\\\\",
 }  # fmt: skip
+
+
+def printable(text: str) -> str:
+    r"""Return the text without escape sequences, control characters and unpaired surrogates.
+
+    Newlines and tabs stay. Takes a time proportional to the length.
+
+    >>> printable("\x1b[31mred\x1b[0m \x1b]0;title\x07and\r plain")
+    'red and plain'
+    """
+    text = _CONTROLS.sub("", _SEQUENCES.sub("", text))
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def plain(text: str) -> str:

@@ -20,8 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import file_name, write_whole
-from falsifier.core.sealing import check_seal, seal
+from falsifier.core.files import check_seal, file_name, seal, write_whole
 from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -1,8 +1,7 @@
 """FMUs: reading their description, stepping them, and isolating them in processes of their own."""
 
 from falsifier.fmu.description import read_info
-from falsifier.fmu.files import fmu_files, fmus_sha256, is_packaged, with_local_files
-from falsifier.fmu.model import FmuModel
+from falsifier.fmu.model import FmuModel, fmu_files, fmus_sha256, is_packaged, with_local_files
 from falsifier.fmu.process import Policy, resolved, rights_text, stop_simulations, watching
 from falsifier.fmu.ssp import is_package, read_package
 from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System

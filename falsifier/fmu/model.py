@@ -1,15 +1,16 @@
-"""FMUs as models: the implementation of the Model protocol."""
+"""FMUs as models, which implement the Model protocol, and the files behind any model."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from typing import ClassVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, Interface, ModelInfo
+from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
@@ -26,6 +27,7 @@ from falsifier.fmu.process import (
     room_for,
     run_task,
 )
+from falsifier.fmu.systems import System
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,3 +207,40 @@ def _check_windows(model: FmuModel, description: Description) -> None:
             f"{model.path}: the FMU has no library for {WINDOWS}, only "
             f"{', '.join(description.info.platforms) or 'no binaries at all'}"
         )
+
+
+def fmu_files(model: Model) -> dict[Path, str]:
+    """Return the paths of a model's FMUs with the SHA-256 of each; empty for a Python function."""
+    if isinstance(model, FmuModel):
+        return {model.path: model.sha256}
+    if isinstance(model, System):
+        return {part.fmu: part.sha256 for part in model.parts.values()}
+    return {}
+
+
+def is_packaged(model: Model) -> bool:
+    """Whether a model comes from an SSP package, whose file stands for those of its FMUs."""
+    return isinstance(model, System) and model.package is not None
+
+
+def fmus_sha256(digests: Iterable[str]) -> str | None:
+    """Return one hash for the FMUs with these hashes: that of a single FMU is its own; None without FMUs."""
+    distinct = sorted(set(digests))
+    if len(distinct) < 2:
+        return distinct[0] if distinct else None
+    return sha256("".join(distinct).encode()).hexdigest()
+
+
+def with_local_files(model: Model, paths: Mapping[str, Path]) -> Model:
+    """Return a model whose FMUs are read from other paths.
+
+    Args:
+        model: one FMU, a system, or neither.
+        paths: path of each FMU by the SHA-256 of its content; the others stay where they are.
+    """
+    if isinstance(model, FmuModel):
+        return replace(model, path=paths.get(model.sha256, model.path))
+    if isinstance(model, System):
+        parts = {n: replace(p, fmu=paths.get(p.sha256, p.fmu)) for n, p in model.parts.items()}
+        return replace(model, components=parts)
+    return model

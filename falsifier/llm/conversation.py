@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError
 from falsifier.llm.failures import ContextExceededError

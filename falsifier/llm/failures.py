@@ -9,7 +9,7 @@ from math import isfinite
 from typing import Any
 from urllib.parse import urlsplit
 
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.providers import known, server_address

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.secrets import redact_held
 
 Role = Literal["system", "user", "assistant", "tool"]

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from falsifier.core import operating_system
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.secrets import scrubbed
 from falsifier.errors import ChatSetupError
 from falsifier.llm.cache import cache_directory

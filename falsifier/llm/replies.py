@@ -21,7 +21,7 @@ from pydantic import (
 )
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
 from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError, did_you_mean

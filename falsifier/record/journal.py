@@ -32,9 +32,8 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import remove_partial, write_whole
+from falsifier.core.files import check_seal, checksum, remove_partial, seal, write_whole
 from falsifier.core.literals import one_line
-from falsifier.core.sealing import check_seal, checksum, seal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from falsifier.core.sealing import check_seal, seal
+from falsifier.core.files import check_seal, seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Status
 from falsifier.search.budget import Spent

@@ -1,10 +1,22 @@
+import json
 import os
 import tempfile
 from pathlib import Path
+from random import Random
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from falsifier.core.files import bundled, own_temporary_folder, remove_partial, write_whole
+from falsifier.core.files import (
+    bundled,
+    check_seal,
+    checksum,
+    own_temporary_folder,
+    remove_partial,
+    seal,
+    write_whole,
+)
 
 
 def test_text_and_bytes_are_written_into_folders_that_are_made(tmp_path: Path) -> None:
@@ -84,3 +96,30 @@ def test_a_temporary_folder_that_others_can_write_to_is_not_used(
     assert own is not None and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)
     assert own_temporary_folder("falsifier-test") is None
+
+
+@given(st.dictionaries(st.text(), st.integers() | st.text(), min_size=1), st.sampled_from([None, 2]))
+def test_a_sealed_object_is_the_object_and_its_checksum(
+    content: dict[str, object], indent: int | None
+) -> None:
+    sealed = seal(json.dumps(content, indent=indent))
+    check_seal(sealed.encode())
+    loaded = json.loads(sealed)
+    assert list(loaded)[-1] == "sum"
+    assert {**content, "sum": loaded["sum"]} == loaded
+
+
+def test_every_flipped_bit_but_in_the_last_blanks_is_noticed() -> None:
+    sealed = seal('{"a":1,"b":"text"}').encode()
+    for position in range(8 * (len(sealed) - 1)):
+        damaged = bytearray(sealed)
+        damaged[position // 8] ^= 1 << position % 8
+        with pytest.raises(ValueError, match="checksum"):
+            check_seal(bytes(damaged))
+
+
+def test_what_has_no_checksum_is_refused() -> None:
+    for content in (b"", b"{}", b'{"a":1}', Random(1).randbytes(1000)):
+        with pytest.raises(ValueError, match="does not end with a checksum"):
+            check_seal(content)
+    assert checksum(b"") != checksum(b"0")

@@ -4,9 +4,12 @@ import ast
 import re
 import tomllib
 
+import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from falsifier.core import literals
+from falsifier.core.literals import printable
 from tests.hostile.names import names
 
 
@@ -26,3 +29,34 @@ def test_cells_and_lines_are_text(name: str) -> None:
     assert len(line.splitlines()) <= 1 and not re.search("[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e]", line)
     assert "\n" not in literals.markdown_text(name) and "\n" not in literals.markdown_code(name)
     assert not re.search(r"(?<!\\)(?:\\\\)*[<|`\[]", literals.markdown_text(name))
+
+
+ACTING = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+@pytest.mark.parametrize(
+    ("sent", "shown"),
+    [
+        ("plain\ttext\nin lines, äöü, ≤ and 😀", "plain\ttext\nin lines, äöü, ≤ and 😀"),
+        ("\x1b[1;31mred\x1b[0m", "red"),
+        ("\x1b[2J\x1b[Hcleared", "cleared"),
+        ("\x9b31mred", "red"),
+        ("\x1b]0;a title\x07shown", "shown"),
+        ("\x1b]52;c;Y2xpcGJvYXJk\x1b\\shown", "shown"),
+        ("\x1b]8;;http://elsewhere\x1b\\a link\x1b]8;;\x1b\\", "a link"),
+        ("overwritten\rwritten over\b\b", "overwrittenwritten over"),
+        ("reversed \u202etxet\u202c", "reversed txet"),
+        ("half \ud83d a pair", "half ? a pair"),
+        ("cut off \x1b[", "cut off ["),
+    ],
+)
+def test_what_a_terminal_would_act_on_is_removed(sent: str, shown: str) -> None:
+    assert printable(sent) == shown
+
+
+@given(st.text(st.one_of(st.sampled_from("\x1b\x9b\x9d\x07[]0;m\\\n"), st.characters(codec=None))))
+def test_nothing_that_acts_is_left_of_any_text(sent: str) -> None:
+    shown = printable(sent)
+    assert not ACTING.search(shown)
+    assert printable(shown) == shown
+    shown.encode("utf-8")

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from falsifier.core import operating_system
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel

@@ -12,9 +12,14 @@ from falsifier.fmu.description.archive import (
     this_platform,
 )
 from falsifier.fmu.description.libraries import misnamed_text, missing_binary_text
-from falsifier.fmu.description.model_description import Description, describe, read_description, read_info
+from falsifier.fmu.description.model_description import (
+    Description,
+    describe,
+    needed_tool_text,
+    read_description,
+    read_info,
+)
 from falsifier.fmu.description.needed_libraries import binary_remarks
-from falsifier.fmu.description.notes import needed_tool_text
 from falsifier.fmu.description.structure import Structure, read_structure
 from falsifier.fmu.description.units import Unit, Units, conversion, is_known, read_units
 from falsifier.fmu.description.variables import Slot

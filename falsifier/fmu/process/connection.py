@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from falsifier.core import operating_system
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 
 # Waking up a process takes about 40 microseconds on either side, which is a lot compared with a simulation
 # shorter than this; polling for this long costs other processes little.

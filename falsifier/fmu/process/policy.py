@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.errors import SpecError, did_you_mean
 
 # Letters and bits of worker/sandbox.h.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core import operating_system
-from falsifier.core.printable import printable
+from falsifier.core.literals import printable
 from falsifier.fmu.process.plan import Plan
 
 # Numbers at the start of the memory; their positions are those of ``enum header`` in worker.h.

@@ -12,7 +12,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from falsifier.core import operating_system
-from falsifier.core.memory import check_memory_limits
+from falsifier.core.operating_system import check_memory_limits
 from falsifier.errors import ModelError
 from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
 from falsifier.fmu.process import folders

@@ -1,13 +1,31 @@
-"""A system as its workers get it, and what their replies say of it in words."""
+"""A system as its workers get it, in bytes, and what their replies say of it in words.
+
+``falsifier/fmu/worker/system_request.c`` is the other side. Components come in the order in which they step.
+"""
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from falsifier.errors import FalsifierError, SimulationError
-from falsifier.fmu.process import Plan, Policy, Reply, Request, Room, Where, outcome, value_checks
-from falsifier.fmu.systems import request
-from falsifier.fmu.systems.network import Network
+from falsifier.fmu.process import (
+    Plan,
+    Policy,
+    Reply,
+    Request,
+    Room,
+    Where,
+    encoding,
+    is_held,
+    library_of,
+    outcome,
+    solver_tolerance,
+    value_checks,
+)
+from falsifier.fmu.systems.network import SYSTEM, Member, Network, Place
+
+# A variable of a component, and the row of the plan's parameters, inputs or outputs that has its values.
+Row = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,16 +76,16 @@ class SystemOrder:
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
-        return request.load(self.network, folder, logging=logging)
+        return _load(self.network, folder, logging=logging)
 
     def prepare(self, plan: Plan) -> bytes:
         """See Order."""
-        return request.prepare(self.network, plan)
+        return _prepare(self.network, plan)
 
     def checks(self, plan: Plan) -> Callable[[Room], None]:
         """See Order."""
         members = self.network.members
-        parts = [request.part_of(self.network, plan, k) for k in range(len(members))]
+        parts = [_part_of(self.network, plan, k) for k in range(len(members))]
         return value_checks(
             plan,
             [(m.description, part.parameters, part.driven) for m, part in zip(members, parts, strict=True)],
@@ -82,7 +100,7 @@ class SystemOrder:
         name = self.component(reply.component)
         if reply.where == Where.TIMEOUT or not name:
             return outcome.failure(self.name, plan, reply, refusals, log)
-        part = request.part_of(self.network, plan, self.network.order[reply.component])
+        part = _part_of(self.network, plan, self.network.order[reply.component])
         return outcome.failure(name, replace(plan, strings=part.strings), reply, refusals, log)
 
     def component(self, position: int) -> str:
@@ -138,7 +156,7 @@ class SystemOrder:
 
     def _titles(self, positions: Sequence[str]) -> list[str]:
         """Return the names of connected outputs at positions that a worker tells, which may tell anything."""
-        titles = [self.network.title(place) for place in request.connected_outputs(self.network)]
+        titles = [self.network.title(place) for place in _connected_outputs(self.network)]
         known = [int(text) for text in positions if _is_position(text)]
         return [titles[k] for k in known if k < len(titles)]
 
@@ -152,3 +170,147 @@ def _short(number: str) -> str:
         return f"{float(number):.3g}"
     except ValueError:
         return "an unknown number"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What a plan has of one component.
+
+    Attributes:
+        parameters: parameters and start values that are set.
+        strings: string parameters and their values.
+        inputs: inputs with a source.
+        driven: those of them that follow a signal from outside.
+        connected: outputs that feed inputs.
+        recorded: other variables that are recorded.
+    """
+
+    parameters: tuple[Row, ...]
+    strings: tuple[tuple[str, str], ...]
+    inputs: tuple[str, ...]
+    driven: tuple[Row, ...]
+    connected: tuple[str, ...]
+    recorded: tuple[Row, ...]
+
+
+def _part_of(network: Network, plan: Plan, member: int) -> Part:
+    """Return what a plan has of the component at this position of the network's members."""
+    places = network.places
+    signals = _connected_outputs(network)
+    parameters = [(places[name], k) for k, name in enumerate(plan.parameters)]
+    outputs = [(places[name], k) for k, name in enumerate(plan.outputs)]
+    sources = _sources_of(network, plan)
+    rows = {places[name]: k for k, name in enumerate(plan.inputs)}
+    own = [place for place in sources if place.member == member]
+    return Part(
+        parameters=tuple((p.name, k) for p, k in parameters if p.member == member),
+        strings=tuple((places[n].name, value) for n, value in plan.strings if places[n].member == member),
+        inputs=tuple(place.name for place in own),
+        driven=tuple((p.name, rows[sources[p]]) for p in own if sources[p] not in signals),
+        connected=tuple(place.name for place in signals if place.member == member),
+        recorded=tuple((p.name, k) for p, k in outputs if p.member == member and p not in signals),
+    )
+
+
+def _sources_of(network: Network, plan: Plan) -> dict[Place, Place]:
+    """Return where the values of all inputs with a source come from: an output, or what the plan drives."""
+    driven = (network.places[name] for name in plan.inputs)
+    links = {link.target: link.source for link in network.links}
+    return links | {place: place for place in driven if place.member != SYSTEM}
+
+
+def _connected_outputs(network: Network) -> dict[Place, int]:
+    """Return the outputs that feed inputs, with their positions among the worker's signals."""
+    sources = {link.source for link in network.links if link.source.member != SYSTEM}
+    ordered = sorted(sources, key=lambda place: (network.order.index(place.member), place.name))
+    return {place: k for k, place in enumerate(ordered)}
+
+
+def _load(network: Network, folder: Path, *, logging: bool) -> bytes:
+    """Return what the worker needs to load the components that were unpacked to subfolders of a folder.
+
+    Raises:
+        ModelError: if one has no library for this machine.
+    """
+    members = [network.members[m] for m in network.order]
+    is_separate = network.coupling.isolation == "each"
+    return encoding.integers(is_separate, len(members)) + b"".join(
+        _fmu(m, folder, logging=logging) for m in members
+    )
+
+
+def _fmu(member: Member, folder: Path, *, logging: bool) -> bytes:
+    own, description = folder / member.folder, member.description
+    library = library_of(member.path, description, own, member.interface, windows=False)
+    return encoding.fmu(description, own, library, member.interface, logging=logging)
+
+
+def _prepare(network: Network, plan: Plan) -> bytes:
+    """Return what the worker needs for the simulations of a plan.
+
+    Raises:
+        ModelError: if a variable is unknown.
+    """
+    coupling, signals = network.coupling, _connected_outputs(network)
+    sizes = (len(plan.parameters), len(plan.inputs), len(plan.outputs))
+    outputs = [(network.places[name], row) for row, name in enumerate(plan.outputs)]
+    copies = [(signals[place], row) for place, row in outputs if place in signals]
+    parts = [
+        encoding.integers(plan.samples, plan.every, plan.pieces, *sizes, plan.tolerance is not None),
+        encoding.reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0),
+        encoding.integers(coupling.method == "jacobi", coupling.max_rounds),
+        encoding.reals(coupling.tolerance),
+        encoding.integers(len(signals)),
+        *(_component(network, plan, position) for position in range(len(network.order))),
+        encoding.integers(len(copies), *(number for pair in copies for number in pair)),
+    ]
+    return b"".join(parts)
+
+
+def _component(network: Network, plan: Plan, position: int) -> bytes:
+    number = network.order[position]
+    member, part = network.members[number], _part_of(network, plan, number)
+    description = member.description
+    loop_end = dict(network.loops).get(position, 0)
+    is_iterated = any(first <= position < last for first, last in network.loops)
+    kinds = {v.name: v for v in description.info.variables}
+    held = [n for n in part.inputs if is_held(description, member.interface, kinds[n])]
+    plain = [n for n in part.inputs if n not in held]
+    slots, parameters = description.slots, [name for name, _ in part.parameters]
+    parts = [
+        encoding.reals(solver_tolerance(plan, description.info)),
+        encoding.integers(_steps(member, plan), loop_end, is_iterated, len(part.strings)),
+        *(encoding.integers(slots[name].reference) + encoding.text(value) for name, value in part.strings),
+        encoding.ports(description, parameters),
+        encoding.integers(*(row for _, row in part.parameters)),
+        *(encoding.inputs(description, names, parameters) for names in (plain, held)),
+        _feeds(network, plan, [Place(number, name) for name in (*plain, *held)]),
+        encoding.ports(description, part.connected),
+        encoding.ports(description, [name for name, _ in part.recorded]),
+        encoding.integers(*(row for _, row in part.recorded)),
+    ]
+    return b"".join(parts)
+
+
+def _steps(member: Member, plan: Plan) -> int:
+    """Return the number of communication steps in a component's own step."""
+    return 1 if member.step is None else round(member.step / (plan.stop_time / plan.steps))
+
+
+def _feeds(network: Network, plan: Plan, targets: Sequence[Place]) -> bytes:
+    """Return where the value of each of these inputs comes from, and how it is converted."""
+    signals, sources = _connected_outputs(network), _sources_of(network, plan)
+    rows = {network.places[name]: row for row, name in enumerate(plan.inputs)}
+    links = {link.target: link for link in network.links}
+    parts = []
+    for target in targets:
+        source, link = sources[target], links.get(target)
+        row = signals[source] if source in signals else rows[source]
+        numbers = (1.0, 0.0, 0.0) if link is None else (link.factor, link.offset, link.start)
+        is_linear = link is not None and link.is_linear
+        parts.append(
+            encoding.integers(source in signals, row)
+            + encoding.reals(*numbers)
+            + encoding.integers(is_linear)
+        )
+    return b"".join(parts)

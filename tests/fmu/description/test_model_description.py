@@ -7,7 +7,6 @@ from falsifier.core.model import Variable
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description.model_description import Description, parse, read_description
-from falsifier.fmu.description.notes import notes
 from falsifier.fmu.description.variables import Slot, with_aliases_marked
 from tests.fmu import fixtures
 
@@ -139,8 +138,6 @@ def test_one_reference_has_one_name_that_can_be_set_and_an_input_keeps_its_own()
 
 
 def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() -> None:
-    root = ElementTree.fromstring(
-        '<fmi><DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/></fmi>'
-    )
-    (said,) = notes(root, (), start_time=0.0, tool="", needs_tool=())
+    times = '<DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/><ModelVariables>'
+    (said,) = described(ROLES.replace("<ModelVariables>", times)).info.notes
     assert said == "ignored in the default experiment, as not greater than 0: stopTime = -1, stepSize = 0"
