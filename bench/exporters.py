@@ -28,7 +28,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.problem.starter import starter_spec
+from falsifier.problem.writing import starter_spec
 from falsifier.record.run import falsify
 from falsifier.views.model_text import info_text
 

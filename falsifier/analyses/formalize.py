@@ -21,8 +21,8 @@ from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.subject import Subject, subject_of
 from falsifier.problem.unit_check import defined_units, factor_and_offset
+from falsifier.problem.writing import Subject, subject_of
 from falsifier.search.budget import Spent
 from falsifier.search.make_engines import open_chat
 from falsifier.search.request import LLMSettings

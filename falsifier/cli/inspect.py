@@ -28,15 +28,13 @@ from falsifier.core.signals import Signal
 from falsifier.core.words import parameterization_text
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.fmu import is_package, read_package, rights_text
-from falsifier.problem.defaults import default_interface
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec, load_problems, load_source
-from falsifier.problem.models import is_system, make_system, rights_of
+from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
-from falsifier.problem.starter import DEFAULT_STOP_TIME, starter_spec
-from falsifier.problem.subject import problem_of_starter
+from falsifier.problem.writing import DEFAULT_STOP_TIME, problem_of_starter, starter_spec
 from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:

@@ -187,7 +187,7 @@ def with_template(source: "ProblemSource", template: str | None) -> "ProblemSour
     """Return a source with the formula of ``--template``, if that is given."""
     if template is None:
         return source
-    from falsifier.problem.template_option import formula_of_template
+    from falsifier.problem.loading import formula_of_template
 
     return source.model_copy(update={"stl": formula_of_template(source, template)})
 

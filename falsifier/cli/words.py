@@ -29,7 +29,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.subject import Subject, subject_of, with_requirement
+from falsifier.problem.writing import Subject, subject_of, with_requirement
 
 if TYPE_CHECKING:
     from falsifier.analyses.formalize import Formalized

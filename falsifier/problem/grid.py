@@ -1,4 +1,4 @@
-"""The monitored time grid, if the user states none: it fits the FMU's step, the formulas' times and the end.
+"""The monitored time grid, if the user states none, and what else follows from the times in formulas.
 
 All times are compared as fractions: in floating point 3 s is not a multiple of 0.003 s.
 """
@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, lcm
 
+from falsifier.core.model import Experiment
+from falsifier.core.space import SearchSpace
 from falsifier.errors import FormulaError, SpecError
-from falsifier.problem.sizes import check_steps
+from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
+from falsifier.stl.formula import Window
 
 # Number of intervals if the FMU specifies no step.
 _DEFAULT_INTERVALS = 1000
@@ -21,6 +24,13 @@ _MAX_DENOMINATOR = 100_000
 _ROUNDING = 1e-12
 # Intervals with this many digits or more are no rounder than others.
 _MANY_DIGITS = 8
+# Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
+MAX_STEPS = 10_000_000
+# An input that changes this often within the formula's smallest window can meet each of its conditions.
+_PIECES_PER_WINDOW = 10
+# Minimum number of pieces if the windows ask for fewer, and their maximum number.
+_FEWEST_PIECES = 200
+_MOST_PIECES = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,3 +166,58 @@ def _listed(times: list[Fraction]) -> str:
 
 def _text(seconds: Fraction) -> str:
     return f"{float(seconds):.6g}"
+
+
+def check_steps(stop_time: float, period: float | None, *, file: str, key: str) -> None:
+    """Check that a period in s divides the stop time into no more than MAX_STEPS steps.
+
+    Raises:
+        SpecError: naming the key and the smallest period.
+    """
+    if period is not None and stop_time / period > MAX_STEPS:
+        raise SpecError(
+            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:g} s; "
+            f"the smallest value is {stop_time / MAX_STEPS:g}",
+            file=file,
+            key=key,
+        )
+
+
+def check_sizes(experiment: Experiment, space: SearchSpace, file: str) -> None:
+    """Check the steps of the solver and of inputs that are sampled and held.
+
+    Raises:
+        SpecError: naming the key and the smallest period.
+    """
+    check_steps(experiment.stop_time, experiment.step_size, file=file, key="model.step_size")
+    for r in space.inputs:
+        check_steps(experiment.stop_time, r.hold, file=file, key=f"inputs.{r.name}.hold")
+
+
+def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:
+    """Return limits wide enough for inputs that change several times within each window.
+
+    Args:
+        formulas: the formulas; those that cannot be parsed have no windows.
+        stop_time: end of the simulation in s.
+        step: step of the time grid in s; the shortest piece is a multiple of it.
+    """
+    stop, grid = exact(stop_time), exact(step)
+    window = smallest_window(formulas)
+    wanted = stop / _FEWEST_PIECES
+    if window is not None:
+        wanted = min(wanted, exact(window) / _PIECES_PER_WINDOW)
+    shortest = max(1, max(wanted, stop / _MOST_PIECES) // grid) * grid
+    return FreeSection(max_control_points=max(1, stop // shortest), min_interval=float(shortest))
+
+
+def smallest_window(formulas: Iterable[str | Formula]) -> float | None:
+    """Return the length in s of the smallest window that is longer than a moment; None if there is none."""
+    windows: list[Window | None] = []
+    for formula in formulas:
+        try:
+            parsed = parse(formula) if isinstance(formula, str) else formula
+        except FormulaError:
+            continue
+        windows += [getattr(part, "window", None) for part in parsed.walk()]
+    return min((w.end - w.start for w in windows if w is not None and w.end > w.start), default=None)

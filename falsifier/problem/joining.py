@@ -8,15 +8,12 @@ from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, Va
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System, is_package, read_info, read_package
-from falsifier.problem.defaults import DEFAULT_POINTS, STL_NAME, default_interface
-from falsifier.problem.freedom import default_freedom
-from falsifier.problem.grid import Grid, choose_grid, formula_times
-from falsifier.problem.models import check_own_steps, make_model
-from falsifier.problem.ranges import fixed_text, fixed_value, input_range, parameter_range
+from falsifier.problem.grid import Grid, check_sizes, check_steps, choose_grid, default_freedom, formula_times
+from falsifier.problem.models import check_own_steps, default_interface, make_model
+from falsifier.problem.ranges import DEFAULT_POINTS, fixed_text, fixed_value, input_range, parameter_range
 from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
-from falsifier.problem.sizes import check_sizes, check_steps
-from falsifier.problem.source import MODEL_FILES
+from falsifier.problem.source import MODEL_FILES, STL_NAME
 from falsifier.problem.spec import Spec, overlay, parse_spec
 
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.

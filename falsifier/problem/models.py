@@ -151,6 +151,13 @@ def _check_interface(spec: Spec, layers: Sequence[ModelChanges], file: str) -> N
         )
 
 
+def default_interface(info: ModelInfo) -> Interface | None:
+    """Return the default interface: co-simulation if the FMU offers it, with its exporting tool's solver."""
+    if "co-simulation" in info.interfaces:
+        return "co-simulation"
+    return info.interfaces[0] if info.interfaces else None
+
+
 def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
     stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
     if not info.interfaces:

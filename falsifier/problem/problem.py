@@ -13,10 +13,9 @@ from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variab
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
-from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import STL_NAME, ProblemSource
 
 if TYPE_CHECKING:
     from falsifier.problem.joining import Joined

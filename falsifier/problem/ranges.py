@@ -9,6 +9,9 @@ from falsifier.errors import SpecError
 from falsifier.problem.sections import InputSection
 from falsifier.problem.shorthand import named_file
 
+# Number of control points of an input of which nobody states it: both ends, the middle and two in between.
+DEFAULT_POINTS = 5
+
 
 def input_range(variable: Variable, section: InputSection, *, file: str | None, key: str) -> InputRange:
     """Return the searched input for a section, completed from the FMU's min, max, unit and description.

@@ -7,7 +7,7 @@ from math import floor
 
 from falsifier.core.space import Freedom, InputRange, SearchSpace
 from falsifier.errors import SpecError
-from falsifier.problem.freedom import default_freedom
+from falsifier.problem.grid import default_freedom
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection, InputSection, ModelChanges
 from falsifier.problem.source import ProblemSource

@@ -7,9 +7,10 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from falsifier.fmu.ssp import SUFFIXES as PACKAGES
-from falsifier.problem.defaults import STL_NAME
 from falsifier.problem.sections import ModelChanges
 
+# Name of the requirement that a formula makes if it is given without a name.
+STL_NAME = "stl"
 # Endings of files that are a model themselves; all others need a spec.
 MODEL_FILES = (".fmu", *PACKAGES)
 

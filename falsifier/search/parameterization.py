@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted, parameterization_text
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.problem.freedom import smallest_window
+from falsifier.problem.grid import smallest_window
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import coarse_inputs, limits_of
 from falsifier.problem.source import Parameterization

@@ -34,7 +34,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import parse_spec
-from falsifier.problem.starter import starter_spec
+from falsifier.problem.writing import starter_spec
 from falsifier.record.run import falsify
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Result

@@ -1,13 +1,14 @@
-"""Specs with components: [components.NAME], [connections], [coupling]."""
-
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from falsifier.core.model import Interface, ModelInfo
 from falsifier.errors import SpecError
 from falsifier.fmu import Coupling, FmuModel, System
 from falsifier.problem.loading import load_problem
+from falsifier.problem.models import default_interface
 from tests.fmu.fixtures import path
 
 COMPONENTS = f"""
@@ -174,3 +175,18 @@ def test_rights_that_do_not_exist_are_named(tmp_path: Path, allow: str, deny: st
     file = write(tmp_path, RIGHTS)
     with pytest.raises(SpecError, match=f"cruise.toml: model: .*{message}"):
         load_problem(file, allow=[allow] if allow else [], deny=[deny] if deny else [])
+
+
+INFO = ModelInfo("m")
+
+
+@pytest.mark.parametrize(
+    ("offered", "chosen"),
+    [
+        (("model-exchange", "co-simulation"), "co-simulation"),
+        (("model-exchange",), "model-exchange"),
+        ((), None),
+    ],
+)
+def test_co_simulation_goes_first(offered: tuple[Interface, ...], chosen: str | None) -> None:
+    assert default_interface(replace(INFO, interfaces=offered)) == chosen

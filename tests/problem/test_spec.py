@@ -3,9 +3,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from falsifier.errors import SpecError
-from falsifier.problem.sections import InputSection, ParameterSection
+from falsifier.problem.sections import InputSection, ParameterSection, RequirementSection, RiseSection
 from falsifier.problem.spec import overlay, parse_spec, read_spec
 
 GOOD: dict[str, Any] = {
@@ -98,3 +99,41 @@ def test_layers_go_from_requirement_to_profile_to_the_profiles_requirement() -> 
     spec = parse_spec(data, file="my.toml")
     assert [layer.stop_time for layer in spec.changes("R", "coarse")] == [1.0, 2.0, 3.0]
     assert [layer.stop_time for layer in spec.changes("R", None)] == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("requirement", "key"),
+    [
+        ({"template": "order", "conditions": ["a", "b"], "inputs": {"u": {"rang": [0, 1]}}}, "inputs.u.rang"),
+        ({"formula": "G (x <= 1)", "inputs": {"u": {"range": [1, 0]}}}, "inputs.u"),
+        ({"template": "order", "conditions": ["a", "b ="]}, "conditions.1"),
+        ({}, "formula"),
+    ],
+)
+def test_keys_are_those_of_the_file_whatever_kind_a_requirement_is(
+    requirement: dict[str, Any], key: str
+) -> None:
+    data = {"model": {"fmu": "a.fmu"}, "requirements": {"<formula>x": requirement}}
+    with pytest.raises(SpecError) as raised:
+        parse_spec(data, file="my.toml")
+    assert raised.value.key == f"requirements.<formula>x.{key}"
+
+
+def test_sections_take_no_unknown_keys() -> None:
+    for section in (InputSection, ParameterSection, RequirementSection):
+        with pytest.raises(ValidationError, match="extra_forbidden"):
+            section.model_validate({"formula": "G[0,1] (y <= 1)", "colour": "red"})
+
+
+def test_a_range_is_in_order_and_excludes_a_value() -> None:
+    with pytest.raises(ValidationError, match=r"expected \[low, high\] with low < high, got \[2, 1\]"):
+        InputSection(range=(2.0, 1.0))
+    with pytest.raises(ValidationError, match="value keeps the input constant"):
+        InputSection(range=(0.0, 1.0), value=0.5)
+
+
+def test_a_template_is_a_requirement_with_changes_of_its_own() -> None:
+    section = RiseSection.model_validate(
+        {"template": "rise", "signal": "y", "reference": 10, "time": 2, "stop_time": 5.0}
+    )
+    assert (section.signal, section.stop_time) == ("y", 5.0)

@@ -15,7 +15,7 @@ from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.request import Method, method_of
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
-from falsifier.problem.defaults import STL_NAME
+from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunStatus, read_summary

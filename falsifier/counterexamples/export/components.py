@@ -27,8 +27,8 @@ from falsifier.counterexamples.export.inputs import InputTable, start_values
 from falsifier.counterexamples.export.tables import write_csv, write_json
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
-from falsifier.problem.defaults import DEFAULT_POINTS
 from falsifier.problem.problem import Problem
+from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.stl.names import name_text
 
 # Folder of an export in which each component has one.
