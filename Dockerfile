@@ -3,7 +3,7 @@
 #   docker build -t falsifier .
 #   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" falsifier run my.toml:R1
 #
-# It has no C compiler: `falsifier build` needs one, nothing else does.
+# It has no C compiler: `falsifier tools build` needs one, nothing else does.
 FROM python:3.13-slim
 
 WORKDIR /src

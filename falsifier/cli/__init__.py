@@ -6,7 +6,7 @@ import sys
 import traceback
 from importlib import import_module
 from io import StringIO
-from typing import NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -22,9 +22,14 @@ from falsifier.core.operating_system import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean
 from falsifier.views.terminal import warn
 
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
 # Exit code that a shell reports for a program whose pipe was closed: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
 _FAILED = 3
+# Set by the shell when it asks for completions; falsifier completes by what click brings.
+_COMPLETES = "_FALSIFIER_COMPLETE"
 # What a machine has run out of, and what to do.
 _ELSEWHERE = "or choose a location on another disk, for example with --out DIR"
 _EXHAUSTED = {
@@ -37,58 +42,83 @@ _EXHAUSTED = {
     errno.EAGAIN: "end other processes, or raise the limit on them (ulimit -u)",
 }
 
-# name: (module, summary in --help)
-_COMMANDS = {
+# name: (module, summary in --help). A group has a table of its own in place of a module.
+_Table = dict[str, "tuple[str | _Table, str]"]
+_LLM: _Table = {
+    "check": ("falsifier.cli.llm", "Check name and key of a language model with one short request."),
+    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model, or what was sent."),
+}
+_TOOLS: _Table = {
+    "build": ("falsifier.cli.tools", "Compile an FMU's C sources for this platform."),
+    "repair": ("falsifier.cli.tools", "Drop what is damaged in the files of a run or campaign."),
+    "validate": ("falsifier.cli.tools", "Re-simulate counterexamples in ARCH-COMP format."),
+    "schema": ("falsifier.cli.tools", "Print the JSON Schema of spec files or run records."),
+}
+_COMMANDS: _Table = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
+    "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
+    "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
+    "watch": ("falsifier.cli.campaign", "Follow a running search from another terminal."),
     "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
+    "explain": (
+        "falsifier.cli.counterexample",
+        "Say why a counterexample violates; simplify it; map it.",
+    ),
+    "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
+    "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
+    "coverage": ("falsifier.cli.report", "Show what a run has tried, and what it has not."),
     "assess": ("falsifier.cli.assess", "Bound the probability of a violation."),
     "margin": ("falsifier.cli.assess", "Find the threshold at which violations begin."),
-    "coverage": ("falsifier.cli.coverage", "Show what a run has tried, and what it has not."),
-    "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
-    "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
-    "shrink": ("falsifier.cli.counterexample", "Make a counterexample as simple as possible."),
-    "explain": ("falsifier.cli.counterexample", "Explain why a counterexample violates."),
-    "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
-    "robustness-map": ("falsifier.cli.counterexample", "Map the robustness around a counterexample."),
     "bench": ("falsifier.cli.campaign", "Run requirements x methods x seeds, and print a table."),
-    "watch": ("falsifier.cli.campaign", "Follow a running campaign from another terminal."),
-    "repair": ("falsifier.cli.repair", "Drop what is damaged in the files of a run or campaign."),
-    "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
-    "validate": ("falsifier.cli.report", "Re-simulate counterexamples in ARCH-COMP format."),
     "info": ("falsifier.cli.inspect", "Show an FMU's interfaces, variables, units and ranges."),
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
-    "build": ("falsifier.cli.inspect", "Compile an FMU's C sources for this platform."),
-    "check": ("falsifier.cli.inspect", "Check a spec file without simulating."),
-    "lint": ("falsifier.cli.words", "Find requirements that say nothing, or the same as others."),
-    "formalize": ("falsifier.cli.words", "Turn a requirement in words into formulas."),
-    "schema": ("falsifier.cli.inspect", "Print the JSON Schema of spec files or run records."),
-    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model."),
-    "llm": ("falsifier.cli.llm", "Check a language model with one short request."),
+    "check": ("falsifier.cli.requirements", "Check a spec file, and find requirements that say nothing."),
+    "formalize": ("falsifier.cli.requirements", "Turn a requirement in words into formulas."),
+    "llm": (_LLM, "Language models: check one, print prompts."),
+    "tools": (_TOOLS, "Build FMUs, repair records, validate results, print schemas."),
 }
 
 
 class _LazyGroup(click.Group):
-    """Lists commands from the table and imports a command's module only when it is called."""
+    """Lists commands from a table and imports a command's module only when it is called."""
+
+    def __init__(self, name: str | None = None, *, table: _Table, **attributes: Any) -> None:
+        super().__init__(name, **attributes)
+        self._table = table
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(_COMMANDS)
+        return list(self._table)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in _COMMANDS:
+        if cmd_name not in self._table:
             return None
-        command: click.Command = getattr(import_module(_COMMANDS[cmd_name][0]), cmd_name.replace("-", "_"))
+        found, summary = self._table[cmd_name]
+        if isinstance(found, dict):
+            return _LazyGroup(cmd_name, table=found, help=summary)
+        command: click.Command = getattr(import_module(found), cmd_name)
         return command
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        if args and args[0] not in _COMMANDS:
-            ctx.fail(f"No such command {args[0]!r}; {did_you_mean(args[0], _COMMANDS)}")
+        if args and args[0] not in self._table:
+            ctx.fail(f"No such command {args[0]!r}; {did_you_mean(args[0], self._table)}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in _COMMANDS.items()])
+            formatter.write_dl([(name, text) for name, (_, text) in self._table.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> "list[CompletionItem]":
+        """Complete names of commands without importing their modules."""
+        from click.shell_completion import CompletionItem
+
+        names = [
+            CompletionItem(name, help=text)
+            for name, (_, text) in self._table.items()
+            if name.startswith(incomplete)
+        ]
+        return [*names, *click.Command.shell_complete(self, ctx, incomplete)]
 
 
 _HELP = """Find inputs that make an FMU violate a requirement.
@@ -103,7 +133,9 @@ failed, 130 interrupted.
 """
 
 
-@click.command(cls=_LazyGroup, help=_HELP, context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(
+    cls=_LazyGroup, table=_COMMANDS, help=_HELP, context_settings={"help_option_names": ["-h", "--help"]}
+)
 @click.version_option(__version__, prog_name="falsifier")
 def cli() -> None:
     """Run the given command; its help text is _HELP."""
@@ -124,6 +156,10 @@ def main() -> NoReturn:
 def _carried_out(arguments: list[str]) -> int:
     """Carry out a command; return its exit code."""
     try:
+        if instruction := os.environ.get(_COMPLETES):
+            from click.shell_completion import shell_complete
+
+            return shell_complete(cli, {}, "falsifier", _COMPLETES, instruction)
         check_memory_limits()
         # Not cli.main: it ends with exit code 1, which means falsified, if a pipe is closed.
         with cli.make_context("falsifier", arguments) as context:

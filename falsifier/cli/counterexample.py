@@ -1,80 +1,111 @@
-"""Commands on counterexamples: ``replay``, ``shrink``, ``explain``, ``export``, ``robustness-map``.
-
-Of a run that falsified nothing, ``shrink``, ``explain`` and ``robustness-map`` take the nearest miss.
-"""
+"""``falsifier explain``, ``replay``, ``export``: on a counterexample, or the nearest miss of a run."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from math import isqrt
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.llm_options import (
-    api_base_option,
-    effort_option,
-    llm_option,
-)
-from falsifier.cli.nearest_miss import (
-    draw_nearest_miss,
-    nearest_miss_line,
-    refuse,
-    shrink_nearest_miss,
-    shrunk_line,
-)
-from falsifier.cli.options import (
-    budget_option,
-    json_option,
-    out_option,
-    run_argument,
-    seed_option,
-    store_option,
-)
+from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
+from falsifier.cli.llm_options import api_base_option, effort_option, llm_option
+from falsifier.cli.options import budget_option, interface_option, json_option, out_option, run_argument
 from falsifier.cli.output import conclude, say
-from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, in_one_line
-from falsifier.counterexamples.nearest_miss import NearestMiss, Subject, asked_about
-from falsifier.counterexamples.store import (
-    Database,
-    Replayed,
-    StoredCounterexample,
-    beside,
-    counterexample_file,
-    load,
-    problem_of,
-    shrunk_file,
-    to_store,
-)
-from falsifier.counterexamples.store import (
-    replay as replay_stored,
-)
+from falsifier.core.words import candidate_lines, counted, in_one_line
+from falsifier.counterexamples.case import Case, case_of, counterexample_case
+from falsifier.counterexamples.store import Database, Replayed
+from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
-from falsifier.evaluation.confirm import Confirmation, confirm, other_interface
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.confirm import confirm, other_interface
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
-from falsifier.stl.margins import shown, signed
+from falsifier.stl.margins import signed
 from falsifier.views.terminal import warn
-from falsifier.views.text import broken_rows
+from falsifier.views.text import broken_rows, evaluation_json
+
+if TYPE_CHECKING:
+    from falsifier.core.model import Interface
+    from falsifier.counterexamples.shrink import Shrunk
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
-
-_requirement_option = click.option(
-    "--requirement", metavar="NAME", help="Which one, if RUN searched several requirements."
-)
+# Simulations of a map: random changes, and the points of a square grid.
+_MAP_SAMPLES, _MAP_POINTS = 256, 441
 
 
 @click.command()
 @run_argument
+@click.option("--shrink", "shrunk", is_flag=True, help="Write the simplest one near it that still violates.")
+@click.option("--map", "mapped", is_flag=True, help="Change all inputs at random; draw where it violates.")
+@budget_option(
+    shown=f"{_SHRINK_BUDGET}; with --map {_MAP_SAMPLES + _MAP_POINTS}", note=" of --shrink or --map"
+)
 @click.option(
-    "--other-interface", "other", is_flag=True, help="Simulate through the FMU's other FMI interface."
+    "--at-most",
+    type=float,
+    metavar="ROBUSTNESS",
+    help="With --shrink: robustness that the simpler one may have; 0: any violation. Default: half of a "
+    "counterexample's, a tenth more than a nearest miss's.",
+)
+@llm_option()
+@effort_option
+@api_base_option
+@click.option("--requirement", metavar="NAME", help="Which one, if RUN searched several requirements.")
+@out_option(
+    "File to write; default: shrunk.json, of a nearest miss shrunk.csv; with --map robustness-map.png."
 )
 @json_option
-def replay(*, run: Path, other: bool, as_json: bool) -> None:
+def explain(
+    *,
+    run: Path,
+    shrunk: bool,
+    mapped: bool,
+    budget: int | None,
+    at_most: float | None,
+    llm: str | None,
+    effort: str | None,
+    api_base: str | None,
+    requirement: str | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Say why a counterexample violates, simplify it, or map what is around it.
+
+    RUN is a run directory or a counterexample file. Of a run that falsified nothing, this is about the
+    simulation that came nearest to a violation.
+
+    Without --shrink and --map: what broke, and what resetting each input alone comes to; of a nearest miss
+    also its picture, nearest-miss.png. With --llm, a language model describes it in its own words, too.
+    Except with --shrink, a run's shrunk counterexample is taken if there is one.
+    """
+    _check_parts(
+        shrunk=shrunk,
+        mapped=mapped,
+        other={"--budget": budget, "--out": out},
+        simpler={"--at-most": at_most},
+        words={"--llm": llm, "--effort": effort, "--api-base": api_base},
+    )
+    if llm is None and (effort is not None or api_base is not None):
+        raise click.UsageError("--effort and --api-base require --llm NAME")
+    case = case_of(run, requirement, shrunk=not shrunk)
+    if shrunk:
+        _shrink(case, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
+    elif mapped:
+        _map(case, run, budget=budget or _MAP_SAMPLES + _MAP_POINTS, out=out, as_json=as_json)
+    else:
+        _explain(case, run, llm=llm, effort=effort, api_base=api_base, as_json=as_json)
+
+
+@click.command()
+@run_argument
+@interface_option("FMI interface through which it is simulated; default: that of the run.")
+@json_option
+def replay(*, run: Path, interface: "Interface | None", as_json: bool) -> None:
     """Simulate a counterexample again, even if the FMU or the requirement has changed since.
 
     RUN is a run directory or a counterexample file.
@@ -82,10 +113,12 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
     Exit codes: 0 no longer violated, or fragile, 1 still violated, 2 it does not fit the problem, 3 the
     simulation failed.
     """
-    stored = load(run)
-    with _problem(stored) as problem:
-        judged = other_interface(problem) if other else problem
-        replayed = replay_stored(stored, judged)
+    case = counterexample_case(run)
+    assert case.stored is not None, "a counterexample has a file"
+    with _loaded(case) as problem:
+        own = getattr(problem.model, "interface", None)
+        judged = problem if interface in (None, own) else other_interface(problem)
+        replayed = replay_stored(case.stored, judged)
         judged.model.close()
     if replayed.status == "does not fit":
         raise CandidateError(replayed.text)
@@ -95,152 +128,13 @@ def replay(*, run: Path, other: bool, as_json: bool) -> None:
 
 @click.command()
 @run_argument
-@budget_option(_SHRINK_BUDGET)
-@click.option(
-    "--margin",
-    type=float,
-    help="Margin to keep: the robustness stays at or below minus this value. Default: half of the "
-    "original's; 0: any violation will do.",
-)
-@click.option(
-    "--within",
-    type=float,
-    help="For a nearest miss: the robustness may grow by this value. Default: a tenth of it.",
-)
-@_requirement_option
-@out_option("File to write; default: shrunk.json in RUN's directory; of a nearest miss shrunk.csv.")
-@store_option
-@json_option
-def shrink(
-    *,
-    run: Path,
-    budget: int,
-    margin: float | None,
-    within: float | None,
-    requirement: str | None,
-    out: Path | None,
-    store: Path | None,
-    as_json: bool,
-) -> None:
-    """Make a counterexample as simple as possible while it still violates; the original is kept.
-
-    RUN is a run directory or a counterexample file. Of a run that falsified nothing, the input that came
-    nearest to a violation is made as simple as possible while it still comes about as near.
-    """
-    found = asked_about(run, requirement)
-    if isinstance(found, NearestMiss):
-        refuse("a nearest miss is no counterexample", {"--margin": margin, "--store": store})
-        shrink_nearest_miss(found, budget=budget, within=within, out=out, as_json=as_json)
-        return
-    refuse("applies to the nearest miss of a run that falsified nothing", {"--within": within})
-    file, stored = found
-    _shrink(file, stored, budget=budget, margin=margin, out=out, store=store, as_json=as_json)
-
-
-def _shrink(
-    original: Path,
-    stored: StoredCounterexample,
-    *,
-    budget: int,
-    margin: float | None,
-    out: Path | None,
-    store: Path | None,
-    as_json: bool,
-) -> None:
-    from falsifier.cli.files import check_out, write_counterexample
-    from falsifier.counterexamples.shrink import shrink as shrink_violation
-
-    # A link is followed, not replaced.
-    file = shrunk_file(original) if out is None else out.resolve()
-    check_out(file, beginnings=(b'{\n  "format"',), kept=original)
-    with _problem(stored) as problem:
-        shrunk = shrink_violation(
-            problem,
-            _simulated(stored, problem),
-            budget=budget,
-            margin=margin,
-            progress=lambda simpler, n: warn(f"simulation {n}: {_inputs_line(simpler)}"),
-        )
-        confirmation = confirm(problem, shrunk.evaluation)
-    if confirmation.outcome == "refuted":
-        raise SpecError(f"{original}: {confirmation.reason}")
-    written = write_counterexample(confirmation, file.parent, name=file.name)
-    if store is not None:
-        written.append(Database(store).save(problem, to_store(confirmation)))
-    if as_json:
-        content = _confirmation_json(confirmation)
-        content |= {"minimal": shrunk.minimal, "simulations": shrunk.simulations}
-        content |= {"least_margin": shrunk.least_margin}
-        say(json.dumps(content | {"files": list(map(str, written))}, indent=2))
-        return
-    say(shrunk_line(problem, shrunk, budget))
-    say(f"  {confirmation.outcome:<13}  {confirmation.reason}")
-    for line in broken_rows(confirmation.evaluation.verdict):
-        say(f"  {line}")
-    half = ", half of the original's; --margin changes it" if margin is None else ""
-    say(f"  margin         at least {shown(shrunk.least_margin):.6g} was kept{half}")
-    for line in candidate_lines(confirmation.evaluation.candidate, problem.space):
-        say(f"  {line}")
-    say(f"  files          {', '.join(map(str, written))}")
-
-
-@click.command()
-@run_argument
-@llm_option()
-@effort_option
-@api_base_option
-@_requirement_option
-@json_option
-def explain(
-    *,
-    run: Path,
-    llm: str | None,
-    effort: str | None,
-    api_base: str | None,
-    requirement: str | None,
-    as_json: bool,
-) -> None:
-    """Explain in one paragraph what broke, and what resetting each input alone comes to.
-
-    RUN is a run directory, whose shrunk counterexample is taken if there is one, or a counterexample file.
-    Of a run that falsified nothing, the simulation that came nearest to a violation is explained, and drawn
-    as nearest-miss.png. With --llm, a language model describes it in its own words, too.
-    """
-    from falsifier.counterexamples.explain import explain as explain_violation
-    from falsifier.counterexamples.explain import narrate
-
-    if llm is None and (effort is not None or api_base is not None):
-        raise click.UsageError("--effort and --api-base require --llm NAME")
-    found = asked_about(run, requirement, shrunk=True)
-    chat = None
-    if llm is not None:
-        from falsifier.llm.connect import connect
-
-        chat = connect(llm, effort=effort, api_base=api_base)
-    with _subject(found) as (problem, evaluation):
-        explanation = explain_violation(problem, evaluation)
-        picture = draw_nearest_miss(found, problem, evaluation) if isinstance(found, NearestMiss) else None
-    words = narrate(explanation, chat) if chat else None
-    if as_json:
-        effects = [asdict(e) for e in explanation.effects]
-        told = {"llm": llm, "words": words} if words else None
-        content: dict[str, Any] = {"violated": explanation.violated, "text": explanation.text}
-        content |= {"effects": effects, "about": _about(found)}
-        content |= {"told_by": told, "picture": picture and str(picture)}
-        say(json.dumps(content, indent=2))
-        return
-    _say_about(found, problem, run)
-    say(explanation.text)
-    if words is not None:
-        say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
-    if picture is not None:
-        say(f"picture: {picture}")
-
-
-@click.command()
-@run_argument
 @out_option("Directory to write; default: export in RUN's directory.", metavar="DIR")
-@store_option
+@click.option(
+    "--store",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Only keep the counterexample in this folder of counterexamples, for pytest --falsifier.",
+)
 def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     """Write a counterexample for FMPy, fmusim, OpenModelica, Simulink and pytest.
 
@@ -248,56 +142,148 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
     """
     from falsifier.counterexamples.export import export_counterexample
 
-    stored = load(run)
-    directory = out or beside(counterexample_file(run), "export")
-    with _problem(stored) as problem:
-        written = export_counterexample(problem, stored, _simulated(stored, problem), directory)
-    if store is not None:
-        written.append(Database(store).save(problem, stored))
-    for path in written:
-        say(str(path))
+    case = counterexample_case(run)
+    assert case.stored is not None, "a counterexample has a file"
+    with _loaded(case) as problem:
+        evaluation = case.simulated(problem)
+        if store is not None:
+            say(str(Database(store).save(problem, case.stored)))
+        if store is None or out is not None:
+            directory = out or case.beside("export")
+            for path in export_counterexample(problem, case.stored, evaluation, directory):
+                say(str(path))
 
 
-@click.command("robustness-map")
-@run_argument
-@click.option(
-    "--radius",
-    type=float,
-    default=0.05,
-    show_default=True,
-    help="Largest change of an input, as a share of its range.",
-)
-@click.option(
-    "--samples", type=int, default=256, show_default=True, help="Number of random changes to simulate."
-)
-@click.option("--grid", type=int, default=21, show_default=True, help="Points per side of the map.")
-@seed_option()
-@_requirement_option
-@out_option("Picture to write; default: robustness-map.png in RUN's directory.")
-@json_option
-def robustness_map(
-    *,
-    run: Path,
-    radius: float,
-    samples: int,
-    grid: int,
-    seed: int,
-    requirement: str | None,
-    out: Path | None,
-    as_json: bool,
-) -> None:
-    """Change the inputs of a counterexample at random and plot where they still violate.
+def _check_parts(*, shrunk: bool, mapped: bool, **groups: Mapping[str, object]) -> None:
+    """Refuse options of another part of ``explain``.
 
-    RUN is a run directory, whose shrunk counterexample is taken if there is one, or a counterexample file.
-    Of a run that falsified nothing, the inputs that came nearest to a violation are changed.
+    Raises:
+        click.UsageError: naming those that were given.
     """
+    if shrunk and mapped:
+        raise click.UsageError("--shrink and --map: give one after the other")
+    applies = {"other": shrunk or mapped, "simpler": shrunk, "words": not (shrunk or mapped)}
+    reasons = {
+        "other": "add --shrink or --map",
+        "simpler": "applies to --shrink only",
+        "words": "leave out --shrink and --map",
+    }
+    for group, options in groups.items():
+        given = [name for name, value in options.items() if value is not None]
+        if given and not applies[group]:
+            raise click.UsageError(f"{', '.join(given)}: {reasons[group]}")
+
+
+def _shrink(case: Case, *, budget: int, at_most: float | None, out: Path | None, as_json: bool) -> None:
+    """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
+    from falsifier.counterexamples.shrink import shrink
+
+    # A link is followed, not replaced.
+    file = case.beside("shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
+    begins = b'"time"' if case.is_miss else b'{\n  "format"'
+    check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.place)
+    with _loaded(case) as problem:
+        shrunk = shrink(
+            problem,
+            case.simulated(problem),
+            budget=budget,
+            at_most=at_most,
+            progress=lambda simpler, n: warn(f"simulation {n}: {_inputs_line(simpler)}"),
+        )
+        found = shrunk.evaluation
+        confirmation = confirm(problem, found) if found.violated else None
+        if confirmation is not None and confirmation.outcome == "refuted":
+            if not case.is_miss:
+                raise SpecError(f"{case.place}: {confirmation.reason}")
+            confirmation = None
+        if confirmation is None:
+            files = _written_inputs(problem, found, file)
+        else:
+            files = write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
+    if as_json:
+        content: dict[str, Any] = {"violated": found.violated}
+        content |= {"outcome": confirmation and confirmation.outcome}
+        content |= {"reason": confirmation and confirmation.reason}
+        content |= {**evaluation_json(found), "minimal": shrunk.minimal, "simulations": shrunk.simulations}
+        say(json.dumps(content | {"at_most": shrunk.at_most, "files": list(map(str, files))}, indent=2))
+        return
+    lines = [case.text] if case.is_miss else []
+    lines.append(_shrunk_line(problem, shrunk, budget))
+    if confirmation is not None:
+        simpler = "this simpler input violates the requirement: " if case.is_miss else ""
+        lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")
+        lines += [f"  {row}" for row in broken_rows(confirmation.evaluation.verdict)]
+    share = "a tenth more than before" if case.is_miss else "half of the original's"
+    changed = f", {share}; --at-most changes it" if at_most is None else ""
+    lines.append(
+        f"  robustness     {signed(found.robustness)}; up to {signed(shrunk.at_most)} was allowed{changed}"
+    )
+    lines += [f"  {line}" for line in candidate_lines(found.candidate, problem.space)]
+    lines.append(f"  files          {', '.join(map(str, files))}")
+    say("\n".join(map(one_line, lines)))
+
+
+def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
+    from falsifier.counterexamples.export.inputs import input_table
+    from falsifier.counterexamples.export.tables import write_csv
+
+    files = [write_csv(input_table(problem, evaluation.candidate), file, problem.model)]
+    picture = draw_evaluation(problem, evaluation, file.with_suffix(".png"))
+    return files if picture is None else [*files, picture]
+
+
+def _shrunk_line(problem: Problem, shrunk: "Shrunk", budget: int) -> str:
+    """Say how shrinking ended."""
+    end = "no simpler one found nearby"
+    if not shrunk.minimal:
+        end = f"the budget of {counted(budget, 'simulation')} is used up"
+    return f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}"
+
+
+def _explain(
+    case: Case, run: Path, *, llm: str | None, effort: str | None, api_base: str | None, as_json: bool
+) -> None:
+    """Print what broke, and what resetting each input alone comes to."""
+    from falsifier.counterexamples.explain import explain, narrate
+
+    chat = None
+    if llm is not None:
+        from falsifier.llm.connect import connect
+
+        chat = connect(llm, effort=effort, api_base=api_base)
+    picture = None
+    with _loaded(case) as problem:
+        evaluation = case.simulated(problem)
+        explanation = explain(problem, evaluation)
+        if case.is_miss:
+            picture = draw_evaluation(problem, evaluation, case.beside("nearest-miss.png"))
+    words = narrate(explanation, chat) if chat else None
+    if as_json:
+        told = {"llm": llm, "words": words} if words else None
+        content: dict[str, Any] = {"violated": explanation.violated, "text": explanation.text}
+        content |= {"effects": [asdict(e) for e in explanation.effects], "about": str(case.place)}
+        content |= {"told_by": told, "picture": picture and str(picture)}
+        say(json.dumps(content, indent=2))
+        return
+    _say_about(case, problem, run)
+    say(explanation.text)
+    if words is not None:
+        say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
+    if picture is not None:
+        say(f"picture: {picture}")
+
+
+def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool) -> None:
+    """Draw the robustness around it."""
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
-    about, name = asked_about(run, requirement, shrunk=True), "robustness-map.png"
-    picture = out or (about.beside(name) if isinstance(about, NearestMiss) else beside(about[0], name))
-    with _subject(about) as (problem, evaluation):
-        found = robustness_map(problem, evaluation, radius=radius, samples=samples, points=grid, seed=seed)
+    points = isqrt(budget * _MAP_POINTS // (_MAP_SAMPLES + _MAP_POINTS))
+    with _loaded(case) as problem:
+        found = robustness_map(
+            problem, case.simulated(problem), samples=budget - points * points, points=points
+        )
+    picture = out or case.beside("robustness-map.png")
     save_figure(plot_robustness_map(found, problem.name), picture)
     if as_json:
         content = {
@@ -307,66 +293,36 @@ def robustness_map(
             "rank_correlations": {
                 c.label: r for c, r in zip(found.coordinates, found.influences, strict=True)
             },
-            "about": _about(about),
+            "about": str(case.place),
             "picture": str(picture),
         }
         say(json.dumps(content, indent=2))
         return
-    _say_about(about, problem, run)
+    _say_about(case, problem, run)
     say(f"{problem.name}: {found.text}")
     say(f"  picture        {picture}")
 
 
-def _about(found: Subject) -> str:
-    """The file of a counterexample, or the run directory of a nearest miss."""
-    return str(found.directory if isinstance(found, NearestMiss) else found[0])
-
-
-def _say_about(found: Subject, problem: Problem, named: Path) -> None:
+def _say_about(case: Case, problem: Problem, named: Path) -> None:
     """Say what a text is about if that is not what was named."""
-    if isinstance(found, NearestMiss):
-        say(one_line(nearest_miss_line(found)))
-    elif found[0] != named and found[0].stem.startswith("shrunk"):
-        say(f"This is about {found[0]}, the shrunk counterexample:")
-        for line in candidate_lines(Candidate.from_json(found[1].candidate), problem.space):
+    if case.is_miss:
+        say(one_line(case.text))
+    elif case.place != named and case.is_shrunk:
+        say(f"This is about {case.place}, the shrunk counterexample:")
+        for line in candidate_lines(case.candidate, problem.space):
             say(f"  {line}")
 
 
 @contextmanager
-def _problem(stored: StoredCounterexample) -> Iterator[Problem]:
-    """Load the problem of a counterexample, and close its model at the end."""
-    problem = problem_of(stored)
+def _loaded(case: Case) -> Iterator[Problem]:
+    """Load the problem, say what its FMU may do, and close the model at the end."""
+    problem = case.problem()
     for note in rights_notes(problem.model):
         warn(note)
     try:
         yield problem
     finally:
         problem.model.close()
-
-
-@contextmanager
-def _subject(found: Subject) -> Iterator[tuple[Problem, Evaluation]]:
-    """Load the problem of what was asked about, simulate that again, and close the model at the end."""
-    if isinstance(found, NearestMiss):
-        problem = found.problem()
-        try:
-            yield problem, found.simulated(problem)
-        finally:
-            problem.model.close()
-        return
-    with _problem(found[1]) as problem:
-        yield problem, _simulated(found[1], problem)
-
-
-def _simulated(stored: StoredCounterexample, problem: Problem) -> Evaluation:
-    evaluation = evaluate(problem, problem.space.admit(Candidate.from_json(stored.candidate)))
-    if not evaluation.violated:
-        found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
-        raise SpecError(
-            f"the counterexample of {problem.name} no longer violates: {found}; to search for another one: "
-            "falsifier run"
-        )
-    return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
 
 
 def _inputs_line(evaluation: Evaluation) -> str:
@@ -378,13 +334,4 @@ def _replayed_json(replayed: Replayed) -> dict[str, Any]:
         "status": replayed.status,
         "robustness": replayed.evaluation and replayed.evaluation.robustness,
         "text": replayed.text,
-    }
-
-
-def _confirmation_json(confirmation: Confirmation) -> dict[str, Any]:
-    return {
-        **confirmation.evaluation.candidate.to_json(),
-        "robustness": confirmation.robustness,
-        "outcome": confirmation.outcome,
-        "reason": confirmation.reason,
     }

@@ -1,8 +1,6 @@
-"""``falsifier info``, ``init``, ``build``, ``check`` and ``schema``: commands that do not search."""
+"""``falsifier info`` and ``falsifier init``: what an FMU holds, and a spec for it."""
 
-import json
 import shlex
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from os.path import relpath
@@ -16,30 +14,22 @@ from falsifier.cli.options import (
     out_option,
     policy_changes,
     policy_options,
-    profile_option,
-    template_option,
-    with_template,
 )
 from falsifier.cli.output import say
 from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
-from falsifier.core.words import parameterization_text
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.grid import choose_grid
-from falsifier.problem.loading import find_spec, load_problems, load_source
+from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
-from falsifier.problem.problem import Problem, held_text
-from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import read_spec
 from falsifier.problem.writing import DEFAULT_STOP_TIME, problem_of_starter, starter_spec
 from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from falsifier.fmu import System
 
 # Maximum number of variables that are compared if the FMU declares no outputs.
@@ -150,17 +140,6 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
-@out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
-def build(*, fmu: Path, out: Path | None) -> None:
-    """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
-    from falsifier.fmu.build import compile_sources
-
-    written = compile_sources(_one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    say(f"{written} written")
-
-
-@click.command()
 @click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
@@ -185,7 +164,7 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
 
     if len(fmus) > 1:
         parts: dict[str, Path] = {}
-        for source in map(_one_fmu, fmus):
+        for source in map(one_fmu, fmus):
             name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
             parts[name] = source
         info = System(dict(parts), name=path.stem).info
@@ -193,61 +172,11 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
     given = fmus[0]
     if is_package(given):
         return starter_spec(_relative(given, path), read_package(given).info)
-    source = _one_fmu(given)
+    source = one_fmu(given)
     found = read_info(source)
     # Raises an error if the FMU cannot be simulated, before a useless spec is written.
     FmuModel(source, interface=default_interface(found) or "co-simulation")
     return starter_spec(_relative(source, path), found)
-
-
-@click.command()
-@click.argument("target")
-@profile_option
-@template_option
-def check(*, target: str, profile: str | None, template: str | None) -> None:
-    """Check the keys, signals, ranges and formulas of a spec file without simulating.
-
-    With --template, only the requirement that the template makes of TARGET, a spec or FMU.
-    """
-    from falsifier.search.vacuity import hidden_margin
-
-    if template is None:
-        problems = load_problems(target, profile=profile)
-    else:
-        problems = [load_source(with_template(ProblemSource(target=target, profile=profile), template))]
-    for problem in problems:
-        say(_problem_line(problem))
-        if hidden := hidden_margin(problem):
-            say(f"note: {problem.name}: {'; '.join(hidden)}")
-    for note in dict.fromkeys(note for problem in problems for note in problem.notes):
-        say(f"note: {note}")
-    for held in dict.fromkeys(held_text(problem.held_inputs) for problem in problems):
-        if held:
-            say(f"not searched: {held}")
-
-
-@click.command()
-@click.option(
-    "--of",
-    "what",
-    type=click.Choice(["spec", "manifest", "journal", "campaign"]),
-    default="spec",
-    show_default=True,
-    help="What to describe: spec files, or a file in run directories (journal: one line of it).",
-)
-def schema(*, what: str) -> None:
-    """Print the JSON Schema of spec files, for editors, or of the records in run directories."""
-    say(json.dumps(_schema(what), indent=2))
-
-
-def _schema(what: str) -> dict[str, Any]:
-    from falsifier.campaigns.directory import CampaignRecord
-    from falsifier.problem.spec import Spec
-    from falsifier.record.manifest import Manifest
-    from falsifier.record.records import RECORDS
-
-    models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
-    return RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
 
 
 def _print_convergence(
@@ -354,7 +283,7 @@ def _spec_of(given: Path) -> Path | None:
     return None
 
 
-def _one_fmu(given: Path) -> Path:
+def one_fmu(given: Path) -> Path:
     """Return the FMU that is given, by path or name.
 
     Raises:
@@ -381,10 +310,3 @@ def _bundled_fmu(name: Path) -> Path:
 def _relative(fmu: Path, spec: Path) -> Path:
     """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
     return Path(relpath(fmu.resolve(), spec.resolve().parent))
-
-
-def _problem_line(problem: Problem) -> str:
-    space = problem.space
-    searched = [f"{r.name} [{r.low:g}, {r.high:g}] {parameterization_text(r)}" for r in space.inputs]
-    searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
-    return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"

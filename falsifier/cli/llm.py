@@ -1,4 +1,4 @@
-"""``falsifier prompt`` and ``falsifier llm``: what a language model is sent, and whether it replies."""
+"""``falsifier llm``: what a language model is sent, and whether it replies."""
 
 import json
 from collections.abc import Sequence
@@ -140,7 +140,7 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
 
     if not holds_run(directory):
         raise JournalError(
-            f"{directory}: not a run directory, which --at requires: falsifier prompt RUN --at {sample}"
+            f"{directory}: not a run directory, which --at requires: falsifier llm prompt RUN --at {sample}"
         )
     records = read_journal(directory)
     exchange = exchange_before(records, sample - 1)
@@ -193,12 +193,7 @@ def _size(messages: Sequence["Message"]) -> str:
     )
 
 
-@click.group()
-def llm() -> None:
-    """Commands on language models."""
-
-
-@llm.command()
+@click.command()
 @click.argument("name")
 @api_base_option
 @effort_option

@@ -115,11 +115,7 @@ def problem_options(command: Function) -> Function:
             help="Free parameterization of every input, with pieces at least this long; default: the spec's "
             "limits, or some derived from the formula's windows.",
         ),
-        click.option(
-            "--interface",
-            type=click.Choice(["co-simulation", "model-exchange"]),
-            help="FMI interface to simulate; default: the spec's, or co-simulation if the FMU offers it.",
-        ),
+        interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
         click.option(
             "--input",
             "inputs",
@@ -296,13 +292,8 @@ def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
     return click.option("-o", "--out", type=click.Path(path_type=Path), metavar=metavar, help=text)
 
 
-def store_option(command: Function) -> Function:
-    return click.option(
-        "--store",
-        type=click.Path(path_type=Path),
-        metavar="DIR",
-        help="Also store the counterexample in this folder of counterexamples.",
-    )(command)
+def interface_option(text: str) -> Decorator:
+    return click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]), help=text)
 
 
 def json_option(command: Function) -> Function:

@@ -1,19 +1,17 @@
-"""``falsifier report`` and ``falsifier validate``."""
+"""``falsifier report`` and ``falsifier coverage``: what a run or campaign has recorded."""
 
 import json
 from pathlib import Path
 
 import click
 
-from falsifier.campaigns.archcomp import Revalidated, export, read_rows
-from falsifier.campaigns.archcomp import validate as check_rows
-from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
-from falsifier.cli.files import check_out
-from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
-from falsifier.cli.output import conclude, say
-from falsifier.core.literals import one_line
-from falsifier.core.words import counted
-from falsifier.stl.margins import signed
+from falsifier.analyses.coverage import coverage as coverage_of_run
+from falsifier.campaigns.archcomp import export
+from falsifier.cli.files import check_out, draw
+from falsifier.cli.options import directory_argument, json_option, out_option
+from falsifier.cli.output import say
+from falsifier.record import manifest
+from falsifier.views.coverage_text import coverage_json, coverage_text
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
 
@@ -50,37 +48,23 @@ def report(
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
-@budget_option(PROTOCOL_SIMULATIONS, note=" per run; claims that used more are rejected")
+@directory_argument
+@out_option("Picture to write; default: coverage.png in DIRECTORY.")
 @json_option
-def validate(*, file: Path, budget: int, as_json: bool) -> None:
-    """Re-simulate the counterexamples in FILE and report which of them are reproduced.
+def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
+    """Show which part of the search space the run in DIRECTORY has tried, and what the system did.
 
-    FILE is a CSV file in the validation format of the ARCH-COMP falsification category, written by any tool.
-
-    Exit codes: 0 all accepted, 1 some rejected, 2 wrong usage or file.
+    Ranges of inputs and parameters, how fast inputs changed, combinations of two at the same time, values
+    that outputs reached, modes and changes of mode. Nothing is simulated.
     """
-    findings = check_rows(read_rows(file), budget=budget)
+    from falsifier.views.plotting import plot_coverage
+
+    found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
+    picture = draw(lambda: plot_coverage(found, name), out or directory / "coverage.png")
     if as_json:
-        text = json.dumps([_finding_json(f) for f in findings], indent=2)
-    else:
-        accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
-        text = "\n".join([*map(_finding_line, findings), accepted])
-    conclude(text, 0 if all(f.holds for f in findings) else 1)
-
-
-def _finding_line(f: Revalidated) -> str:
-    rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
-    robustness = "" if f.robustness is None else f", robustness {signed(f.robustness)}"
-    return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
-
-
-def _finding_json(finding: Revalidated) -> dict[str, object]:
-    return {
-        "row": finding.row.number,
-        "requirement": finding.row.requirement,
-        "holds": finding.holds,
-        "robustness": finding.robustness,
-        "claimed": finding.row.robustness,
-        "reason": finding.reason,
-    }
+        content = {"requirements": name, **coverage_json(found), "picture": picture and str(picture)}
+        say(json.dumps(content, indent=2))
+        return
+    say(coverage_text(found, name))
+    if picture is not None:
+        say(f"picture: {picture}")

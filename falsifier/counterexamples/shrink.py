@@ -21,13 +21,14 @@ from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import half_step
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import signed
 
 Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
 Progress = Callable[[Evaluation, int], None]
 
-# Share of the original's margin that a simpler counterexample keeps, unless another margin is demanded.
+# Share of a violation's margin that a simpler one keeps, unless something else is demanded.
 KEPT_SHARE = 0.5
-# Share of its robustness by which a simpler near miss may be farther from a violation, unless stated.
+# Share of a near miss's robustness by which a simpler one may be farther from a violation.
 GIVEN_SHARE = 0.1
 
 
@@ -40,15 +41,14 @@ class Shrunk:
         evaluation: the simplest one found; the original if nothing simpler will do.
         simulations: number of simulations used.
         minimal: whether no pass can make it simpler; False if the budget ended first.
-        least_margin: the margin that every simpler one had to keep; negative for a near miss: minus the
-            largest robustness that was allowed.
+        at_most: the largest robustness that was allowed to a simpler one.
     """
 
     original: Evaluation
     evaluation: Evaluation
     simulations: int
     minimal: bool
-    least_margin: float
+    at_most: float
 
 
 def shrink(
@@ -56,71 +56,46 @@ def shrink(
     evaluation: Evaluation,
     *,
     budget: int = 500,
-    margin: float | None = None,
+    at_most: float | None = None,
     progress: Progress = lambda evaluation, simulations: None,
 ) -> Shrunk:
     """Make a counterexample as simple as possible such that it still violates.
 
-    If the original violates at half the communication step too, so does the result.
+    If it violates at half the communication step too, so does the result. A near miss, which does not
+    violate, becomes as simple as possible such that it still comes about as near; a simpler one that violates
+    is preferred from then on: confirm it.
 
     Args:
-        problem: the problem whose requirement is violated.
-        evaluation: the counterexample.
+        problem: the problem with the requirement.
+        evaluation: the counterexample, or the simulation that came nearest to a violation.
         budget: maximum number of simulations.
-        margin: the robustness must stay at or below minus this value; default: half of the original's margin.
-        progress: called with each simpler counterexample and the number of simulations so far.
+        at_most: robustness that the result may have at most; 0 for a counterexample: any violation will do.
+            Default: half of a counterexample's, a tenth more than a near miss's.
+        progress: called with each simpler one and the number of simulations so far.
 
     Raises:
-        SpecError: if the evaluation does not violate by that margin, or a number is out of range.
+        SpecError: if the simulation fails or has a larger robustness, or a number is out of range.
     """
     instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
-    if margin is not None and finite("margin", margin) < 0:
-        raise SpecError(f"margin: expected a number that is not negative, got {margin!r}")
-    budget = whole("budget", budget, least=1)
-    hunt = _Hunt(problem, budget, margin or 0.0, demands_violation=True)
+    if at_most is not None:
+        finite("at_most", at_most)
+    hunt = _Hunt(problem, whole("budget", budget, least=1))
     start = hunt.kept(problem.space.admit(evaluation.candidate))
     if start is None or start.robustness is None:
-        violated = f"violated by {margin:g} or more" if margin else "violated"
-        raise SpecError(f"nothing to shrink: {problem.name} is not {violated}")
-    if margin is None:
-        hunt.margin = KEPT_SHARE * -start.robustness
-    with suppress(_BudgetUsedUpError):
-        hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
-    return _descend(hunt, evaluation, start, progress)
-
-
-def shrink_miss(
-    problem: Problem,
-    evaluation: Evaluation,
-    *,
-    budget: int = 500,
-    within: float | None = None,
-    progress: Progress = lambda evaluation, simulations: None,
-) -> Shrunk:
-    """Make an input that nearly violates as simple as possible such that it still comes about as near.
-
-    A simpler one that violates is preferred from then on; confirm it.
-
-    Args:
-        problem: the problem whose requirement is not violated.
-        evaluation: the simulation that came nearest to a violation.
-        budget: maximum number of simulations.
-        within: the robustness may grow by this value; default: a tenth of the original's.
-        progress: called with each simpler input and the number of simulations so far.
-
-    Raises:
-        SpecError: if the simulation fails or violates, or ``within`` is negative.
-    """
-    budget = whole("budget", budget, least=1)
-    if within is not None and finite("within", within) < 0:
-        raise SpecError(f"within: expected a number that is not negative, got {within!r}")
-    hunt = _Hunt(problem, budget, -inf)
-    start = hunt.kept(problem.space.admit(evaluation.candidate))
-    if start is None or start.robustness is None or start.violated:
-        how = "the simulation fails" if start is None else "it violates the requirement: use shrink"
-        raise SpecError(f"{problem.name}: no near miss to shrink: {how}")
-    allowed = GIVEN_SHARE * start.robustness if within is None else within
-    hunt.margin = -(start.robustness + allowed)
+        raise SpecError(f"nothing to shrink: the simulation of {problem.name} fails")
+    hunt.demands_violation = start.violated
+    if start.violated and at_most is not None and at_most > 0:
+        raise SpecError(f"at_most: {problem.name} is violated: expected a number up to 0, got {at_most!r}")
+    share = KEPT_SHARE if start.violated else 1 + GIVEN_SHARE
+    hunt.at_most = share * start.robustness if at_most is None else at_most
+    if hunt.kept(start.candidate) is None:
+        raise SpecError(
+            f"nothing to shrink: the robustness of {problem.name} is {signed(start.robustness)}, more than "
+            f"{hunt.at_most:g}"
+        )
+    if start.violated:
+        with suppress(_BudgetUsedUpError):
+            hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
     return _descend(hunt, evaluation, start, progress)
 
 
@@ -135,11 +110,11 @@ def _descend(hunt: "_Hunt", original: Evaluation, start: Evaluation, progress: P
                     best, minimal = simpler, False
                     progress(best, hunt.simulations)
                     if best.violated and not hunt.demands_violation:
-                        hunt.demands_violation, hunt.margin = True, 0.0
+                        hunt.demands_violation, hunt.at_most = True, 0.0
     except _BudgetUsedUpError:
         minimal = False
     unchanged = best.candidate.key == start.candidate.key
-    return Shrunk(original, original if unchanged else best, hunt.simulations, minimal, hunt.margin)
+    return Shrunk(original, original if unchanged else best, hunt.simulations, minimal, hunt.at_most)
 
 
 class _BudgetUsedUpError(Exception):
@@ -152,7 +127,7 @@ class _Hunt:
 
     problem: Problem
     budget: int
-    margin: float
+    at_most: float = inf
     demands_violation: bool = False
     demands_half_step: bool = False
     simulations: int = 0
@@ -172,11 +147,11 @@ class _Hunt:
         return None
 
     def kept(self, candidate: Candidate) -> Evaluation | None:
-        """Simulate a candidate; return its evaluation if it keeps the margin and all that is demanded."""
+        """Simulate a candidate; return its evaluation if it has all that is demanded."""
         if candidate.key not in self._known:
             self._known[candidate.key] = self._simulate(self.problem, candidate)
         found = self._known[candidate.key]
-        if found.robustness is None or found.robustness > -self.margin:
+        if found.robustness is None or found.robustness > self.at_most:
             return None
         if self.demands_violation and not found.violated:
             return None

@@ -200,8 +200,8 @@ def counterexample_file(path: Path) -> Path:
     if not found:
         raise SpecError(
             "contains no confirmed counterexample; expected a counterexample file or the directory of a run "
-            "that found one (of a campaign: a directory in its runs/). falsifier explain, shrink and "
-            "robustness-map also take a run that found none",
+            "that found one (of a campaign: a directory in its runs/). falsifier explain also "
+            "takes a run that found none",
             file=str(path),
         )
     return found[0]
@@ -217,7 +217,7 @@ def file_of(requirement: str = "") -> str:
 
 
 def shrunk_file(counterexample: Path) -> Path:
-    """Where ``falsifier shrink`` writes what it makes of a counterexample.
+    """Where ``falsifier explain --shrink`` writes what it makes of a counterexample.
 
     >>> shrunk_file(Path("run/counterexample-AT1.json")).name
     'shrunk-AT1.json'

@@ -61,7 +61,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         raise SpecError(
             f"{target} is a folder; give a spec file, an FMU or a bundled name. If it holds a run: "
             f"falsifier resume {shlex.quote(target)} continues it, "
-            f"falsifier prompt {shlex.quote(target)} --at N prints what was asked before sample N"
+            f"falsifier llm prompt {shlex.quote(target)} --at N prints what was asked before sample N"
         )
     raise SpecError(
         f"no spec file or bundled requirement {target!r}; give a file like my.toml:REQ, or a bundled name; "

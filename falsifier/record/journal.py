@@ -242,7 +242,7 @@ def _check_is_file(path: Path) -> None:
     if path.is_dir():
         raise JournalError(
             f"{path} is a folder, not a journal; to set it aside: "
-            f"falsifier repair {shlex.quote(str(path.parent))}"
+            f"falsifier tools repair {shlex.quote(str(path.parent))}"
         )
 
 
@@ -353,7 +353,7 @@ class JournalReader:
         except ValueError as error:
             raise JournalError(
                 f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
-                f"falsifier repair {shlex.quote(str(self.path.parent))}"
+                f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
             ) from None
 
 

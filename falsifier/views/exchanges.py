@@ -56,7 +56,7 @@ def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
 def _left_out(directory: Path, missing: Sequence[Iteration], what: str) -> Html:
     if not missing:
         return Html("")
-    command = f"falsifier prompt {shlex.quote(str(directory))} --at N"
+    command = f"falsifier llm prompt {shlex.quote(str(directory))} --at N"
     return el(
         "p",
         f"The first {counted(len(missing), what)} are not shown; the question before sample N: ",

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from falsifier.analyses.lint import lint, static_findings, unmoved_findings
-from falsifier.cli.inspect import check
+from falsifier.cli.requirements import check
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource

@@ -72,7 +72,7 @@ def test_help_needs_no_package_but_clicks() -> None:
 def test_help_names_the_commands(tmp_path: Path) -> None:
     done = falsifier("--help", cwd=tmp_path)
     assert done.code == 0
-    for name in ("run", "info", "check", "prompt", "resume"):
+    for name in ("run", "info", "check", "llm", "resume"):
         assert f"  {name}" in done.out
 
 

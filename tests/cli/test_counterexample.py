@@ -57,16 +57,18 @@ def test_what_an_fmu_may_do_is_kept_and_said(tmp_path: Path) -> None:
 
 
 def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
-    done = run(folder, "shrink", "run", "--store", "kept", "--json")
+    done = run(folder, "explain", "run", "--shrink", "--json")
     assert done.code == 0, done.err
     signals = done.json["signals"]
     assert (signals["throttle"]["values"], signals["brake"]["values"]) == ([100.0], [0.0])
     assert done.json["minimal"]
     assert done.json["outcome"] == "confirmed"
-    assert done.json["least_margin"] == pytest.approx(0.2133 / 2, abs=1e-3)
-    assert [str(Path(f).parent) for f in done.json["files"]] == ["run", "run", "kept/AT.AT1"]
+    assert done.json["at_most"] == pytest.approx(-0.2133 / 2, abs=1e-3)
+    assert [str(Path(f).parent) for f in done.json["files"]] == ["run", "run"]
+    kept = run(folder, "export", "run/shrunk.json", "--store", "kept")
+    assert kept.code == 0 and kept.out.startswith("kept/AT.AT1/") and kept.out.count("\n") == 1
     assert (folder / "run" / "counterexample.json").exists()
-    assert run(folder, "replay", done.json["files"][2]).code == 1
+    assert run(folder, "replay", kept.out.strip()).code == 1
 
 
 def test_explain_names_what_it_takes(folder: Path) -> None:
@@ -105,7 +107,7 @@ def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
 
 
 def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> None:
-    done = run(folder, "robustness-map", "run", "--samples", "16", "--grid", "3", "--json")
+    done = run(folder, "explain", "run", "--map", "--budget", "25", "--json")
     assert done.code == 0, done.err
     shares = [p["share"] for p in done.json["persistence"]]
     assert shares == sorted(shares, reverse=True)
@@ -128,7 +130,7 @@ def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     done = run(tmp_path, "replay", "run/counterexample.json")
     assert done.code == 0, done.err
     assert done.out.startswith("AT1: no longer violated, robustness +")
-    refused = run(tmp_path, "shrink", "run")
+    refused = run(tmp_path, "explain", "run", "--shrink")
     assert (refused.code, "no longer violates" in refused.err) == (2, True)
 
 
@@ -136,7 +138,7 @@ def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (["replay", "gone.json"], "no such file"),
-        (["shrink", "."], "contains no confirmed counterexample"),
+        (["export", "."], "contains no confirmed counterexample"),
         (["explain", "broken.json"], "not a counterexample file"),
     ],
 )
@@ -188,9 +190,12 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
     own = folder / "keep.fmu"
     own.write_bytes(b"PK mine")
     for arguments, why in (
-        (["shrink", "run", "--out", "keep.fmu"], "exists and is not such a file"),
-        (["shrink", "run", "--out", "run/counterexample.json"], "is the original, which is kept"),
-        (["shrink", "run", "--out", os.devnull], "is not a file that can be replaced"),
+        (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is not such a file"),
+        (
+            ["explain", "run", "--shrink", "--out", "run/counterexample.json"],
+            "is the original, which is kept",
+        ),
+        (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
     ):
         done = run(folder, *arguments)

@@ -74,18 +74,18 @@ def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path
     assert given.code == 0, given.err
     path = tmp_path / "car.toml"
     path.write_text(path.read_text().replace("LIMIT", "500"))
-    assert falsifier("check", "car.toml", cwd=tmp_path).code == 0
+    assert "R1: ok, " in falsifier("check", "car.toml", cwd=tmp_path).out
     assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
 
 
 def test_check_names_all_requirements(tmp_path: Path) -> None:
     done = falsifier("check", "AT", cwd=tmp_path)
-    assert done.code == 0
+    assert done.code == 1, "AT6abc repeats others"
     assert done.out.count(": ok") == 10
 
 
 def test_schema_describes_spec_files(tmp_path: Path) -> None:
-    schema = falsifier("schema", cwd=tmp_path).json
+    schema = falsifier("tools", "schema", cwd=tmp_path).json
     systems = {"components", "connections", "coupling"}
     assert set(schema["properties"]) == {
         "model", "inputs", "parameters", "requirements", "profiles", "context", *systems
@@ -108,16 +108,16 @@ def test_info_says_how_far_half_the_step_moves_the_outputs(tmp_path: Path) -> No
 
 def test_build_writes_an_fmu_for_this_platform(tmp_path: Path) -> None:
     shutil.copy(fixture("Lag_2sources"), tmp_path / "lag.fmu")
-    done = falsifier("build", "lag.fmu", "-o", "built.fmu", cwd=tmp_path)
+    done = falsifier("tools", "build", "lag.fmu", "-o", "built.fmu", cwd=tmp_path)
     assert done.code == 0, done.err
     assert this_platform() in read_info(tmp_path / "built.fmu").platforms
-    missing = falsifier("build", "no.fmu", "-o", "x.fmu", cwd=tmp_path)
+    missing = falsifier("tools", "build", "no.fmu", "-o", "x.fmu", cwd=tmp_path)
     assert missing.code == 2 and not (tmp_path / "x.fmu").exists()
 
 
 def test_schemas_of_records_are_printed_too(tmp_path: Path) -> None:
     for what in ("manifest", "journal", "campaign"):
-        assert falsifier("schema", "--of", what, cwd=tmp_path).json
+        assert falsifier("tools", "schema", what, cwd=tmp_path).json
 
 
 def test_an_fmu_without_outputs_can_be_checked_and_searched(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from tests.llm.server import Step, serving
 
 
 def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
-    printed = falsifier("prompt", "AT1", "--variant", "MP4", "--json", cwd=tmp_path)
+    printed = falsifier("llm", "prompt", "AT1", "--variant", "MP4", "--json", cwd=tmp_path)
     with serving(reply(FULL)) as server:
         falsifier(*at1(server.url), cwd=tmp_path, env=ENV)
         sent = server.received[0].body["messages"]
@@ -20,24 +20,25 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
         falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         sent = server.received[1].body["messages"]
     printed = falsifier(
-        *("prompt", "AT1", "--variant", "MP4", "--after", "run", "--samples", "1", "--json"), cwd=tmp_path
+        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--samples", "1", "--json"),
+        cwd=tmp_path,
     )
     assert json.loads(printed.out) == sent
-    rich = falsifier("prompt", "AT1", "--after", "run", cwd=tmp_path).out
+    rich = falsifier("llm", "prompt", "AT1", "--after", "run", cwd=tmp_path).out
     assert "2 of 100 simulations spent, 98 left. Propose the next sample." in rich
-    at = falsifier("prompt", "run", "--at", "2", cwd=tmp_path)
+    at = falsifier("llm", "prompt", "run", "--at", "2", cwd=tmp_path)
     assert sent[1]["content"] in at.out and "--- reply of openai/" in at.out
     assert at.out.endswith("--- rationale of sample 2 ---\nbecause\n")
-    no_run = falsifier("prompt", "AT1", "--at", "1", cwd=tmp_path)
+    no_run = falsifier("llm", "prompt", "AT1", "--at", "1", cwd=tmp_path)
     assert (no_run.code, "AT1: not a run directory" in no_run.err) == (2, True)
-    none = falsifier("prompt", "run", "--at", "3", cwd=tmp_path)
+    none = falsifier("llm", "prompt", "run", "--at", "3", cwd=tmp_path)
     assert (none.code, "the run has no sample 3" in none.err) == (2, True)
-    other = falsifier("prompt", "CC1", "--after", "run", cwd=tmp_path)
+    other = falsifier("llm", "prompt", "CC1", "--after", "run", cwd=tmp_path)
     assert (other.code, "run is a run of AT1 on the model" in other.err) == (2, True)
 
 
 def test_a_printed_prompt_says_how_much_of_it_stays_the_same(tmp_path: Path) -> None:
-    text = falsifier("prompt", "F16", cwd=tmp_path).out
+    text = falsifier("llm", "prompt", "F16", cwd=tmp_path).out
     assert (
         "100 simulations may be spent" in text
         and "altitude above the ground; at t = 0: 2338" in text.replace("Altitude", "altitude")
@@ -47,11 +48,11 @@ def test_a_printed_prompt_says_how_much_of_it_stays_the_same(tmp_path: Path) -> 
 
 
 def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
-    first = falsifier("prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
+    first = falsifier("llm", "prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
     assert "Propose the first sample" in first.out
     assert "--- tool" not in first.out
     falsifier("run", "AT1", "--engine", "corners", "--out", "run", cwd=tmp_path)
-    later = ("prompt", "AT1", "--engine", "hybrid", "--after", "run", "--anonymous")
+    later = ("llm", "prompt", "AT1", "--engine", "hybrid", "--after", "run", "--anonymous")
     text = falsifier(*later, cwd=tmp_path).out
     assert "Propose the next 5 different samples" in text
     assert "--- tool predict, offered while" in text and "At most 3 calls" in text
@@ -64,7 +65,7 @@ def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path
 
 
 def test_a_prompt_of_fewer_samples_needs_a_run(tmp_path: Path) -> None:
-    done = falsifier("prompt", "AT1", "--samples", "1", cwd=tmp_path)
+    done = falsifier("llm", "prompt", "AT1", "--samples", "1", cwd=tmp_path)
     assert (done.code, "--after" in done.err) == (2, True)
 
 
@@ -78,7 +79,7 @@ def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
 
 
 def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
-    asking = ("prompt", "AT1", "--variant", "MP2", "--reply", "points", "--json")
+    asking = ("llm", "prompt", "AT1", "--variant", "MP2", "--reply", "points", "--json")
     printed = json.loads(falsifier(*asking, cwd=tmp_path).out)
     with serving(Step("All out. <point>100, 100, 100, 100, 100, 100, 100, 0, 0, 0</point>")) as server:
         done = falsifier(
@@ -95,14 +96,14 @@ def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
 
 def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> None:
     (tmp_path / "notes.md").write_text("The speed must not exceed 120 mph.")
-    text = falsifier("prompt", "AT1", "--context", "notes.md", cwd=tmp_path).out
+    text = falsifier("llm", "prompt", "AT1", "--context", "notes.md", cwd=tmp_path).out
     assert "--- notes.md (whole) ---\nThe speed must not exceed 120 mph." in text
     (tmp_path / "notes.md").write_text("token:\n  sk-abcdefghijklmnop")
-    done = falsifier("prompt", "AT1", "--context", "notes.md", cwd=tmp_path)
+    done = falsifier("llm", "prompt", "AT1", "--context", "notes.md", cwd=tmp_path)
     assert (done.code, done.out) == (2, "")
     assert "context notes.md: line 2 looks like a key" in done.err
     assert "sk-abc" not in done.err
-    assert "notes.md" not in falsifier("prompt", "AT1", cwd=tmp_path).out
+    assert "notes.md" not in falsifier("llm", "prompt", "AT1", cwd=tmp_path).out
     useless = falsifier("run", "AT1", "--engine", "cma", "--context", "notes.md", cwd=tmp_path)
     assert (useless.code, "--context: applies to language models and" in useless.err) == (2, True)
 

@@ -16,9 +16,9 @@ def test_one_damaged_line_costs_one_simulation(tmp_path: Path) -> None:
     lines = path.read_bytes().splitlines(keepends=True)
     lines[3] = lines[3].replace(b'"status":"ok"', b'"status":"OK"')
     path.write_bytes(b"".join(lines))
-    with pytest.raises(JournalError, match=r"line 4 is damaged: its checksum .* falsifier repair"):
+    with pytest.raises(JournalError, match=r"line 4 is damaged: its checksum .* falsifier tools repair"):
         read_journal(tmp_path)
-    done = CliRunner().invoke(cli, ["repair", str(tmp_path)])
+    done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "line 4: its checksum does not match" in done.output
     assert (tmp_path / "journal.jsonl.damaged-1").read_bytes() == b"".join(lines)
@@ -27,4 +27,4 @@ def test_one_damaged_line_costs_one_simulation(tmp_path: Path) -> None:
     before = len(read_journal(tmp_path))
     assert Numeric().resume(tmp_path).falsified
     assert [r.kind for r in read_journal(tmp_path)[before:]] == ["evaluated", "ended"]
-    assert CliRunner().invoke(cli, ["repair", str(tmp_path)]).output.endswith("nothing is damaged\n")
+    assert CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)]).output.endswith("nothing is damaged\n")

@@ -26,12 +26,12 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
         'AT,AT2,2,"[0 100 0]",[],1,2\n'
         'AT,AT2,2,"[0 0 0]",[],1,2\n'
     )
-    result = command("validate", "v.csv")
+    result = command("tools", "validate", "v.csv")
     assert result.exit_code == 1
     assert "row 1, AT2: reproduced, robustness -" in result.stdout
     assert "row 2, AT2: not reproduced, robustness +" in result.stdout
     assert "1 of 2 counterexamples accepted" in result.stdout
-    (found, other) = json.loads(command("validate", "v.csv", "--json").stdout)
+    (found, other) = json.loads(command("tools", "validate", "v.csv", "--json").stdout)
     assert (found["holds"], other["holds"]) == (True, False)
 
 

@@ -34,7 +34,7 @@ def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
 
 def test_no_binary_for_this_platform_says_what_there_is_and_what_to_do() -> None:
     with pytest.raises(
-        ModelError, match=r"no binary for .*, nor for any other; .*compile them with `falsifier build"
+        ModelError, match=r"no binary for .*, nor for any other; .*compile them with `falsifier tools build"
     ):
         run(isolated("Lag_2sources"), ("y",))
 

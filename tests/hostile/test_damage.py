@@ -179,7 +179,7 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         path.write_bytes(flip(path.read_bytes()[:-3], random) + path.read_bytes()[-3:])
         with pytest.raises(JournalError):
             load_runs(tmp_path / "c")
-        done = CliRunner().invoke(cli, ["repair", str(tmp_path / "c")])
+        done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
         assert done.exit_code == 0, done.output
         resume_campaign(tmp_path / "c")
         assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")

@@ -13,7 +13,7 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "run-directory.md"
 
 
 def schema(what: str) -> dict[str, object]:
-    loaded: dict[str, object] = json.loads(CliRunner().invoke(cli, ["schema", "--of", what]).stdout)
+    loaded: dict[str, object] = json.loads(CliRunner().invoke(cli, ["tools", "schema", what]).stdout)
     jsonschema.Draft202012Validator.check_schema(loaded)
     return loaded
 

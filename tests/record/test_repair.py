@@ -41,7 +41,7 @@ def test_a_journal_that_is_a_folder_is_set_aside(tmp_path: Path) -> None:
     journal = tmp_path / "journal.jsonl"
     journal.unlink()
     journal.mkdir()
-    with pytest.raises(JournalError, match="is a folder, not a journal; to set it aside: falsifier repair"):
+    with pytest.raises(JournalError, match="not a journal; to set it aside: falsifier tools repair"):
         resume(tmp_path, problems=[easy()])
     (finding,) = repair(tmp_path)
     assert "kept as journal.jsonl.damaged-1" in finding

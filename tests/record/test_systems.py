@@ -81,7 +81,7 @@ def test_info_and_check_show_the_system(spec: Path, tmp_path: Path) -> None:
     assert shown.code == 0
     assert "Connections: pi.y -> plant.u, plant.y -> pi.measured" in shown.out
     assert falsifier("check", "loop.toml", cwd=tmp_path).out.startswith("R: ok, G[0,10] (plant.y <= 1.2)")
-    refused = falsifier("build", "loop.toml", cwd=tmp_path)
+    refused = falsifier("tools", "build", "loop.toml", cwd=tmp_path)
     assert (refused.code, refused.err) == (
         2,
         "falsifier: loop.toml is a system of FMUs; give one of them: plant, pi\n",

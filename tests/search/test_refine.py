@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.nearest_miss import nearest_miss
+from falsifier.counterexamples.case import nearest_miss
 from falsifier.engines import make_engine
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_problem

@@ -77,11 +77,13 @@ def missing_binary_text(
     )
     if needs_wine:
         text += "; that for Windows runs through Wine"
-        build = f"; it contains C sources: compile them with `falsifier build {name}` to run without Wine"
+        build = (
+            f"; it contains C sources: compile them with `falsifier tools build {name}` to run without Wine"
+        )
         return text + (build if has_sources else "")
     text += "".join(f"; {reason}" for reason in _reasons(here, platforms))
     if has_sources:
-        return f"{text}; it contains C sources: compile them with `falsifier build {name}`"
+        return f"{text}; it contains C sources: compile them with `falsifier tools build {name}`"
     wine = " or for 64-bit Windows" if "x86-windows" in platforms and can_run_windows() else ""
     return f"{text}; export it again for this platform{wine}"
 

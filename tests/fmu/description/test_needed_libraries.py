@@ -120,9 +120,7 @@ def test_binaries_for_other_systems_are_named_with_what_helps(tmp_path: Path) ->
     )
     assert "only for x86_64-darwin; binaries for macOS run only there" in without_linux(tmp_path, "darwin64")
     said = without_linux(tmp_path, "win64", sources=True)
-    assert (
-        "only for x86_64-windows; it contains C sources: compile them with `falsifier build my.fmu`" in said
-    )
+    assert "it contains C sources: compile them with `falsifier tools build my.fmu`" in said
 
 
 def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path: Path) -> None:
@@ -137,7 +135,7 @@ def test_a_windows_binary_that_runs_through_wine_is_not_called_missing(tmp_path:
         archive.writestr("sources/all.c", b"")
     assert binary_remarks(packed) == (
         "no binary for x86_64-linux, only for x86_64-windows; that for Windows runs through Wine; it "
-        "contains C sources: compile them with `falsifier build my.fmu` to run without Wine",
+        "contains C sources: compile them with `falsifier tools build my.fmu` to run without Wine",
     )
 
 

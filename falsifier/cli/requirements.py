@@ -1,4 +1,4 @@
-"""``falsifier lint`` and ``falsifier formalize``: what requirements say, before anything is searched."""
+"""``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import json
 import shlex
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.analyses.lint import SIMULATIONS, LintFinding
-from falsifier.analyses.lint import lint as find
+from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli.llm_options import (
     connection_options,
     connection_settings,
@@ -17,6 +16,7 @@ from falsifier.cli.llm_options import (
     llm_option,
 )
 from falsifier.cli.options import (
+    budget_option,
     json_option,
     out_option,
     profile_option,
@@ -26,10 +26,13 @@ from falsifier.cli.options import (
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted
+from falsifier.core.words import counted, parameterization_text
 from falsifier.errors import SpecError
+from falsifier.problem.loading import load_source, sources_of
+from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.writing import Subject, subject_of, with_requirement
+from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
     from falsifier.analyses.formalize import Formalized
@@ -38,29 +41,43 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("target")
 @profile_option
-@click.option(
-    "--simulations",
-    type=click.IntRange(min=0),
-    default=SIMULATIONS,
-    show_default=True,
-    help="Simulations that measure whether inputs move a requirement; 0: only what the FMU declares.",
-)
 @template_option
+@budget_option(0, note=" that measure whether inputs move a requirement; 0: what the FMU declares counts")
 @json_option
-def lint(*, target: str, profile: str | None, simulations: int, template: str | None, as_json: bool) -> None:
-    """Find requirements that say nothing: nothing moves them, or they cannot fail or hold.
+def check(*, target: str, profile: str | None, template: str | None, budget: int, as_json: bool) -> None:
+    """Check a spec file, and find requirements that say nothing.
 
-    Also windows and parts that do not matter, units that do not fit, and requirements that repeat others. The
-    exit code is 1 if something was found. With --template, only the requirement that the template makes.
+    First keys, signals, ranges and formulas. Then what cannot fail or hold, what nothing moves, windows and
+    parts that do not matter, units that do not fit, and requirements that repeat others. With --template,
+    only the requirement that the template makes of TARGET, a spec or FMU.
+
+    Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
     source = with_template(ProblemSource(target=target, profile=profile), template)
-    findings = find(source, simulations=simulations)
-    code = 1 if findings else 0
+    findings = lint(source, simulations=budget)
+    invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
+    code = 2 if invalid else 1 if findings else 0
     if as_json:
         conclude(json.dumps([finding.as_json() for finding in findings], indent=2), code)
-    lines = [line for finding in findings for line in _lines(finding)]
+    sources = [source] if source.stl is not None else sources_of(source)
+    problems = [load_source(each) for each in sources if each.name not in invalid]
+    for finding in findings:
+        if finding.requirement in invalid:
+            warn(f"falsifier: {finding.text}")
+    lines = list(map(_problem_line, problems))
+    lines += dict.fromkeys(f"note: {note}" for problem in problems for note in problem.notes)
+    held = dict.fromkeys(held_text(problem.held_inputs) for problem in problems)
+    lines += [f"not searched: {text}" for text in held if text]
+    lines += [line for finding in findings if finding.kind != "invalid" for line in _lines(finding)]
     lines.append(f"{counted(len(findings), 'finding')}" if findings else "nothing found")
     conclude("\n".join(lines), code)
+
+
+def _problem_line(problem: Problem) -> str:
+    space = problem.space
+    searched = [f"{r.name} [{r.low:g}, {r.high:g}] {parameterization_text(r)}" for r in space.inputs]
+    searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
+    return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
 
 
 def _lines(finding: LintFinding) -> list[str]:

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from falsifier import falsify
-from falsifier.counterexamples.nearest_miss import NearestMiss, asked_about, nearest_miss
+from falsifier.counterexamples.case import case_of, nearest_miss
 from falsifier.counterexamples.store import save
 from falsifier.errors import JournalError, SpecError
 from falsifier.testing import lag_problem
@@ -23,31 +23,29 @@ def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path)
 
 def test_a_run_with_a_counterexample_is_asked_about_that(tmp_path: Path) -> None:
     falsify(easy(), "corners", budget=5, directory=tmp_path)
-    found = asked_about(tmp_path)
-    assert not isinstance(found, NearestMiss)
-    assert found[1].robustness < 0
-    assert asked_about(found[0]) == found
-    simpler = save(found[1].model_copy(update={"reason": "shrunk"}), tmp_path / "shrunk.json")
-    assert asked_about(tmp_path) == found
-    again = asked_about(tmp_path, shrunk=True)
-    assert not isinstance(again, NearestMiss)
-    assert (again[0], again[1].reason) == (simpler, "shrunk")
-    assert asked_about(found[0], shrunk=True) == found, "the file that was named"
+    found = case_of(tmp_path)
+    assert found.stored is not None and found.robustness < 0 and not found.is_shrunk
+    assert case_of(found.place) == found
+    simpler = save(found.stored.model_copy(update={"reason": "shrunk"}), tmp_path / "shrunk.json")
+    assert case_of(tmp_path) == found
+    again = case_of(tmp_path, shrunk=True)
+    assert (again.place, again.is_shrunk) == (simpler, True)
+    assert case_of(found.place, shrunk=True) == found, "the file that was named"
 
 
 def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
     problems = [hard(), impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")]
     falsify(problems, "corners", budget=5, directory=tmp_path)
     # The only counterexample needs no name.
-    assert not isinstance(asked_about(tmp_path), NearestMiss)
-    found = asked_about(tmp_path, "FAR")
-    assert isinstance(found, NearestMiss)
+    assert not case_of(tmp_path).is_miss
+    found = case_of(tmp_path, "FAR")
+    assert found.is_miss
     assert found.requirement == "FAR"
     assert found.beside("a.png").name == "a-FAR.png"
     with pytest.raises(JournalError, match="this run searched HARD, NEVER, FAR, not OTHER"):
-        asked_about(tmp_path, "OTHER")
+        case_of(tmp_path, "OTHER")
     with pytest.raises(SpecError, match="this is none"):
-        asked_about(tmp_path / "counterexample-HARD.json", "FAR")
+        case_of(tmp_path / "counterexample-HARD.json", "FAR")
 
 
 def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) -> None:
@@ -55,7 +53,7 @@ def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) ->
         [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")], "corners", budget=2, directory=tmp_path
     )
     with pytest.raises(SpecError, match="searched NEVER, FAR; choose one with --requirement NAME"):
-        asked_about(tmp_path)
+        case_of(tmp_path)
 
 
 def test_a_system_that_violates_now_is_said_to_have_changed(tmp_path: Path) -> None:

@@ -1,0 +1,129 @@
+"""``falsifier tools``: building FMUs, repairing records, validating results, printing schemas."""
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from falsifier.campaigns.archcomp import Revalidated, read_rows
+from falsifier.campaigns.archcomp import validate as check_rows
+from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
+from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS
+from falsifier.cli.inspect import one_fmu
+from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
+from falsifier.cli.output import conclude, say
+from falsifier.core.literals import one_line
+from falsifier.core.words import counted
+from falsifier.counterexamples.store import load
+from falsifier.errors import JournalError, SpecError
+from falsifier.problem.spec import Spec
+from falsifier.record.journal import holds_run
+from falsifier.record.manifest import Manifest
+from falsifier.record.records import RECORDS
+from falsifier.record.repair import repair as repair_run
+from falsifier.record.repair import set_aside
+from falsifier.stl.margins import signed
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+
+@click.command()
+@directory_argument
+def repair(*, directory: Path) -> None:
+    """Repair the run or campaign in DIRECTORY after its files were damaged.
+
+    Says what is wrong, keeps a copy of every file that is changed, and drops what is damaged; falsifier
+    resume repeats it. A campaign's run that cannot be repaired is set aside, so that the campaign repeats it.
+    """
+    findings = _repair_campaign(directory) if is_campaign(directory) else _repair_run(directory)
+    for finding in findings:
+        say(finding)
+    say("repaired" if findings else f"{directory}: nothing is damaged")
+
+
+def _repair_campaign(directory: Path) -> list[str]:
+    findings: list[str] = []
+    for name in read_campaign(directory).runs:
+        place = run_directory(directory, name)
+        if not place.is_dir():
+            continue
+        try:
+            findings += _repair_run(place) if holds_run(place) or any(place.iterdir()) else []
+        except JournalError as error:
+            findings.append(f"{error}; kept as {set_aside(place).name}, the campaign repeats it")
+    return findings
+
+
+def _repair_run(directory: Path) -> list[str]:
+    findings = repair_run(directory)
+    for path in sorted(directory.glob("counterexample*.json")):
+        try:
+            load(path)
+        except SpecError as error:
+            findings.append(f"{error}; kept as {set_aside(path).name}, falsifier replay writes it again")
+    return findings
+
+
+@click.command()
+@click.argument("fmu", type=click.Path(path_type=Path))
+@out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
+def build(*, fmu: Path, out: Path | None) -> None:
+    """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
+    from falsifier.fmu.build import compile_sources
+
+    written = compile_sources(one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
+    say(f"{written} written")
+
+
+@click.command()
+@click.argument(
+    "what", type=click.Choice(["spec", "manifest", "journal", "campaign"]), default="spec", required=False
+)
+def schema(*, what: str) -> None:
+    """Print the JSON Schema of spec files, for editors, or of a file in run directories.
+
+    Of a journal, it describes one line.
+    """
+    models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
+    found = RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()
+    say(json.dumps(found, indent=2))
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
+@budget_option(PROTOCOL_SIMULATIONS, note=" per run; claims that used more are rejected")
+@json_option
+def validate(*, file: Path, budget: int, as_json: bool) -> None:
+    """Re-simulate the counterexamples in FILE and report which of them are reproduced.
+
+    FILE is a CSV file in the validation format of the ARCH-COMP falsification category, written by any tool.
+
+    Exit codes: 0 all accepted, 1 some rejected, 2 wrong usage or file.
+    """
+    findings = check_rows(read_rows(file), budget=budget)
+    if as_json:
+        text = json.dumps([_finding_json(f) for f in findings], indent=2)
+    else:
+        accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
+        text = "\n".join([*map(_finding_line, findings), accepted])
+    conclude(text, 0 if all(f.holds for f in findings) else 1)
+
+
+def _finding_line(f: Revalidated) -> str:
+    rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
+    robustness = "" if f.robustness is None else f", robustness {signed(f.robustness)}"
+    return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
+
+
+def _finding_json(finding: Revalidated) -> dict[str, object]:
+    return {
+        "row": finding.row.number,
+        "requirement": finding.row.requirement,
+        "holds": finding.holds,
+        "robustness": finding.robustness,
+        "claimed": finding.row.robustness,
+        "reason": finding.reason,
+    }

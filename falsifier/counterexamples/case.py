@@ -1,0 +1,191 @@
+"""What commands on a run or file are about: a counterexample; of a run without one, the nearest miss."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import file_name
+from falsifier.core.words import counted
+from falsifier.counterexamples.known_inputs import judged_candidates
+from falsifier.counterexamples.store import (
+    StoredCounterexample,
+    beside,
+    counterexample_file,
+    file_of,
+    keep_recorded,
+    load,
+    problem_of,
+    shrunk_file,
+)
+from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.loading import load_source
+from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
+from falsifier.record.journal import holds_run
+from falsifier.record.manifest import Manifest
+from falsifier.stl.margins import margin_words, signed
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A counterexample, or the simulation of a run with the smallest robustness that is no violation.
+
+    Attributes:
+        place: the counterexample's file; of a nearest miss, the run directory.
+        requirement: name of the requirement.
+        source: how to load the problem; None if it was made in Python.
+        candidate: what was simulated.
+        robustness: its robustness, as recorded.
+        stored: content of the counterexample's file; None for a nearest miss.
+        suffix: what names of files beside it end in, if the run searched several requirements.
+        simulations: number of simulations of the run that were judged; 0 for a counterexample.
+    """
+
+    place: Path
+    requirement: str
+    source: ProblemSource | None
+    candidate: Candidate
+    robustness: float
+    stored: StoredCounterexample | None = None
+    suffix: str = ""
+    simulations: int = 0
+
+    @property
+    def is_miss(self) -> bool:
+        """Whether it is a nearest miss, no counterexample."""
+        return self.stored is None
+
+    @property
+    def is_shrunk(self) -> bool:
+        """Whether it is what a counterexample was shrunk to."""
+        return not self.is_miss and self.place.stem.startswith("shrunk")
+
+    @property
+    def text(self) -> str:
+        """What a nearest miss is, in words, before anything is said about it."""
+        return (
+            f"{self.requirement} was not falsified in {counted(self.simulations, 'simulation')}; this is "
+            f"about the nearest miss, with robustness {signed(self.robustness)} "
+            f"({margin_words(self.robustness)})."
+        )
+
+    def beside(self, name: str) -> Path:
+        """Return a path in its folder, with the requirement in it if the run searched several."""
+        if not self.is_miss:
+            return beside(self.place, name)
+        file = Path(name)
+        return self.place / f"{file.stem}{self.suffix}{file.suffix}"
+
+    def problem(self) -> Problem:
+        """Load the problem.
+
+        Raises:
+            SpecError: if it was made in Python, or can no longer be loaded.
+        """
+        if self.stored is not None:
+            return problem_of(self.stored)
+        if self.source is None:
+            raise SpecError(
+                f"{self.place}: the problem of this run was made in Python: call simulate() and "
+                "explain() there"
+            )
+        return load_source(self.source)
+
+    def simulated(self, problem: Problem) -> Evaluation:
+        """Simulate it again, for its trajectory.
+
+        Raises:
+            SimulationError: if the simulation of a nearest miss fails.
+            SpecError: if a counterexample no longer violates, or a nearest miss does now.
+        """
+        evaluation = evaluate(problem, problem.space.admit(self.candidate))
+        if self.is_miss and evaluation.robustness is None:
+            raise SimulationError(f"{problem.name}: the simulation now fails: {evaluation.reason}")
+        if self.is_miss and evaluation.violated:
+            raise SpecError(
+                f"the nearest miss of {problem.name} now violates (robustness "
+                f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
+                f"falsifier run ... --start-from {self.place}"
+            )
+        if not self.is_miss and not evaluation.violated:
+            found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
+            raise SpecError(
+                f"the counterexample of {problem.name} no longer violates: {found}; to search for another "
+                "one: falsifier run"
+            )
+        return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
+
+
+def counterexample_case(place: Path) -> Case:
+    """Return the counterexample of a run directory or file.
+
+    Raises:
+        SpecError: if there is none or more than one.
+    """
+    file = counterexample_file(place)
+    stored = load(file)
+    candidate = Candidate.from_json(stored.candidate)
+    return Case(file, stored.requirement, stored.problem, candidate, stored.robustness, stored)
+
+
+def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Case:
+    """Return the counterexample of a run or file; of a run without one, its nearest miss.
+
+    Args:
+        place: run directory or counterexample file.
+        requirement: which one, if a run searched several.
+        shrunk: whether to return what a run's counterexample was shrunk to, if it was.
+
+    Raises:
+        SpecError: if there is neither, or a run searched several requirements and none is named.
+    """
+    if not (place.is_dir() and holds_run(place)):
+        if requirement is not None:
+            raise SpecError(f"{place}: --requirement chooses from a run directory; this is none")
+        return counterexample_case(place)
+    keep_recorded(place)
+    described = manifest.read(place)
+    name = _chosen(place, described, requirement)
+    file = place / file_of(name if described.shared else "")
+    if not file.exists():
+        return nearest_miss(place, name)
+    simpler = shrunk_file(file)
+    return counterexample_case(simpler if shrunk and simpler.exists() else file)
+
+
+def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
+    """Return the simulation of a run that came nearest to a violation.
+
+    Args:
+        directory: run directory.
+        requirement: name of the requirement; None: the run's first.
+
+    Raises:
+        SpecError: if no simulation has a robustness that is not negative.
+    """
+    described = manifest.read(directory)
+    name = described.names[0] if requirement is None else requirement
+    judged = judged_candidates(directory, name)
+    misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
+    if not misses:
+        raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
+    robustness, candidate = min(misses, key=lambda pair: pair[0])
+    source = described.of(name).request.source
+    suffix = f"-{file_name(name)}" if described.shared else ""
+    return Case(directory, name, source, candidate, robustness, None, suffix, len(judged))
+
+
+def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
+    """Return the requirement that was named, the only one, or the only one with a counterexample."""
+    if requirement is not None:
+        return described.of(requirement).requirement.name
+    if not described.shared:
+        return described.requirement.name
+    found = [name for name in described.names if (place / file_of(name)).exists()]
+    if len(found) == 1:
+        return found[0]
+    raise SpecError(
+        f"this run searched {', '.join(described.names)}; choose one with --requirement NAME", file=str(place)
+    )
