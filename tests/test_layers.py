@@ -114,6 +114,29 @@ def test_there_is_no_circle() -> None:
     TopologicalSorter(graph).prepare()
 
 
+EXPORT = PACKAGE.parent / "modelica" / "export"
+
+
+def relative_imports(path: Path) -> set[Path]:
+    """The files of the exporter that a file of it imports, also for type checkers."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            folder = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            found |= {folder.with_suffix(".py"), *(folder / f"{alias.name}.py" for alias in node.names)}
+    return {file for file in found if file.is_file()}
+
+
+def test_the_exporter_and_the_product_import_nothing_of_each_other_and_it_has_no_circle() -> None:
+    files = sorted(EXPORT.rglob("*.py"))
+    of_exporter = {module.split(".")[0] for path in files for module, _ in imports(path)}
+    of_product = {module.split(".")[0] for path in sources() for module, _ in imports(path)}
+    assert "falsifier" not in of_exporter and not {"modelica", "export"} & of_product
+    graph = {path: relative_imports(path) for path in files}
+    assert sum(map(len, graph.values())) > 100
+    TopologicalSorter(graph).prepare()
+
+
 def test_heavy_packages_are_imported_in_one_place_inside_functions() -> None:
     found = set()
     for path in sources():

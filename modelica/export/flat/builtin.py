@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import prod
-from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, ExportError, Place
 from . import fold
 from .delays import delay
+from .instance import Evaluation
 from .ir import NUMBERS, Der, Floor, Initial, Lit, Op, Pre, Scalar, Tensor, Var
 from .tensors import scalar_tensor, tensor
 
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
-
-
-Known = Callable[["Evaluator", Call], Tensor]
+Known = Callable[[Evaluation, Call], Tensor]
 
 
 def operation(operator: str, operands: list[Tensor], place: Place, *, events: bool) -> Tensor:
@@ -114,7 +110,7 @@ def known(name: str) -> bool:
     return name in _CALLS or name in fold.REAL_FUNCTIONS or name in _REFUSED
 
 
-def call(evaluator: Evaluator, node: Call) -> Tensor:
+def call(evaluator: Evaluation, node: Call) -> Tensor:
     """Evaluate a call of a built-in function."""
     if node.name in _REFUSED:
         raise ExportError(node.place, _REFUSED[node.name])
@@ -125,13 +121,13 @@ def call(evaluator: Evaluator, node: Call) -> Tensor:
     return _CALLS[node.name](evaluator, node)
 
 
-def _args(evaluator: Evaluator, node: Call, *counts: int) -> list[Tensor]:
+def _args(evaluator: Evaluation, node: Call, *counts: int) -> list[Tensor]:
     if len(node.arguments) not in counts:
         raise ExportError(node.place, f"'{node.name}' expects {' or '.join(map(str, counts))} arguments")
     return [evaluator.value(item) for item in node.arguments]
 
 
-def _map(evaluator: Evaluator, node: Call, make: Callable[[tuple[Scalar, ...]], Scalar]) -> Tensor:
+def _map(evaluator: Evaluation, node: Call, make: Callable[[tuple[Scalar, ...]], Scalar]) -> Tensor:
     count = 2 if node.name in ("atan2", "div", "mod", "rem") else 1
     args = _args(evaluator, node, count)
     dims = next((arg.dims for arg in args if arg.dims), ())
@@ -141,17 +137,17 @@ def _map(evaluator: Evaluator, node: Call, make: Callable[[tuple[Scalar, ...]], 
     return tensor(dims, [make(items) for items in zip(*columns, strict=True)])
 
 
-def _plain(evaluator: Evaluator, node: Call) -> Tensor:
+def _plain(evaluator: Evaluation, node: Call) -> Tensor:
     return _map(evaluator, node, lambda args: fold.arithmetic(node.name, args, node.place))
 
 
-def _floor(evaluator: Evaluator, arg: Scalar, place: Place) -> Scalar:
+def _floor(evaluator: Evaluation, arg: Scalar, place: Place) -> Scalar:
     if isinstance(arg, Lit) or arg.type == "Integer" or not evaluator.events:
         return fold.floor_free(arg, place)
     return Floor(arg)
 
 
-def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
+def _rounding(evaluator: Evaluation, node: Call) -> Tensor:
     """floor, ceil, integer."""
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
@@ -171,7 +167,7 @@ def _rounding(evaluator: Evaluator, node: Call) -> Tensor:
     return _map(evaluator, node, make)
 
 
-def _division(evaluator: Evaluator, node: Call) -> Tensor:
+def _division(evaluator: Evaluation, node: Call) -> Tensor:
     """div, mod, rem: exact for Integers, by floor (with events) for Reals."""
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
@@ -190,7 +186,7 @@ def _division(evaluator: Evaluator, node: Call) -> Tensor:
     return _map(evaluator, node, make)
 
 
-def _extreme(evaluator: Evaluator, node: Call) -> Tensor:
+def _extreme(evaluator: Evaluation, node: Call) -> Tensor:
     args = _args(evaluator, node, 1, 2)
     items = args[0].items if len(args) == 1 else args[0].items + args[1].items
     if len(args) == 2 and (args[0].dims or args[1].dims):
@@ -201,7 +197,7 @@ def _extreme(evaluator: Evaluator, node: Call) -> Tensor:
     return scalar_tensor(result)
 
 
-def _variable(evaluator: Evaluator, node: Call) -> Tensor:
+def _variable(evaluator: Evaluation, node: Call) -> Tensor:
     """Evaluate the argument of der, pre, edge or change, which must be a variable."""
     value = _args(evaluator, node, 1)[0]
     if not all(isinstance(item, Var) for item in value.items):
@@ -209,19 +205,19 @@ def _variable(evaluator: Evaluator, node: Call) -> Tensor:
     return value
 
 
-def _der(evaluator: Evaluator, node: Call) -> Tensor:
+def _der(evaluator: Evaluation, node: Call) -> Tensor:
     value = _variable(evaluator, node)
     if value.type != "Real":
         raise ExportError(node.place, "'der' needs a Real")
     return tensor(value.dims, [Der(item.name) for item in value.items if isinstance(item, Var)], "Real")
 
 
-def _pre(evaluator: Evaluator, node: Call) -> Tensor:
+def _pre(evaluator: Evaluation, node: Call) -> Tensor:
     value = _variable(evaluator, node)
     return tensor(value.dims, [Pre(v.name, v.type) for v in value.items if isinstance(v, Var)], value.type)
 
 
-def _change(evaluator: Evaluator, node: Call) -> Tensor:
+def _change(evaluator: Evaluation, node: Call) -> Tensor:
     item = _variable(evaluator, node).items[0]
     assert isinstance(item, Var)
     if item.type == "Real" or (node.name == "edge" and item.type != "Boolean"):
@@ -232,7 +228,7 @@ def _change(evaluator: Evaluator, node: Call) -> Tensor:
     return scalar_tensor(Op("<>", (item, before), "Boolean"))
 
 
-def _ordinal(evaluator: Evaluator, node: Call) -> Tensor:
+def _ordinal(evaluator: Evaluation, node: Call) -> Tensor:
     """The position of an item in its enumeration, starting at 1."""
 
     def make(args: tuple[Scalar, ...]) -> Scalar:
@@ -244,12 +240,12 @@ def _ordinal(evaluator: Evaluator, node: Call) -> Tensor:
     return _map(evaluator, node, make)
 
 
-def _without_events(evaluator: Evaluator, node: Call) -> Tensor:
+def _without_events(evaluator: Evaluation, node: Call) -> Tensor:
     with evaluator.without_events():
         return _args(evaluator, node, 1, 2)[-1]
 
 
-def _size(evaluator: Evaluator, node: Call) -> Tensor:
+def _size(evaluator: Evaluation, node: Call) -> Tensor:
     value = evaluator.value(node.arguments[0])
     if len(node.arguments) == 1:
         return tensor((len(value.dims),), [Lit(n, "Integer") for n in value.dims], "Integer")
@@ -259,7 +255,7 @@ def _size(evaluator: Evaluator, node: Call) -> Tensor:
     return scalar_tensor(Lit(value.dims[index - 1], "Integer"))
 
 
-def _fill(evaluator: Evaluator, node: Call) -> Tensor:
+def _fill(evaluator: Evaluation, node: Call) -> Tensor:
     texts = node.arguments
     if node.name == "fill":
         item: Scalar = evaluator.scalar(texts[0])
@@ -270,12 +266,12 @@ def _fill(evaluator: Evaluator, node: Call) -> Tensor:
     return Tensor(dims, (item,) * prod(dims), item.type)
 
 
-def _identity(evaluator: Evaluator, node: Call) -> Tensor:
+def _identity(evaluator: Evaluation, node: Call) -> Tensor:
     n = evaluator.static_integer(node.arguments[0], node.place)
     return tensor((n, n), [Lit(int(i == j), "Integer") for i in range(n) for j in range(n)], "Integer")
 
 
-def _reduce(evaluator: Evaluator, node: Call) -> Tensor:
+def _reduce(evaluator: Evaluation, node: Call) -> Tensor:
     items = list(_args(evaluator, node, 1)[0].items)
     if node.name == "sum":
         return scalar_tensor(_sum(items, node.place))
@@ -285,7 +281,7 @@ def _reduce(evaluator: Evaluator, node: Call) -> Tensor:
     return scalar_tensor(result)
 
 
-def _transpose(evaluator: Evaluator, node: Call) -> Tensor:
+def _transpose(evaluator: Evaluation, node: Call) -> Tensor:
     value = _args(evaluator, node, 1)[0]
     if len(value.dims) != 2:
         raise ExportError(node.place, "'transpose' needs a matrix")
@@ -294,7 +290,7 @@ def _transpose(evaluator: Evaluator, node: Call) -> Tensor:
     return tensor((columns, rows), items, value.type)
 
 
-def _cat(evaluator: Evaluator, node: Call) -> Tensor:
+def _cat(evaluator: Evaluation, node: Call) -> Tensor:
     axis = evaluator.static_integer(node.arguments[0], node.place)
     parts = [evaluator.value(text) for text in node.arguments[1:]]
     if axis != 1 or any(part.dims[1:] != parts[0].dims[1:] or not part.dims for part in parts):
@@ -305,11 +301,11 @@ def _cat(evaluator: Evaluator, node: Call) -> Tensor:
     return tensor(dims, [item for part in parts for item in part.items])
 
 
-def _initial(evaluator: Evaluator, node: Call) -> Tensor:
+def _initial(evaluator: Evaluation, node: Call) -> Tensor:
     return scalar_tensor(Initial())
 
 
-def _sample(evaluator: Evaluator, node: Call) -> Tensor:
+def _sample(evaluator: Evaluation, node: Call) -> Tensor:
     raise ExportError(
         node.place, "'sample' is only allowed as a condition of 'when', alone or as 'sample(...) and ...'"
     )

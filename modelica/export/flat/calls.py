@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from math import prod
-from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, Class, Colon, Component, ExportError, Place
-from .instance import Scope
+from .instance import Evaluation, Scope
 from .ir import Outputs, Tensor, Var, Variable
 from .tensors import fitted, type_of
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 
 def function_outputs(function: Class, call: Call) -> list[Component]:
@@ -26,7 +22,7 @@ def function_outputs(function: Class, call: Call) -> list[Component]:
     return outputs
 
 
-def arguments(here: Evaluator, function: Class, call: Call) -> tuple[Tensor, ...]:
+def arguments(here: Evaluation, function: Class, call: Call) -> tuple[Tensor, ...]:
     """Return the values for all inputs of a function, in their order."""
     inputs = [item for item in function.components if item.causality == "input"]
     given: dict[str, Tensor] = {}
@@ -51,7 +47,7 @@ def arguments(here: Evaluator, function: Class, call: Call) -> tuple[Tensor, ...
 
 
 def fit_argument(
-    here: Evaluator, item: Component, given: dict[str, Tensor], function: Class, call: Call
+    here: Evaluation, item: Component, given: dict[str, Tensor], function: Class, call: Call
 ) -> Tensor:
     """Check one argument against the declaration; return it with the declared type."""
     value, kind = given[item.name], type_of(item)
@@ -68,7 +64,7 @@ def fit_argument(
     return fitted(value, value.dims, kind, call.place)
 
 
-def lifted(here: Evaluator, function: Class, args: tuple[Tensor, ...], place: Place) -> list[Tensor]:
+def lifted(here: Evaluation, function: Class, args: tuple[Tensor, ...], place: Place) -> list[Tensor]:
     """Call a function with array results or several outputs; auxiliary variables receive the results."""
     if here.sink is None:
         raise ExportError(

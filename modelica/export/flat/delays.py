@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from ..read.syntax import Call, ExportError, Expr, Place, Several
 from . import fold
+from .instance import Evaluation
 from .ir import DelayLine, Equation, Lit, Scalar, Tensor, Time, Var, Variable, is_delayed
 from .tensors import cast, fitted, scalar_tensor
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
 
 _ARGUMENTS = ("in0", "in1", "x", "positiveVelocity", "initialPoints", "initialValues")
 
 Seeds = tuple[tuple[Scalar, Scalar], ...]
 
 
-def delay(here: Evaluator, call: Call) -> Tensor:
+def delay(here: Evaluation, call: Call) -> Tensor:
     """Translate `delay(expression, delayTime)` and `delay(expression, delayTime, delayMax)`."""
     if len(call.arguments) not in (2, 3):
         raise ExportError(
@@ -32,7 +29,7 @@ def delay(here: Evaluator, call: Call) -> Tensor:
     return scalar_tensor(_line(here, Time(), value, back, span, (), call.place))
 
 
-def spatial_distribution(here: Evaluator, item: Several) -> list[Equation]:
+def spatial_distribution(here: Evaluation, item: Several) -> list[Equation]:
     """Translate `(out0, out1) = spatialDistribution(...)` for a medium that flows in one direction."""
     call = item.right
     assert isinstance(call, Call)
@@ -66,7 +63,7 @@ def _arguments(call: Call) -> dict[str, Expr]:
     return given
 
 
-def _seeds(here: Evaluator, given: dict[str, Expr], place: Place) -> Seeds:
+def _seeds(here: Evaluation, given: dict[str, Expr], place: Place) -> Seeds:
     """Return the initial content of the line, beginning with what flows out first."""
     ends = Tensor((2,), (Lit(0.0, "Real"), Lit(1.0, "Real")), "Real")
     points = here.value(given["initialPoints"]) if "initialPoints" in given else ends
@@ -82,7 +79,7 @@ def _seeds(here: Evaluator, given: dict[str, Expr], place: Place) -> Seeds:
 
 
 def _line(
-    here: Evaluator, key: Scalar, value: Scalar, back: Scalar, span: Scalar, seeds: Seeds, place: Place
+    here: Evaluation, key: Scalar, value: Scalar, back: Scalar, span: Scalar, seeds: Seeds, place: Place
 ) -> Scalar:
     """Add a delay line; return the value that comes out of it."""
     if here.sink is None or not here.events:

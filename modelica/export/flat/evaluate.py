@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import prod
 
@@ -31,24 +31,20 @@ from .calls import arguments, function_outputs, lifted
 from .instance import Bound, Leaf, Node, NodeArray, Scope
 from .ir import (
     Cond,
-    DelayLine,
-    Equation,
     FlatModel,
     FunctionCall,
     Lit,
     Op,
-    Outputs,
     Pick,
     Relation,
     Scalar,
+    Sink,
     Tensor,
     Time,
     Type,
     Var,
 )
 from .tensors import element, fitted, scalar_tensor, selected, stacked, tensor, type_of
-
-Sink = Callable[[Outputs | Equation | DelayLine], None]
 
 
 class Evaluator:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from ..read.library import BUILTIN_TYPES, base_classes, find_class
 from ..read.syntax import Class, Colon, Component, ExportError, Expr, Modifier, Place
-from .ir import Tensor, Type
-
-if TYPE_CHECKING:
-    from .evaluate import Evaluator
-
+from .ir import FlatModel, Lit, Scalar, Sink, Tensor, Type
 
 ATTRIBUTES = frozenset(
     ["start", "fixed", "min", "max", "nominal", "unit", "displayUnit", "quantity", "stateSelect"]
@@ -121,6 +118,39 @@ class NodeArray:
 Child = "Leaf | Node | NodeArray"
 
 
+class Evaluation(Protocol):
+    """What evaluates expressions in a scope, for instances, calls and built-in functions; see Evaluator."""
+
+    model: FlatModel
+    events: bool
+    sink: Sink | None
+    leaves: dict[str, tuple[Leaf, int]]
+
+    def at(self, scope: Scope, *, events: bool = False, sink: Sink | None = None) -> Evaluation:
+        """Return what evaluates in another scope."""
+
+    def without_events(self) -> AbstractContextManager[None]:
+        """Evaluate relations without events within this context."""
+
+    def bound(self, bound: Bound) -> Tensor:
+        """Evaluate a modifier."""
+
+    def scalar(self, expr: Expr) -> Scalar:
+        """Evaluate an expression that must be scalar."""
+
+    def value(self, expr: Expr) -> Tensor:
+        """Evaluate any expression."""
+
+    def static(self, value: Scalar, place: Place) -> Lit:
+        """Compute a value that must be known before simulation."""
+
+    def static_integer(self, expr: Expr, place: Place) -> int:
+        """Compute a size or other integer that must be known before simulation."""
+
+    def parametric(self, value: Scalar) -> bool:
+        """Whether a value is known when the simulation starts."""
+
+
 class Node:
     """An instance of a model."""
 
@@ -129,7 +159,7 @@ class Node:
         cls: Class,
         prefix: str,
         mods: Mods,
-        evaluator: Evaluator,
+        evaluator: Evaluation,
         *,
         public: bool = True,
         place: Place | None = None,

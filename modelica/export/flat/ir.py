@@ -350,3 +350,7 @@ def names_in(node: Scalar, keep: Callable[[Scalar], bool] = lambda _: True) -> s
 
 
 REAL_ZERO = Lit(0.0, "Real")
+
+
+# Receives what is taken out of expressions.
+Sink = Callable[[Outputs | Equation | DelayLine], None]
