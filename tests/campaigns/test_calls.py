@@ -20,9 +20,16 @@ from tests.llm.server import Step, serving
 TAKEN, PAUSE = 0.3, 1.5
 STAND_IN = """
 import json
-from types import SimpleNamespace
+import sys
+from types import ModuleType, SimpleNamespace
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
+
+
+handler = ModuleType("litellm.llms.custom_httpx.http_handler")
+handler.HTTPHandler = type("HTTPHandler", (), {})
+handler.get_ssl_configuration = lambda *_: True
+sys.modules |= {name: handler for name in ("litellm.llms", "litellm.llms.custom_httpx", handler.__name__)}
 
 
 class UnsupportedParamsError(Exception):
