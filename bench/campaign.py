@@ -8,6 +8,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -21,19 +22,18 @@ from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import open_journal, read_journal, save_trajectory, write_manifest
-from falsifier.record.manifest import describe, environment
+from falsifier.record.journal import open_journal, read_journal, save_trajectory
+from falsifier.record.manifest import describe, environment, write
 from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
     EndedRecord,
     EvaluatedRecord,
     Record,
-    VerdictRecord,
     line_of,
 )
 from falsifier.record.run import falsify
-from falsifier.search.budget import Budget
+from falsifier.search.budget import Budget, Spent
 from falsifier.search.loop import search
 from falsifier.search.request import RunRequest
 from falsifier.search.steps import Live
@@ -69,7 +69,7 @@ def overhead(target: str, directory: Path) -> str:
     request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
     problem = load_source(request.problems[0])
     falsify(problem, "uniform", budget=10)
-    write_manifest(directory, describe(request, [problem], "uniform").model_dump(mode="json"))
+    write(directory, describe(request, [problem], "uniform"))
     engine, executor = TimedEngine(make_engine("uniform", problem, seed=0)), TimedExecutor()
     with open_journal(directory, keep=request.keep) as journal:
         started = perf_counter()
@@ -160,14 +160,13 @@ def make_run(request: RunRequest, place: Path) -> None:
     problem = load_source(request.problems[0])
     place.mkdir(parents=True)
     (place / "trajectories").mkdir()
-    write_manifest(place, describe(request, [problem], "uniform").model_dump(mode="json"))
+    write(place, describe(request, [problem], "uniform"))
     low, high = problem.space.bounds.T
     candidate = problem.space.decode(low + (high - low) * ((request.seed + 1) / 11))
     evaluation = evaluate(problem, candidate)
     assert evaluation.trajectory is not None
-    assert evaluation.verdict is not None
     trajectory = save_trajectory(place, BUDGET - 1, evaluation.trajectory)
-    verdict = VerdictRecord.of(evaluation.verdict)
+    verdict = evaluation.verdict
     assert verdict is not None
     records: list[Record] = []
     for i in range(BUDGET):
@@ -181,7 +180,7 @@ def make_run(request: RunRequest, place: Path) -> None:
                 elapsed=0.01 * i,
             )
         )
-        falling = verdict.model_copy(update={"robustness": float(BUDGET - i) if i < BUDGET - 1 else -1.0})
+        falling = replace(verdict, robustness=float(BUDGET - i) if i < BUDGET - 1 else -1.0)
         last = trajectory if i == BUDGET - 1 else None
         judged = {problem.name: falling}
         records.append(
@@ -202,10 +201,10 @@ def make_run(request: RunRequest, place: Path) -> None:
             robustness=-1.0,
             reference=-1.0,
             reason="written by a benchmark",
-            spent={"simulations": BUDGET},
+            spent=Spent(BUDGET),
         )
     )
-    records.append(EndedRecord(status="falsified", reason="", spent={"simulations": BUDGET}))
+    records.append(EndedRecord(status="falsified", reason="", spent=Spent(BUDGET)))
     lines = (line_of(record, number) for number, record in enumerate(records, 1))
     (place / "journal.jsonl").write_bytes(b"".join(lines))
 

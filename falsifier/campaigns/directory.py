@@ -14,12 +14,12 @@ from hashlib import sha256
 from pathlib import Path
 
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from falsifier.campaigns.request import CampaignRequest
-from falsifier.core.files import check_seal, seal, write_whole
-from falsifier.errors import JournalError, rejected
+from falsifier.errors import JournalError
 from falsifier.record.journal import holds_run
+from falsifier.record.sealed import locked, read_sealed, write_sealed
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"
@@ -56,7 +56,7 @@ def is_campaign(directory: Path) -> bool:
 
 def write_campaign(directory: Path, record: CampaignRecord) -> None:
     """Write campaign.json."""
-    write_whole(directory / CAMPAIGN, seal(record.model_dump_json(indent=2, exclude={"sum"})))
+    write_sealed(directory / CAMPAIGN, record)
 
 
 def read_campaign(directory: Path) -> CampaignRecord:
@@ -65,21 +65,7 @@ def read_campaign(directory: Path) -> CampaignRecord:
     Raises:
         JournalError: if there is none, or it is invalid.
     """
-    try:
-        content = (directory / CAMPAIGN).read_bytes()
-        check_seal(content)
-        return CampaignRecord.model_validate_json(content)
-    except FileNotFoundError:
-        raise JournalError(f"{directory}: not a campaign directory: it contains no {CAMPAIGN}") from None
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        message = rejected(first["msg"], first["input"])
-        raise JournalError(f"{directory}/{CAMPAIGN}: {key}: {message}") from None
-    except (ValueError, OSError) as error:
-        raise JournalError(
-            f"{directory}/{CAMPAIGN} is damaged: {error}; this campaign cannot be continued: start a new one"
-        ) from None
+    return read_sealed(directory / CAMPAIGN, CampaignRecord, what="campaign")
 
 
 def campaign_mark(directory: Path) -> str:
@@ -117,25 +103,19 @@ def run_directories(directory: Path) -> list[Path]:
 
 
 @contextmanager
-def locked(directory: Path) -> Iterator[None]:
+def campaign_lock(directory: Path) -> Iterator[None]:
     """Hold the campaign's lock.
 
     Raises:
         JournalError: if another process holds it.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(directory / _LOCK)
-    try:
-        lock.acquire(timeout=_LOCK_PATIENCE)
-    except Timeout:
-        raise JournalError(
-            f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
-            f"falsifier watch {directory}"
-        ) from None
-    try:
+    busy = (
+        f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
+        f"falsifier watch {directory}"
+    )
+    with locked(directory / _LOCK, busy=busy, patience=_LOCK_PATIENCE):
         yield
-    finally:
-        lock.release()
 
 
 def is_worked_on(directory: Path) -> bool:

@@ -127,7 +127,7 @@ class _Followed:
             requirement=self.requirement or self.request.problems[0].name,
             method=self.method,
             seed=self.request.seed,
-            status="running" if summary.is_incomplete else summary.status,
+            status=summary.status,
             reason=summary.reason,
             best=summary.best_robustness,
             spent=summary.spent,

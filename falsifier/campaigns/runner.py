@@ -1,16 +1,16 @@
 """Runs and resumes campaigns."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
 from falsifier.campaigns.directory import (
     STOP,
     CampaignRecord,
+    campaign_lock,
     campaign_mark,
     is_campaign,
-    locked,
     read_campaign,
     run_directory,
     write_campaign,
@@ -26,8 +26,8 @@ from falsifier.evaluation.workers import Workers, open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import holds_run, open_journal, write_manifest
-from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read
+from falsifier.record.journal import holds_run, open_journal
+from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read, write
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import read_summary
 from falsifier.search.budget import Budget
@@ -77,7 +77,7 @@ def run_campaign(
         ModelError: if an FMU cannot be used, or the cluster cannot be reached.
     """
     problems = check_request(request, executor=executor)
-    with locked(directory):
+    with campaign_lock(directory):
         if is_campaign(directory):
             raise JournalError(
                 f"{directory} already contains a campaign: choose another --out, or to continue it: "
@@ -111,7 +111,7 @@ def resume_campaign(
         SpecError: see run_campaign.
         ModelError: see run_campaign.
     """
-    with locked(directory):
+    with campaign_lock(directory):
         record = read_campaign(directory)
         problems = _load(record.runs.values())
         check_unchanged(directory, record.hashes, _hashes(problems))
@@ -267,5 +267,5 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
         return
     with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
         if not holds_run(directory):
-            write_manifest(directory, task.manifest.model_dump(mode="json"))
-        journal.write(EndedRecord(status="failed", reason=reason, spent=asdict(summary.spent)), at_once=True)
+            write(directory, task.manifest)
+        journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent), at_once=True)

@@ -10,30 +10,24 @@
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
 a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
-is noticed. Only search/repair.py, which drops what is damaged, touches these files beside this module.
+is noticed. Only record/repair.py, which drops what is damaged, touches these files beside this module.
 """
 
 import errno
-import json
 import logging
 import os
 import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import cache
 from io import BytesIO
 from pathlib import Path
 from time import monotonic
-from typing import Any
-
-from filelock import FileLock, Timeout
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import check_seal, checksum, remove_partial, seal, write_whole
-from falsifier.core.literals import one_line
+from falsifier.core.files import check_seal, checksum, remove_partial, write_whole
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -43,12 +37,11 @@ from falsifier.record.records import (
     EndedRecord,
     EvaluatedRecord,
     ExchangeRecord,
-    FindingRecord,
     Record,
-    VerdictRecord,
     line_of,
     parse_line,
 )
+from falsifier.record.sealed import locked
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.request import Keep
 
@@ -73,41 +66,23 @@ _KIND_WITHIN = 40
 
 
 class Journal:
-    """Writes one run directory as a listener of the run; the only writer while it is open.
+    """Writes one run directory as a listener of the run; made by open_journal.
 
     Args:
-        directory: run directory; created if missing.
+        directory: run directory, whose lock is held.
         keep: which trajectories are kept.
-        patience: time in s to wait for another process that writes here.
-
-    Raises:
-        JournalError: if another process still writes here after that time.
     """
 
-    def __init__(self, directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> None:
+    def __init__(self, directory: Path, keep: Keep) -> None:
         self.directory = directory
         self._keep = keep
-        with _can_be_a_folder(directory):
-            directory.mkdir(parents=True, exist_ok=True)
-            (directory / TRAJECTORIES).mkdir(exist_ok=True)
-        self._lock = FileLock(directory / LOCK)
-        try:
-            self._lock.acquire(timeout=patience)
-        except Timeout:
-            raise JournalError(
-                f"{directory}: another process is writing to this run; wait until it ends"
-            ) from None
         path = directory / JOURNAL
-        try:
-            _check_is_file(path)
-            _drop_torn_line(path)
-            remove_partial(directory / TRAJECTORIES, _TRAJECTORY_NAMES)
-            remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
-            self.records = read_journal(directory)
-            self._file = path.open("ab", buffering=0)
-        except BaseException:
-            self._lock.release()
-            raise
+        _check_is_file(path)
+        _drop_torn_line(path)
+        remove_partial(directory / TRAJECTORIES, _TRAJECTORY_NAMES)
+        remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
+        self.records = read_journal(directory)
+        self._file = path.open("ab", buffering=0)
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
         self._lines = len(self.records)
@@ -139,12 +114,8 @@ class Journal:
                 ended = EndedRecord(
                     status=event.status,
                     reason=event.reason,
-                    spent=asdict(event.spent),
-                    findings={
-                        result.problem.name: [FindingRecord(**asdict(f)) for f in result.findings]
-                        for result in event.results
-                        if result.findings
-                    },
+                    spent=event.spent,
+                    findings={r.problem.name: list(r.findings) for r in event.results if r.findings},
                 )
                 self.write(ended, at_once=True)
             case _:
@@ -173,11 +144,10 @@ class Journal:
         self._lines += 1
 
     def close(self) -> None:
-        """Force everything to disk and let others write here."""
+        """Force everything to disk."""
         with suppress(OSError):  # the last line of a run was forced to disk when it was written
             os.fsync(self._file.fileno())
         self._file.close()
-        self._lock.release()
 
     def _add(self, record: Record, *, at_once: bool = False) -> None:
         """Append a record, unless the journal contains it already."""
@@ -201,7 +171,7 @@ class Journal:
             EvaluatedRecord(
                 index=event.index,
                 status=evaluation.status,
-                verdicts={name: VerdictRecord.of(e.verdict) for name, e in event.judged.items()},
+                verdicts={name: e.verdict for name, e in event.judged.items()},
                 reason=evaluation.reason,
                 seconds=evaluation.seconds,
                 log=list(evaluation.log),
@@ -218,12 +188,35 @@ class Journal:
 
 @contextmanager
 def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
-    """Open the journal of a run directory, and close it even after an exception; see Journal."""
-    journal = Journal(directory, keep=keep, patience=patience)
-    try:
-        yield journal
-    finally:
-        journal.close()
+    """Open the journal of a run directory as its only writer, and close it even after an exception.
+
+    Args:
+        directory: run directory; created if missing.
+        keep: which trajectories are kept.
+        patience: time in s to wait for another process that writes here.
+
+    Raises:
+        JournalError: if another process still writes here after that time, or a line is damaged.
+    """
+    with _can_be_a_folder(directory):
+        directory.mkdir(parents=True, exist_ok=True)
+        (directory / TRAJECTORIES).mkdir(exist_ok=True)
+    with run_lock(directory, patience):
+        journal = Journal(directory, keep)
+        try:
+            yield journal
+        finally:
+            journal.close()
+
+
+def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[None]:
+    """Hold the lock of a run directory.
+
+    Raises:
+        JournalError: if another process still writes to it after so many s.
+    """
+    busy = f"{directory}: another process is writing to this run; wait until it ends"
+    return locked(directory / LOCK, busy=busy, patience=patience)
 
 
 @contextmanager
@@ -256,33 +249,6 @@ def holds_lines(directory: Path) -> bool:
     """Whether a directory contains a journal with at least one line."""
     path = directory / JOURNAL
     return path.exists() and path.stat().st_size > 0
-
-
-def read_manifest(directory: Path) -> dict[str, Any]:
-    """Read a run directory's manifest as plain JSON.
-
-    Raises:
-        JournalError: if there is none, or it is damaged.
-    """
-    path = directory / MANIFEST
-    try:
-        content = path.read_bytes()
-        check_seal(content)
-        manifest: dict[str, Any] = json.loads(content)
-        del manifest["sum"]
-    except (FileNotFoundError, NotADirectoryError):
-        raise JournalError(f"{directory}: not a run directory: it contains no {MANIFEST}") from None
-    except (ValueError, OSError, RecursionError) as error:
-        raise JournalError(
-            f"{path} is damaged: {one_line(str(error))}; this run cannot be continued: start a new one"
-        ) from None
-    return manifest
-
-
-def write_manifest(directory: Path, manifest: dict[str, Any]) -> None:
-    """Write the manifest of a run directory."""
-    content = {key: value for key, value in manifest.items() if key != "sum"}
-    write_whole(directory / MANIFEST, seal(json.dumps(content, indent=2)))
 
 
 def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Record]:
@@ -387,11 +353,10 @@ def recorded_evaluations(
                 range(record.first, record.first + len(record.candidates)), record.requirement
             )
         elif isinstance(record, EvaluatedRecord):
-            verdict = record.verdicts.get(requirement or turn[record.index])
             evaluations[record.index] = Evaluation(
                 candidates[record.index],
                 record.status,
-                verdict.verdict if verdict else None,
+                record.verdicts.get(requirement or turn[record.index]),
                 record.reason,
                 recorded_trajectory(directory, record.trajectory),
                 record.seconds,

@@ -3,27 +3,27 @@
 import platform
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import InputRange, ParameterRange, ValueKind
-from falsifier.errors import JournalError, rejected
+from falsifier.errors import JournalError
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
-from falsifier.record.journal import MANIFEST, read_manifest
+from falsifier.record.journal import MANIFEST
+from falsifier.record.sealed import read_sealed, write_sealed
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.refine import levels_of
 from falsifier.search.request import RunRequest
@@ -45,15 +45,6 @@ class InputRecord(_Strict):
     description: str = ""
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
-
-
-class HeldRecord(_Strict):
-    """One input or parameter that is not searched."""
-
-    name: str
-    causality: Literal["input", "parameter"]
-    value: float | str | None = Field(description="At which it is held; null: the model's own.")
-    reason: str = Field(description="Why it is not searched.")
 
 
 class ModeRecord(_Strict):
@@ -111,7 +102,7 @@ class Manifest(_Strict):
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
-    not_searched: tuple[HeldRecord, ...] = Field(
+    not_searched: tuple[Held, ...] = Field(
         description="The other inputs and the parameters, with the values at which they are held."
     )
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
@@ -121,11 +112,6 @@ class Manifest(_Strict):
         {}, description="What the language model was told of context files, by requirement."
     )
     sum: str = Field("", description="Checksum of the file up to here.")
-
-    @property
-    def held(self) -> tuple[Held, ...]:
-        """The inputs and parameters that were not searched."""
-        return tuple(Held(**record.model_dump()) for record in self.not_searched)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -166,13 +152,12 @@ def read(directory: Path) -> Manifest:
     Raises:
         JournalError: if there is none, or it is invalid.
     """
-    try:
-        return Manifest.model_validate(read_manifest(directory))
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        message = rejected(first["msg"], first["input"])
-        raise JournalError(f"{directory}/{MANIFEST}: {key}: {message}") from None
+    return read_sealed(directory / MANIFEST, Manifest, what="run")
+
+
+def write(directory: Path, manifest: Manifest) -> None:
+    """Write the manifest of a run directory."""
+    write_sealed(directory / MANIFEST, manifest)
 
 
 def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:
@@ -196,7 +181,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         ),
         inputs=tuple(_range_record(r) for r in space.inputs),
         parameters=tuple(_range_record(p) for p in space.parameters),
-        not_searched=tuple(HeldRecord(**asdict(held)) for held in problem.held),
+        not_searched=problem.held,
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
         hashes=file_hashes(problem),

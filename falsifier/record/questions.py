@@ -130,15 +130,7 @@ def doubtful_confirmations(
         evaluations: evaluations of the same run by their index.
     """
     return [
-        Confirmation(
-            problem=problem,
-            evaluation=evaluations[record.index],
-            outcome=record.outcome,
-            robustness=record.robustness,
-            reference=record.reference,
-            reason=record.reason,
-            halved=record.halved,
-        )
+        record.confirmation(problem, evaluations[record.index])
         for record in records
         if isinstance(record, ConfirmedRecord)
         and record.requirement == problem.name

@@ -1,24 +1,23 @@
 """The lines of a journal as typed records."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, fields
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from falsifier.core.files import check_seal, seal
+from falsifier.core.files import seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
-from falsifier.evaluation.evaluate import Status
+from falsifier.evaluation.evaluate import Evaluation, Status
+from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.findings import Finding, FindingKind
-from falsifier.stl import Breach
+from falsifier.search.findings import Finding
 from falsifier.stl.verdict import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    # The values in it are checked alike.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
     sum: str = Field("", description="Checksum of the line up to here.")
@@ -36,45 +35,15 @@ class AskedRecord(_Record):
     elapsed: float = _ELAPSED
 
 
-class VerdictRecord(_Record):
-    """Robustness, and what decided it."""
-
-    robustness: float = Field(
-        allow_inf_nan=False,
-        description="Below 0: violated. Exactly on the limit, -1e-300 if that is a violation, else 1e-300.",
-    )
-    critical_time: float
-    predicate: str
-    values: dict[str, float]
-    breach: Breach | None = Field(None, description="What broke; null if nothing did.")
-
-    @classmethod
-    def of(cls, verdict: Verdict | None) -> "VerdictRecord | None":
-        """Return the record of a verdict; None without a verdict."""
-        if verdict is None:
-            return None
-        return cls(
-            robustness=verdict.robustness,
-            critical_time=verdict.critical_time,
-            predicate=verdict.predicate,
-            values=dict(verdict.values),
-            breach=verdict.breach,
-        )
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict that was recorded."""
-        return Verdict(self.robustness, self.critical_time, self.predicate, self.values, self.breach)
-
-
 class EvaluatedRecord(_Record):
     """An evaluation ended."""
 
     kind: Literal["evaluated"] = "evaluated"
     index: int
     status: Status
-    verdicts: dict[str, VerdictRecord | None] = Field(
-        description="Verdict on each requirement not yet falsified, by name; null if it could not be judged."
+    verdicts: dict[str, Verdict | None] = Field(
+        description="Verdict on each requirement not yet falsified, by name; null if it could not be judged. "
+        "A robustness below 0 is a violation; on the limit it is -1e-300 if that is one, else 1e-300."
     )
     reason: str = ""
     seconds: float
@@ -102,7 +71,7 @@ class ConfirmedRecord(_Record):
     reference: float | None
     reason: str
     halved: float | None = None
-    spent: dict[str, float | None] = Field(description="What the run had spent by then.")
+    spent: Spent = Field(description="What the run had spent by then.")
 
     @classmethod
     def of(cls, confirmation: Confirmation, *, index: int, spent: Spent) -> "ConfirmedRecord":
@@ -115,26 +84,20 @@ class ConfirmedRecord(_Record):
             reference=confirmation.reference,
             reason=confirmation.reason,
             halved=confirmation.halved,
-            spent=asdict(spent),
+            spent=spent,
         )
 
-
-class FindingRecord(BaseModel):
-    """One thing that the search could not show about a requirement."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-    kind: FindingKind
-    text: str
-    part: str = Field("", description="Part of the formula, or input, that it is about.")
-    margin: float | None = Field(None, allow_inf_nan=False, description="How far the part was from changing.")
-    time: float | None = Field(None, description="When it came closest, in s.")
-    simulation: int | None = Field(None, description="Index of the evaluation in which it came closest.")
-
-    @property
-    def finding(self) -> Finding:
-        """The finding that was recorded."""
-        return Finding(**self.model_dump())
+    def confirmation(self, problem: Problem, evaluation: Evaluation) -> Confirmation:
+        """Return what was recorded, given the problem and the evaluation that violates its requirement."""
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome=self.outcome,
+            robustness=self.robustness,
+            reference=self.reference,
+            reason=self.reason,
+            halved=self.halved,
+        )
 
 
 class EndedRecord(_Record):
@@ -143,8 +106,8 @@ class EndedRecord(_Record):
     kind: Literal["ended"] = "ended"
     status: str
     reason: str
-    spent: dict[str, float | None]
-    findings: dict[str, list[FindingRecord]] = Field(
+    spent: Spent
+    findings: dict[str, list[Finding]] = Field(
         default_factory=dict,
         description="What the search could not show, by name of each requirement that was not falsified.",
     )
@@ -160,22 +123,17 @@ def line_of(record: Record, number: int) -> bytes:
     return seal(numbered.model_dump_json(exclude={"sum"})).encode()
 
 
-def parse_line(line: bytes, number: int | None = None) -> Record:
-    """Return the record of a line.
-
-    Args:
-        line: the line.
-        number: number that it must have; None: any.
+def parse_line(line: bytes, number: int) -> Record:
+    """Return the record of a line whose checksum is right, and which must have this number.
 
     Raises:
-        ValueError: if it is damaged; the message says how.
+        ValueError: if it is none, or has another number; the message says which.
     """
-    check_seal(line)
     try:
         record = RECORDS.validate_json(line)
     except ValidationError as error:
         raise ValueError(error.errors()[0]["msg"]) from None
-    if number is not None and record.line != number:
+    if record.line != number:
         raise ValueError(f"expected line {number}, found line {record.line}: lines are missing or doubled")
     return record
 
@@ -183,12 +141,5 @@ def parse_line(line: bytes, number: int | None = None) -> Record:
 def elapsed_at(record: Record) -> float:
     """Wall-clock time of the run in s when a record was written."""
     if isinstance(record, ConfirmedRecord | EndedRecord):
-        return spent_of(record.spent).seconds
+        return record.spent.seconds
     return record.elapsed
-
-
-def spent_of(recorded: Mapping[str, float | None]) -> Spent:
-    """Rebuild Spent from its record, in which all numbers are floats."""
-    whole = {f.name for f in fields(Spent) if f.type is int}
-    numbers = {name: int(v) if name in whole and v is not None else v for name, v in recorded.items()}
-    return Spent(**numbers)  # type: ignore[arg-type]

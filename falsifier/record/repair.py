@@ -1,48 +1,17 @@
-"""Makes a damaged run directory readable again: what is damaged is dropped, and repeated by ``resume``.
+"""Makes a damaged run directory readable again.
 
-Before a file is changed, a copy is kept beside it. Simulations and confirmations are repeated with the same
-result. Replies of a language model are not: everything from the first damaged exchange on is dropped.
+Of a journal, what stands before the damage is kept, as after a crash at that moment: ``resume`` simulates the
+rest again with the same result, and asks for the replies of a language model again. A copy of every file that
+is changed is kept beside it.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from shutil import copy2
 
-from filelock import FileLock, Timeout
-
-from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.errors import JournalError
 from falsifier.record import manifest
-from falsifier.record.journal import JOURNAL, LOCK, TRAJECTORIES, is_intact
-from falsifier.record.records import (
-    AskedRecord,
-    ConfirmedRecord,
-    EndedRecord,
-    EvaluatedRecord,
-    ExchangeRecord,
-    Record,
-    line_of,
-    parse_line,
-)
-
-# What a line that cannot be read was about, judged by its beginning.
-_REPEATABLE = (b'"kind":"asked"', b'"kind":"evaluated"', b'"kind":"confirmed"', b'"kind":"ended"')
-_KIND_WITHIN = 40
-
-
-@dataclass(frozen=True, slots=True)
-class _Damage:
-    """A place in a journal where lines are missing or cannot be read.
-
-    Attributes:
-        number: number of the first line that is affected.
-        repeatable: whether only steps are affected that ``resume`` repeats with the same result.
-    """
-
-    number: int
-    repeatable: bool
+from falsifier.record.journal import JOURNAL, TRAJECTORIES, JournalReader, is_intact, run_lock
 
 
 def repair(directory: Path) -> list[str]:
@@ -51,19 +20,9 @@ def repair(directory: Path) -> list[str]:
     Raises:
         JournalError: if the manifest is damaged, which nothing can replace, or a process writes here.
     """
-    asks_llm = manifest.read(directory).request.llm is not None
-    lock = FileLock(directory / LOCK)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        raise JournalError(
-            f"{directory}: another process is writing to this run; wait until it ends"
-        ) from None
-    try:
-        journal = _repair_journal(directory / JOURNAL, asks_llm=asks_llm)
-        return [*journal, *_repair_trajectories(directory / TRAJECTORIES)]
-    finally:
-        lock.release()
+    manifest.read(directory)
+    with run_lock(directory):
+        return [*_repair_journal(directory), *_repair_trajectories(directory / TRAJECTORIES)]
 
 
 def set_aside(path: Path) -> Path:
@@ -81,75 +40,21 @@ def _repair_trajectories(folder: Path) -> list[str]:
     return [f"{path}: damaged; kept as {set_aside(path).name}, simulated again if needed" for path in damaged]
 
 
-def _repair_journal(path: Path, *, asks_llm: bool) -> list[str]:
+def _repair_journal(directory: Path) -> list[str]:
+    path = directory / JOURNAL
     if path.is_dir():
         return [f"{path}: a folder, not a journal; kept as {set_aside(path).name}"]
-    content = path.read_bytes() if path.exists() else b""
-    content = content[: content.rfind(b"\n") + 1]  # a crash may have cut off the last line
-    found: dict[int, Record] = {}
-    findings: list[str] = []
-    damages: list[_Damage] = []
-    for number, line in enumerate(content.splitlines(keepends=True), 1):
-        try:
-            record = parse_line(line)
-        except ValueError as error:
-            findings.append(f"{path}: line {number}: {error}")
-            repeatable = any(kind in line[:_KIND_WITHIN] for kind in _REPEATABLE)
-            damages.append(_Damage(max(found, default=0) + 1, repeatable))
-            continue
-        if record.line in found:
-            findings.append(f"{path}: line {number}: line {record.line} is doubled")
-        found.setdefault(record.line, record)
-    gaps = _gaps(sorted(found), damages)
-    findings += [f"{path}: line {gap.number} is missing" for gap in gaps]
-    kept = _consistent([found[number] for number in sorted(found)], [*damages, *gaps], asks_llm=asks_llm)
-    repaired = b"".join(line_of(record, number) for number, record in enumerate(kept, 1))
-    if repaired == content:
-        return []
-    copy = copy2(path, _free(path))
-    write_whole(path, repaired)
-    lost = len(content.splitlines()) - len(kept)
-    again = f"{counted(lost, 'line')} dropped, the original is kept as {Path(copy).name}"
-    return [*findings, f"{path}: {again}; falsifier resume repeats what is missing"]
-
-
-def _gaps(numbers: Sequence[int], known: Iterable[_Damage]) -> list[_Damage]:
-    """Places where more lines are missing than could not be read."""
-    unread: dict[int, int] = {}
-    for damage in known:
-        unread[damage.number] = unread.get(damage.number, 0) + 1
-    pairs = zip([0, *numbers], numbers, strict=False)
-    return [
-        _Damage(last + 1, repeatable=False)
-        for last, following in pairs
-        if following - last - 1 > unread.get(last + 1, 0)
-    ]
-
-
-def _consistent(records: Sequence[Record], damages: Sequence[_Damage], *, asks_llm: bool) -> list[Record]:
-    """Records that can be replayed: evaluations with their candidate, confirmations with their evaluation."""
-    if asks_llm:
-        first = min((d.number for d in damages if not d.repeatable), default=None)
-        records = [record for record in records if first is None or record.line < first]
-    if not damages:
-        return list(records)
-    candidates: set[int] = set()
-    evaluated: set[int] = set()
-    kept: list[Record] = []
-    for record in records:
-        match record:
-            case AskedRecord():
-                candidates |= set(range(record.first, record.first + len(record.candidates)))
-            case EvaluatedRecord():
-                if record.index not in candidates:
-                    continue
-                evaluated.add(record.index)
-            case ConfirmedRecord():
-                if record.index not in evaluated:
-                    continue
-            case EndedRecord():
-                continue
-            case ExchangeRecord():
-                pass
-        kept.append(record)
-    return kept
+    reader = JournalReader(directory)
+    try:
+        for _ in reader.new():
+            pass
+    except JournalError:
+        lost = path.read_bytes()[reader.offset :].count(b"\n")
+        copy = Path(copy2(path, _free(path)))
+        with path.open("r+b") as file:
+            file.truncate(reader.offset)
+        return [
+            f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
+            f"original is kept as {copy.name}; falsifier resume repeats what is missing"
+        ]
+    return []

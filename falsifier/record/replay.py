@@ -26,7 +26,6 @@ from falsifier.record.records import (
     ExchangeRecord,
     Record,
     elapsed_at,
-    spent_of,
 )
 from falsifier.search.budget import Spent
 from falsifier.search.proposals import proposals
@@ -103,15 +102,7 @@ class Replayed:
         record = self.confirmed.get((index, problem.name))
         if record is None:
             return self.live.confirm(problem, evaluation, index)
-        return Confirmation(
-            problem=problem,
-            evaluation=evaluation,
-            outcome=record.outcome,
-            robustness=record.robustness,
-            reference=record.reference,
-            reason=record.reason,
-            halved=record.halved,
-        )
+        return record.confirmation(problem, evaluation)
 
     def chat(self, inner: Chat) -> Chat:
         """Return a chat that plays the recorded replies first."""
@@ -151,7 +142,7 @@ def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
             rejected = sum(bool(e.problem) and e.reply is not None for e in kept[answered:])
             if record.status == "failed" and rejected > MAX_REASKS:
                 del kept[answered:]
-            unrepeated = _difference(spent_of(record.spent), kept)
+            unrepeated = _difference(record.spent, kept)
     return kept, unrepeated
 
 

@@ -23,7 +23,7 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_lines, holds_run, open_journal, write_manifest
+from falsifier.record.journal import holds_lines, holds_run, open_journal
 from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
@@ -304,7 +304,7 @@ def carry_out(
                 _check_same(directory, described)
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             if not begun:
-                write_manifest(directory, described.model_dump(mode="json"))
+                manifest.write(directory, described)
             steps = replayed(directory, journal.records, live)
             all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
         return search(

@@ -16,12 +16,11 @@ from falsifier.record.records import (
     EvaluatedRecord,
     ExchangeRecord,
     Record,
-    VerdictRecord,
     elapsed_at,
-    spent_of,
 )
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
+from falsifier.stl.verdict import Verdict
 
 RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interrupted", "failed"]
 FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
@@ -50,7 +49,7 @@ class Summary:
         self.status: RunStatus = "waiting"
         self.reason = ""
         self.best: int | None = None
-        self.verdict: VerdictRecord | None = None
+        self.verdict: Verdict | None = None
         self.counterexample: int | None = None
         self.unconfirmed: dict[int, str] = {}
         self.trajectories: dict[int, str] = {}
@@ -60,9 +59,7 @@ class Summary:
         self._simulation_seconds = 0.0
         self._failed: dict[int, str] = {}
         self._robustness: list[float] = []
-        self._missing: set[int] = set()
-        self._has_ended = False
-        self._latest: VerdictRecord | None = None
+        self._latest: Verdict | None = None
 
     @property
     def spent(self) -> Spent:
@@ -89,11 +86,6 @@ class Summary:
         """Smallest robustness so far."""
         return None if self.best is None else self._robustness[self.best]
 
-    @property
-    def is_incomplete(self) -> bool:
-        """Whether a repair has dropped evaluations that are still to be carried out again."""
-        return bool(self._missing) and not self._has_ended
-
     def begin(self) -> None:
         """Set the status to running even if the first record was skipped by the reader."""
         if self.status == "waiting":
@@ -101,12 +93,10 @@ class Summary:
 
     def add(self, record: Record) -> None:
         """Update the numbers with one record."""
-        self._has_ended = isinstance(record, EndedRecord)
-        if self.counterexample is not None and not self._is_missing(record):
+        if self.counterexample is not None:
             return
-        if self.counterexample is None:
-            self.status = "running"
-            self._spent = replace(self._spent, seconds=elapsed_at(record))
+        self.status = "running"
+        self._spent = replace(self._spent, seconds=elapsed_at(record))
         match record:
             case EvaluatedRecord():
                 self._evaluated(record)
@@ -116,7 +106,7 @@ class Summary:
                 self.counterexample = record.index
                 self.verdict = self._latest
                 self.status, self.reason = "falsified", record.reason
-                self._spent = spent_of(record.spent)
+                self._spent = record.spent
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
@@ -125,34 +115,24 @@ class Summary:
             case EndedRecord():
                 self.status = _ended(record.status)
                 self.reason = record.reason
-                self._spent = spent_of(record.spent)
+                self._spent = record.spent
                 own = [found for name, found in record.findings.items() if self._requirement in (None, name)]
-                self.findings = tuple(each.finding for found in own for each in found)
+                self.findings = tuple(each for found in own for each in found)
             case AskedRecord():
                 pass
-
-    def _is_missing(self, record: Record) -> bool:
-        """Whether this is an evaluation that a repair dropped and that was carried out again."""
-        return isinstance(record, EvaluatedRecord) and record.index in self._missing
 
     def _evaluated(self, record: EvaluatedRecord) -> None:
         judged = record.verdicts
         verdict = (
             next(iter(judged.values()), None) if self._requirement is None else judged[self._requirement]
         )
-        value = verdict.robustness if verdict else float("nan")
+        self._latest = verdict
         smallest = self.best_robustness
-        if record.index >= len(self._robustness):
-            self._latest = verdict
-        if verdict is not None and (smallest is None or (value, record.index) < (smallest, self.best)):
-            self.best = record.index
-            self.verdict = verdict if self.counterexample is None else self.verdict
+        if verdict is not None and (smallest is None or verdict.robustness < smallest):
+            self.best, self.verdict = record.index, verdict
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
-        gap = range(len(self._robustness), record.index + 1)
-        self._robustness += [float("nan") for _ in gap]
-        self._missing = (self._missing | set(gap)) - {record.index}
-        self._robustness[record.index] = value
+        self._robustness.append(verdict.robustness if verdict else float("nan"))
         self._simulation_seconds += record.seconds
         if all(v is None for v in judged.values()):
             self._failed[record.index] = record.reason

@@ -12,8 +12,7 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import Workers
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import write_manifest
-from falsifier.record.manifest import describe
+from falsifier.record.manifest import describe, write
 from falsifier.search.budget import Budget
 from falsifier.search.request import RunRequest
 from tests.fmu.fixtures import path as fixture
@@ -72,4 +71,4 @@ def record_ad_hoc(folder: Path, formulas: Mapping[str, str]) -> None:
         problem = Problem.from_fmu(fixture("CheapLag_2"), formula, inputs={"u": (-1, 1, 3)}, stop_time=1.0)
         asked = RunRequest(problems=(problem.source,) if problem.source else ())
         (folder / place).mkdir()
-        write_manifest(folder / place, describe(asked, [problem], "uniform").model_dump(mode="json"))
+        write(folder / place, describe(asked, [problem], "uniform"))

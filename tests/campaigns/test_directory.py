@@ -3,10 +3,10 @@ from pathlib import Path
 import pytest
 
 from falsifier.campaigns.directory import (
+    campaign_lock,
     campaign_mark,
     is_campaign,
     is_worked_on,
-    locked,
     read_campaign,
     run_directories,
     run_directory,
@@ -67,14 +67,14 @@ def test_a_run_is_its_own_only_one_and_a_folder_has_those_in_it(tmp_path: Path) 
 def test_one_process_works_on_a_campaign_and_others_can_see_it(tmp_path: Path) -> None:
     directory = tmp_path / "c"
     assert not is_worked_on(directory)
-    with locked(directory):
+    with campaign_lock(directory):
         assert is_worked_on(directory)
-        with pytest.raises(JournalError, match="another process"), locked(directory):
+        with pytest.raises(JournalError, match="another process"), campaign_lock(directory):
             pass
     assert not is_worked_on(directory)
 
 
 def test_the_lock_is_released_whatever_happens(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), locked(tmp_path):
+    with pytest.raises(KeyboardInterrupt), campaign_lock(tmp_path):
         raise KeyboardInterrupt
     assert not is_worked_on(tmp_path)

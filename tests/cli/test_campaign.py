@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from falsifier.campaigns import Follower
-from falsifier.campaigns.directory import locked
+from falsifier.campaigns.directory import campaign_lock
 from falsifier.context.values import Level
 from falsifier.errors import JournalError, SpecError
 from falsifier.record import manifest
@@ -197,7 +197,7 @@ def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:
         assert "2/4 runs finished" in result.stdout
         assert "running" not in result.stdout
         assert "stopped; to continue: falsifier resume c" in result.stdout
-    with locked(tmp_path / "c"):
+    with campaign_lock(tmp_path / "c"):
         result = command("watch", "c", "--once")
         assert "2 running" in result.stdout
         assert "stopped" not in result.stdout

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.record.journal import read_journal, write_manifest
+from falsifier.record.journal import read_journal
 from falsifier.record.records import AskedRecord, ExchangeRecord
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
 from tests.llm.server import Step, serving
+from tests.record.support import write_manifest
 
 
 def test_two_replies_falsify_at1(tmp_path: Path) -> None:

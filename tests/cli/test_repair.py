@@ -10,7 +10,7 @@ from falsifier.record.journal import read_journal
 from tests.hostile.test_damage import Numeric
 
 
-def test_one_damaged_line_costs_one_simulation(tmp_path: Path) -> None:
+def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on_from_there(tmp_path: Path) -> None:
     Numeric().run(tmp_path)
     path = tmp_path / "journal.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
@@ -20,11 +20,9 @@ def test_one_damaged_line_costs_one_simulation(tmp_path: Path) -> None:
         read_journal(tmp_path)
     done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert "line 4: its checksum does not match" in done.output
+    assert "line 4 is damaged" in done.output
     assert (tmp_path / "journal.jsonl.damaged-1").read_bytes() == b"".join(lines)
-    kept = [r.index for r in read_journal(tmp_path) if r.kind == "evaluated"]
-    assert 1 not in kept and len(kept) == len(load_runs(tmp_path)[0].robustness) - 1
-    before = len(read_journal(tmp_path))
+    assert len(read_journal(tmp_path)) == 3
     assert Numeric().resume(tmp_path).falsified
-    assert [r.kind for r in read_journal(tmp_path)[before:]] == ["evaluated", "ended"]
+    assert len(load_runs(tmp_path)[0].robustness) > 3
     assert CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)]).output.endswith("nothing is damaged\n")

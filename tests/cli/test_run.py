@@ -11,13 +11,14 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import JournalError
-from falsifier.record.journal import read_journal, write_manifest
+from falsifier.record.journal import read_journal
 from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier, listen_to_interrupts
 from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.record.support import write_manifest
 
 
 def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:

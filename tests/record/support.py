@@ -1,7 +1,10 @@
 """A run over a Python function."""
 
+import json
 from pathlib import Path
+from typing import Any
 
+from falsifier.core.files import seal
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run
 from falsifier.record.run import falsify, resume
@@ -20,3 +23,9 @@ def run(
     if directory is not None and holds_run(directory):
         return resume(directory, problems=[problem])[0]
     return falsify(problem, engine, budget=budget, seed=seed, directory=directory)
+
+
+def write_manifest(directory: Path, content: dict[str, Any]) -> None:
+    """Write a manifest that need not be valid, with its checksum."""
+    kept = {key: value for key, value in content.items() if key != "sum"}
+    (directory / "manifest.json").write_text(seal(json.dumps(kept, indent=2)), encoding="utf-8")

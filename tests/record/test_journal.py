@@ -6,7 +6,6 @@ import pytest
 
 from falsifier.errors import JournalError
 from falsifier.record.journal import (
-    Journal,
     JournalReader,
     open_journal,
     read_journal,
@@ -55,8 +54,9 @@ def test_lines_of_candidates_can_be_passed_over(tmp_path: Path) -> None:
 
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:
-    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
-        Journal(tmp_path)
+    busy = pytest.raises(JournalError, match="another process is writing")
+    with open_journal(tmp_path), busy, open_journal(tmp_path):
+        pass
 
 
 def test_a_damaged_line_is_named(tmp_path: Path) -> None:

@@ -6,9 +6,10 @@ from falsifier.record.records import (
     EndedRecord,
     EvaluatedRecord,
     ExchangeRecord,
-    VerdictRecord,
 )
 from falsifier.record.summary import Summary
+from falsifier.search.budget import Spent
+from falsifier.stl.verdict import Verdict
 
 
 def status(summary: Summary) -> str:
@@ -19,16 +20,14 @@ def status(summary: Summary) -> str:
 def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
     verdict = None
     if robustness is not None:
-        verdict = VerdictRecord(
-            robustness=robustness, critical_time=1.0, predicate="x <= 1", values={"x": 2.0}
-        )
+        verdict = Verdict(robustness=robustness, critical_time=1.0, predicate="x <= 1", values={"x": 2.0})
     status = "ok" if verdict else "failed"
     return EvaluatedRecord(
         index=index, status=status, verdicts={"R": verdict}, seconds=0.5, elapsed=index + 1
     )
 
 
-def confirmed(index: int, outcome: Outcome, reason: str, **spent: float | None) -> ConfirmedRecord:
+def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> ConfirmedRecord:
     return ConfirmedRecord(
         index=index,
         requirement="R",
@@ -53,9 +52,9 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
         2.5,
         5.0,
     )
-    summary.add(confirmed(2, "fragile", "vanishes"))
+    summary.add(confirmed(2, "fragile", "vanishes", Spent()))
     assert status(summary) == "running"
-    summary.add(confirmed(4, "confirmed", "yes", simulations=5.0, seconds=9.0, cost=None))
+    summary.add(confirmed(4, "confirmed", "yes", Spent(simulations=5, seconds=9.0, cost=None)))
     assert summary.counterexample == 4
     assert summary.unconfirmed == {2: "fragile: vanishes"}
     assert (summary.status, summary.spent.seconds, summary.spent.cost) == ("falsified", 9.0, None)
@@ -64,10 +63,10 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
 def test_what_others_do_after_a_requirement_was_falsified_is_not_its_own() -> None:
     summary = Summary("R")
     summary.add(evaluated(0, -1.0))
-    summary.add(confirmed(0, "confirmed", "yes", simulations=1.0))
+    summary.add(confirmed(0, "confirmed", "yes", Spent(simulations=1)))
     other = evaluated(1, 5.0).model_copy(update={"verdicts": {"S": None}})
     summary.add(other)
-    summary.add(EndedRecord(status="not falsified", reason="S stands", spent={"simulations": 2.0}))
+    summary.add(EndedRecord(status="not falsified", reason="S stands", spent=Spent(simulations=2)))
     assert (status(summary), summary.reason, summary.spent.simulations) == ("falsified", "yes", 1)
 
 
@@ -87,7 +86,7 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
 
 def test_a_run_that_goes_on_is_running_again() -> None:
     summary = Summary()
-    summary.add(EndedRecord(status="interrupted", reason="", spent={}))
+    summary.add(EndedRecord(status="interrupted", reason="", spent=Spent()))
     assert status(summary) == "interrupted"
     summary.add(evaluated(0, 1.0))
     assert status(summary) == "running"

@@ -163,7 +163,7 @@ def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
         reason=summary.reason,
         robustness=summary.robustness,
         best=summary.best,
-        verdict=summary.verdict.verdict if summary.verdict else None,
+        verdict=summary.verdict,
         counterexample=summary.counterexample,
         unconfirmed=summary.unconfirmed,
         trajectories=summary.trajectories,

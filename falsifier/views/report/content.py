@@ -137,7 +137,7 @@ def _where(run: Run) -> str:
 def unshown(run: Run) -> list[str]:
     """Return what a search could not show, one line each."""
     texts = [*(finding.text for finding in run.findings), *(failure.text for failure in run.failures)]
-    held = held_text(h for h in run.manifest.held if h.causality == "input")
+    held = held_text(h for h in run.manifest.not_searched if h.causality == "input")
     return [*texts, *([f"not searched: {held}"] if held else [])]
 
 

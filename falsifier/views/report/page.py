@@ -224,7 +224,7 @@ def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
     if shown.is_lost:
         facts.append(("trajectory", "not shown: its file is damaged or missing"))
     facts += level_facts(run)
-    facts += [("not searched", held_text(run.manifest.held))] if run.manifest.held else []
+    facts += [("not searched", held_text(run.manifest.not_searched))] if run.manifest.not_searched else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
         commands.insert(0, ("replay the counterexample", replay_command(run)))

@@ -6,21 +6,21 @@ import pytest
 from falsifier.campaigns.analysis import columns, frame, histories, load, load_run
 from falsifier.errors import JournalError
 from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
 from falsifier.record.journal import (
     read_journal,
     recorded_evaluations,
-    write_manifest,
 )
 from falsifier.record.manifest import describe
 from falsifier.record.records import (
     AskedRecord,
     EvaluatedRecord,
     Record,
-    VerdictRecord,
     line_of,
     parse_line,
 )
 from falsifier.search.request import RunRequest
+from falsifier.stl.verdict import Verdict
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import easy
 
@@ -77,9 +77,9 @@ def test_loading_reads_each_line_once_and_passes_over_the_candidates(
 ) -> None:
     problem = easy()
     request = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"),))
-    write_manifest(tmp_path, describe(request, [problem], "corners").model_dump(mode="json"))
+    manifest.write(tmp_path, describe(request, [problem], "corners"))
     candidate = problem.space.decode([0.5, 0.25, 0.1, -0.3], origin="uniform").to_json()
-    verdict = VerdictRecord(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
+    verdict = Verdict(robustness=0.1, critical_time=3.0, predicate="x <= 0.9", values={"x": 0.8})
     with (tmp_path / "journal.jsonl").open("wb") as file:
         for i in range(1000):
             asked = AskedRecord(
