@@ -93,11 +93,25 @@ def remove_partial(folder: Path, names: str) -> None:
                 path.unlink()
 
 
+def cache_directory() -> Path:
+    """Return this tool's directory in the user's cache directory."""
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "falsifier"
+
+
 def own_temporary_folder(name: str) -> Path | None:
     """Return a folder for machine code in the system's temporary folder; None if it cannot be private."""
     try:
-        folder = Path(tempfile.gettempdir()) / f"{name}-{operating_system.user()}"
-        folder.mkdir(mode=0o700, exist_ok=True)
+        temporary = Path(tempfile.gettempdir())
+    except OSError:
+        return None
+    return private_folder(temporary / f"{name}-{operating_system.user()}")
+
+
+def private_folder(folder: Path) -> Path | None:
+    """Make a folder for machine code; None if other users could write to it, or this one cannot."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         is_private = operating_system.is_private(folder)
     except OSError:
         return None

@@ -1,7 +1,6 @@
 """Valid replies on disk, keyed by the content of the request: no question is paid for twice."""
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -12,6 +11,7 @@ from uuid import uuid4
 from pydantic import ValidationError
 
 from falsifier.core import operating_system
+from falsifier.core.files import cache_directory
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 
 
@@ -68,9 +68,3 @@ class CachedChat:
 def default_cache_directory() -> Path:
     """Directory of stored replies: ``replies`` in this tool's cache directory."""
     return cache_directory() / "replies"
-
-
-def cache_directory() -> Path:
-    """This tool's directory in the user's cache directory."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "falsifier"

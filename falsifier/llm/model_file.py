@@ -15,10 +15,10 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from falsifier.core import operating_system
+from falsifier.core.files import cache_directory
 from falsifier.core.literals import printable
 from falsifier.core.secrets import scrubbed
 from falsifier.errors import ChatSetupError
-from falsifier.llm.cache import cache_directory
 
 SUFFIX = ".gguf"
 # Tokens of prompt and reply together: prompts have up to 6,000, and reasoning takes most of the rest.

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from falsifier.core import operating_system
 from falsifier.core.compiler import compile_c
+from falsifier.core.files import cache_directory, checksum, private_folder
 from falsifier.core.secrets import holds_secrets, scrubbed
 from falsifier.errors import ModelError
 from falsifier.fmu.description import WINDOWS, this_platform
@@ -38,7 +39,7 @@ def worker_program(root: Path, *, windows: bool = False) -> Path:
     """Return the path of the program that runs FMUs.
 
     Args:
-        root: folder for a copy, if the installed one may not be executed or there is none.
+        root: folder for a copy, if the installed one may not be executed, or for what is compiled and not kept.
         windows: whether it is the program for Windows, which is executed by Wine.
 
     Raises:
@@ -66,24 +67,40 @@ def _has_its_library() -> bool:
 
 
 def _compiled(root: Path, found: str) -> Path:
-    """Return the program, compiled by this machine's C compiler."""
-    path = root / "worker"
-    if path.exists():
-        return path
+    """Return the program, compiled by this machine's C compiler, once for all processes of this user."""
     if found.endswith("-windows"):
         raise ModelError(f"there is no program to run FMUs on {found}; use a 64-bit Python for x86-64")
+    path = (_kept() or root) / f"worker-{found}-{_sum_of_sources()}"
+    if path.exists():
+        return path
     kept = ("sandbox_linux.c", "calls_linux.c") if found in _CONFINED else ("sandbox_none.c",)
     sources = [p.name for p in sorted(WORKER.glob("*.c")) if p.name in kept or p.name not in _NOT_HERE]
     libraries = ("-lm", "-ldl") if found.endswith("-linux") else ("-lm",)
-    partial = path.with_suffix(".partial")
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
         compile_c(WORKER, WORKER, [*_FLAGS, *sources, *libraries, "-o", str(partial)])
     except ModelError as error:
         raise ModelError(
             f"there is no program to run FMUs on {found}, and it cannot be compiled: {error}"
         ) from None
-    partial.rename(path)
+    partial.replace(path)
     return path
+
+
+def _kept() -> Path | None:
+    """Return the folder where compiled programs are kept; None if there is none from which they may run."""
+    try:
+        folder = private_folder(cache_directory() / "workers")
+    except RuntimeError:  # the user has no home
+        return None
+    return None if folder is None or operating_system.forbids_programs(folder) else folder
+
+
+@lru_cache(maxsize=1)
+def _sum_of_sources() -> str:
+    """Return a checksum of what the program is compiled from, so that no other version's is taken."""
+    files = sorted((*WORKER.glob("*.c"), *WORKER.glob("*.h")))
+    return checksum(b"".join(file.read_bytes() for file in files) + " ".join(_FLAGS).encode())
 
 
 def protect_secrets(environment: Mapping[str, str]) -> None:

@@ -4,7 +4,6 @@ import hashlib
 import shutil
 import subprocess
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ from falsifier.fmu.description.archive import this_platform
 from falsifier.fmu.process import REGISTRY, program
 from falsifier.fmu.process.connection import Request, Where
 from falsifier.fmu.process.program import WORKER
-from falsifier.fmu.process.start import Workplace
 from falsifier.fmu.process.worker import REUSES
 from tests.fmu import fixtures
 
@@ -68,30 +66,31 @@ class TestElsewhere:
     """On a platform for which nothing was built."""
 
     @pytest.fixture(autouse=True)
-    def unknown_platform(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown_platform(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(program, "this_platform", lambda: "riscv64-linux")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
-    def test_the_machines_compiler_builds_it_and_it_simulates(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_the_machines_compiler_builds_it_once_and_it_simulates(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         model = fixtures.isolated("Lag_2")
         REGISTRY.close()
         compiled = fixtures.run(model, ("y",))["y"]
         REGISTRY.close()
+        (kept,) = (tmp_path / "cache" / "falsifier" / "workers").iterdir()
+        monkeypatch.setattr(program, "compile_c", None)
+        assert program.worker_program(tmp_path / "of another process") == kept
         monkeypatch.undo()
         np.testing.assert_array_equal(compiled, fixtures.run(model, ("y",))["y"])
 
-    def test_it_is_compiled_once(self, tmp_path: Path) -> None:
-        found = program.worker_program(tmp_path)
-        first = found.stat().st_ino
-        assert program.worker_program(tmp_path).stat().st_ino == first
-
-    def test_threads_that_need_it_at_the_same_time_wait_for_each_other(self) -> None:
-        workplace = Workplace()
-        try:
-            with ThreadPoolExecutor(4) as threads:
-                found = [threads.submit(workplace.program) for _ in range(4)]
-            assert len({each.result().stat().st_ino for each in found}) == 1
-        finally:
-            workplace.remove()
+    def test_where_others_could_exchange_it_nothing_is_kept(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(program, "compile_c", lambda what, folder, arguments: Path(arguments[-1]).touch())
+        shared = tmp_path / "cache" / "falsifier" / "workers"
+        shared.mkdir(parents=True)
+        shared.chmod(0o777)
+        assert program.worker_program(tmp_path).parent == tmp_path and not list(shared.iterdir())
 
     def test_without_a_compiler_one_line_says_so(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
