@@ -79,7 +79,12 @@ def test_simulations_need_no_open_streams_and_no_folder_for_temporary_files(
 
 
 @pytest.mark.parametrize(
-    ("most", "where"), [(500, "run/manifest.json"), (200_000, "memory shared with the processes of FMUs")]
+    ("most", "where"),
+    [
+        (500, "run/manifest.json"),
+        (10_000, "Lag_2.fmu is unpacked"),
+        (200_000, "memory shared with the processes of FMUs"),
+    ],
 )
 def test_a_limit_on_the_size_of_files_is_told_with_the_file_and_the_cure(
     most: int, where: str, tmp_path: Path

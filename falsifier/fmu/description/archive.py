@@ -1,5 +1,6 @@
 """Archives of FMUs and other models: checked before any of their contents are written to disk or loaded."""
 
+import errno
 import hashlib
 import platform
 import stat
@@ -57,6 +58,8 @@ _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 # What reading an entry of a damaged archive raises. RuntimeError stands for entries that are encrypted or
 # compressed by an unknown method, OSError also for damaged bzip2 data, ValueError for names in no encoding.
 UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
+# What is the machine's fault and not the archive's.
+_EXHAUSTED = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FORBIDDEN_KINDS = {
     stat.S_IFLNK: "symbolic link",
     stat.S_IFIFO: "named pipe",
@@ -126,12 +129,16 @@ def extract(path: Path, folder: Path) -> None:
     """Unpack an FMU into a folder after checking its entries.
 
     Raises:
-        ModelError: if the archive is rejected or damaged, or the disk is full.
+        ModelError: if the archive is rejected or damaged.
+        OSError: if the machine has no room for it, or allows no files so large.
     """
     with open_archive(path) as archive:
         try:
             archive.extractall(folder)
         except UNREADABLE as error:
+            if isinstance(error, OSError) and error.errno in _EXHAUSTED:
+                error.filename = f"{folder}, to which {path} is unpacked"
+                raise
             raise ModelError(f"{path}: cannot unpack the FMU into {folder} ({error})") from error
 
 
