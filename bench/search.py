@@ -79,7 +79,8 @@ def _published(entry: dict[str, Any] | None) -> str:
     return f"{entry['falsified']}: {value}"
 
 
-def _seeds(text: str) -> range:
+def seeds_from(text: str) -> range:
+    """Return the seeds that a command line names: ``7`` or ``100-109``, both ends included."""
     first, _, last = text.partition("-")
     return range(int(first), int(last or first) + 1)
 
@@ -90,7 +91,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--engine", choices=sorted(set(ENGINES) - {"hybrid"}), default=DEFAULT_ENGINE)
     parser.add_argument("--requirements", nargs="+", choices=known, default=known, metavar="NAME")
-    parser.add_argument("--seeds", type=_seeds, default=range(100, 110), help="for example 100-109")
+    parser.add_argument("--seeds", type=seeds_from, default=range(100, 110), help="for example 100-109")
     parser.add_argument(
         "--budget",
         type=int,
