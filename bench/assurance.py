@@ -14,9 +14,7 @@ of a violation:
 The columns:
 
 - bound, interval: share of 1000 calls of `assess`, each with another seed and 300 draws, in which the exact
-  upper bound, and the exact two-sided interval, contain the true probability;
-- splitting: share of 200 estimates, each with another seed and at most 4000 simulations, whose interval
-  contains the true probability, of those that finished. Estimates that did not finish have no interval.
+  upper bound, and the exact two-sided interval, contain the true probability.
 
     python -m bench.assurance > bench/assurance.md
 """
@@ -26,7 +24,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from math import sqrt
-from statistics import mean, median
+from statistics import mean
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +37,15 @@ from falsifier import (
     Problem,
     Requirement,
     SearchSpace,
-    Splitting,
     Variable,
     assess,
     parse,
 )
-from falsifier.analyses.splitting import split
 
 Cost = Callable[[NDArray[np.float64]], float]
 
-SEEDS, MANY_SEEDS = range(1000, 1200), range(1000, 2000)
-DRAWN, SPLITTING = 300, 4000
+SEEDS = range(1000, 2000)
+DRAWN = 300
 _NAMES = ("a", "b", "c", "d")
 # Probability of the rare mode, and of the violations to which a slope leads.
 _RARE, _BROAD = 0.02, 2e-4
@@ -137,26 +133,11 @@ def exact(name: str, probability: float, seed: int) -> tuple[bool, bool]:
     return probability <= found.bound, low <= probability <= high
 
 
-def estimated(name: str, probability: float, seed: int) -> Splitting:
-    """Estimate the probability of one system with one seed."""
-    return split(SYSTEMS[name](probability), 4, budget=SPLITTING, seed=seed, confidence=0.95)
-
-
 def row(pool: ProcessPoolExecutor, name: str, probability: float) -> str:
     """Return one row of the table."""
-    told = list(pool.map(partial(exact, name, probability), MANY_SEEDS, chunksize=10))
+    told = list(pool.map(partial(exact, name, probability), SEEDS, chunksize=10))
     exactly = " | ".join(f"{mean(held):.1%}" for held in zip(*told, strict=True))
-    found = list(pool.map(partial(estimated, name, probability), SEEDS, chunksize=10))
-    finished = [s for s in found if s.probability is not None]
-    held = ratio = wide = "-"
-    if finished:
-        held = f"{mean(s.low <= probability <= s.high for s in finished):.1%}"
-        ratio = f"{median(s.probability / probability for s in finished if s.probability):.2f}"
-        wide = f"{median(s.high / s.low for s in finished):.1f}"
-    return (
-        f"| {name} | {probability:.0e} | {exactly} | {held} of {len(finished)} | {ratio} | {wide} "
-        f"| {mean(s.simulations for s in found):.0f} |"
-    )
+    return f"| {name} | {probability:.0e} | {exactly} |"
 
 
 def main() -> None:
@@ -164,11 +145,8 @@ def main() -> None:
     print("# Coverage of bounds and intervals of 95 %\n")
     print("\n\n".join((__doc__ or "").split("\n\n")[1:-1]))
     print("\nCommand: `python -m bench.assurance > bench/assurance.md`\n")
-    print(
-        "| system | probability | bound | interval | splitting | median estimate / truth | median high / low "
-        "| mean simulations of splitting |"
-    )
-    print("|---|---|---|---|---|---|---|---|", flush=True)
+    print("| system | probability | bound | interval |")
+    print("|---|---|---|---|", flush=True)
     with ProcessPoolExecutor(2) as pool:
         for name in SYSTEMS:
             for probability in PROBABILITIES:

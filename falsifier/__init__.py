@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from falsifier.analyses.formalize import Difference, Formalized, Reading, formalize
     from falsifier.analyses.lint import LintFinding, lint
     from falsifier.analyses.margin import Margin, margin
-    from falsifier.analyses.splitting import Splitting
     from falsifier.campaigns import (
         CampaignRequest,
         Method,
@@ -153,7 +152,6 @@ _EXPORTS = {
     "Shrunk": "falsifier.counterexamples.shrink",
     "Signal": "falsifier.core.signals",
     "Spent": "falsifier.search.budget",
-    "Splitting": "falsifier.analyses.splitting",
     "StoredCounterexample": "falsifier.counterexamples.store",
     "System": "falsifier.fmu",
     "Trajectory": "falsifier.core.trajectory",
@@ -253,7 +251,6 @@ __all__ = [
     "Shrunk",
     "Signal",
     "Spent",
-    "Splitting",
     "StoredCounterexample",
     "System",
     "Trajectory",

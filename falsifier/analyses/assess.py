@@ -6,15 +6,10 @@ is extrapolated from the draws: a narrow region of violations leaves no trace in
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 
-import numpy as np
-from numpy.typing import NDArray
-
-from falsifier.analyses.splitting import Splitting, least_budget, split
 from falsifier.core.arguments import whole
-from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines.box import UnitBox
@@ -54,14 +49,13 @@ class Assurance:
     Attributes:
         problem: what was simulated.
         distribution: what was drawn, in words; every probability here refers to it.
-        confidence: confidence of the bound and the intervals.
+        confidence: confidence of the bound, and of the interval.
         drawn: number of simulations drawn independently.
         violations: how many of them violate the requirement, as simulated, without confirmation.
         failures: why simulations among them failed; the bounds count them as violations where that is worse.
-        bound: upper confidence bound on the probability of a violation, exact.
+        bound: one-sided upper confidence bound on the probability of a violation, exact.
         interval: exact two-sided confidence interval of that probability; from 0 without violations.
         smallest: the drawn evaluation with the smallest robustness, without its trajectory.
-        splitting: estimate of the probability by splitting; None if it was not asked for.
         searched: what a search found; None if none was given.
         findings: what no simulation tested; empty with violations.
         interrupted: whether the user stopped it; everything refers to what was drawn by then.
@@ -76,7 +70,6 @@ class Assurance:
     bound: float
     interval: tuple[float, float]
     smallest: Evaluation
-    splitting: Splitting | None
     searched: Searched | None = None
     findings: tuple[Finding, ...] = ()
     interrupted: bool = False
@@ -87,11 +80,12 @@ class Assurance:
         share = f"{self.confidence * 100:g} %"
         lines = [
             f"{self.violations} of {counted(self.drawn, 'random simulation')} violate the requirement.",
-            f"With {share} confidence, the probability of a violation is at most {self.bound:.3g}.",
+            f"With {share} confidence (one-sided), the probability of a violation is at most "
+            f"{self.bound:.3g}.",
         ]
         if self.violations:
             low, high = self.interval
-            lines.append(f"With {share} confidence, it is between {low:.3g} and {high:.3g}.")
+            lines.append(f"With {share} confidence (two-sided), it is between {low:.3g} and {high:.3g}.")
         if self.failures:
             lines += [f"{failure.text}." for failure in self.failures]
             lines.append("The bound counts failed simulations as violations.")
@@ -102,8 +96,6 @@ class Assurance:
         lines.append(f"The smallest robustness of these was {signed(smallest)} ({margin_words(smallest)}).")
         if self.searched is not None:
             lines.append(self._searched_text(self.searched))
-        if self.splitting is not None:
-            lines.append(_splitting_text(self.splitting, share))
         lines.append(
             "Probability of what: of inputs drawn uniformly from the search space with this "
             f"parameterization, not of inputs in operation: {self.distribution}."
@@ -136,23 +128,18 @@ def assess(
     budget: int,
     seed: int = 0,
     confidence: float = 0.95,
-    splitting: int | None = None,
     searched: Sequence[Evaluation] = (),
     progress: Progress | None = None,
 ) -> Assurance:
     """Bound the probability of a violation by random simulations.
 
-    The bound is exact whatever the system is, as long as inputs are drawn as stated. The estimate by
-    splitting is not: it is for probabilities too small to be seen in the draws, and for violations to which
-    the robustness leads.
+    The bound is exact whatever the system is, as long as inputs are drawn as stated.
 
     Args:
         problem: what to simulate; inputs are drawn as the engine ``uniform`` does.
         budget: maximum number of simulations.
         seed: seed of the random numbers.
-        confidence: confidence of the bound and the intervals, between 0 and 1.
-        splitting: how many simulations of the budget are for splitting; default: half, if that is enough for
-            an estimate, otherwise none.
+        confidence: confidence of the bound, and of the interval, between 0 and 1.
         searched: evaluations of a search of the same space, in order, to be stated beside the bound, such as
             those of a Result.
         progress: called with the number of simulations so far.
@@ -173,10 +160,18 @@ def assess(
     if not problem.space.names:
         raise SpecError("nothing to vary; give at least one input or parameter a range")
     check_limits(problem)
-    rest = _for_splitting(budget, splitting)
-    count = _Counted(problem, progress or (lambda _: None))
-    engine = Uniform(problem, seed=seed)
-    drawn, interrupted = _drawn(count, engine, budget - rest)
+    engine, vacuity = Uniform(problem, seed=seed), Vacuity(problem)
+    drawn: list[Evaluation] = []
+    interrupted = False
+    try:
+        while len(drawn) < budget:
+            evaluation = evaluate(problem, engine.ask()[0])
+            vacuity.see(evaluation, len(drawn))
+            drawn.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
+            if progress is not None:
+                progress(len(drawn))
+    except KeyboardInterrupt:
+        interrupted = True
     judged = [e for e in drawn if e.robustness is not None]
     if not judged:
         if interrupted:
@@ -184,12 +179,6 @@ def assess(
         raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
     violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
     each = (1.0 + confidence) / 2.0
-    divided: Splitting | None = None
-    if rest and not interrupted:
-        try:
-            divided = _split(problem, count, rest, seed=seed, confidence=confidence)
-        except KeyboardInterrupt:
-            interrupted = True
     return Assurance(
         problem=problem,
         distribution=_distribution_text(problem.space),
@@ -203,65 +192,10 @@ def assess(
             upper_bound(violations + failures, len(drawn), each),
         ),
         smallest=min(judged, key=_robustness),
-        splitting=divided,
         searched=_told(searched, problem.space),
-        findings=() if violations else count.vacuity.findings(),
+        findings=() if violations else vacuity.findings(),
         interrupted=interrupted,
     )
-
-
-def _drawn(count: "_Counted", engine: Uniform, wanted: int) -> tuple[list[Evaluation], bool]:
-    """Simulate random candidates; return their evaluations, and whether the user stopped that."""
-    drawn: list[Evaluation] = []
-    try:
-        while len(drawn) < wanted:
-            drawn.append(count(engine.ask()[0]))
-    except KeyboardInterrupt:
-        return drawn, True
-    return drawn, False
-
-
-@dataclass(slots=True)
-class _Counted:
-    """Evaluates candidates without keeping trajectories, counts them, and notes what they do not test."""
-
-    problem: Problem
-    progress: Progress
-    count: int = 0
-    vacuity: Vacuity = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.vacuity = Vacuity(self.problem)
-
-    def __call__(self, candidate: Candidate) -> Evaluation:
-        evaluation = evaluate(self.problem, candidate)
-        self.vacuity.see(evaluation, self.count)
-        self.count += 1
-        self.progress(self.count)
-        return replace(evaluation, trajectory=None)
-
-
-def _for_splitting(budget: int, wanted: int | None) -> int:
-    if wanted is None:
-        return budget // 2 if budget // 2 >= least_budget() else 0
-    wanted = whole("splitting", wanted, least=0)
-    if wanted >= budget:
-        raise SpecError(
-            f"splitting: expected fewer simulations than the budget of {budget}, got {wanted}: the bound "
-            "needs some, too"
-        )
-    if 0 < wanted < least_budget():
-        raise SpecError(f"splitting: expected 0, or at least {least_budget()} simulations, got {wanted}")
-    return wanted
-
-
-def _split(problem: Problem, count: _Counted, budget: int, *, seed: int, confidence: float) -> Splitting:
-    box = UnitBox(problem.space)
-
-    def cost(point: NDArray[np.float64]) -> float:
-        return _robustness(count(box.candidate(point, origin="splitting", rationale="moved at random")))
-
-    return split(cost, box.dimension, budget=budget, seed=seed, confidence=confidence)
 
 
 def _robustness(evaluation: Evaluation) -> float:
@@ -293,16 +227,6 @@ def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | N
             drawable = UnitBox(space).represents(evaluation.candidate)
             return Searched(len(evaluations), smallest, number, drawable)
     return Searched(len(evaluations), smallest)
-
-
-def _splitting_text(found: Splitting, share: str) -> str:
-    effort = f"multilevel splitting, {counted(found.simulations, 'simulation')}"
-    if found.probability is None:
-        return f"No estimate ({effort}): it ended before a violation, which says nothing; the bound holds."
-    return (
-        f"Estimate, not a bound ({effort}): probability {found.probability:.2g}, {share} confidence interval "
-        f"{found.low:.2g} to {found.high:.2g} if a falling robustness leads to all violations."
-    )
 
 
 def _distribution_text(space: SearchSpace) -> str:

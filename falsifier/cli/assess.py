@@ -41,14 +41,7 @@ _SAID_EVERY = 100
 @problem_options
 @budget_option(_ASSESS_BUDGET)
 @click.option(
-    "--splitting",
-    type=int,
-    metavar="N",
-    help="Simulations of the budget for an estimate by multilevel splitting; default: half of a budget that "
-    "is large enough, otherwise 0.",
-)
-@click.option(
-    "--confidence", type=float, default=0.95, show_default=True, help="Confidence of bound and intervals."
+    "--confidence", type=float, default=0.95, show_default=True, help="Confidence of bound and interval."
 )
 @click.option("--requirement", metavar="NAME", help="Which one, if a run searched several requirements.")
 @seed_option()
@@ -58,7 +51,6 @@ _SAID_EVERY = 100
 def assess(
     *,
     budget: int,
-    splitting: int | None,
     confidence: float,
     requirement: str | None,
     seed: int,
@@ -72,7 +64,7 @@ def assess(
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or the
     directory of a run, whose search space is drawn from and whose findings are stated beside the
     bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
-    uniform. The upper bound is exact (Clopper and Pearson); splitting adds an estimate.
+    uniform. The upper bound is exact (Clopper and Pearson).
 
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the draws so far count.
@@ -90,7 +82,6 @@ def assess(
             budget=budget,
             seed=seed,
             confidence=confidence,
-            splitting=splitting,
             searched=searched,
             progress=said,
         )

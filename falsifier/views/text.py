@@ -218,7 +218,6 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
         "upper_bound": found.bound,
         "interval": found.interval,
         "smallest": evaluation_json(found.smallest),
-        "estimate": found.splitting and asdict(found.splitting),
         "searched": found.searched and asdict(found.searched),
         "findings": [asdict(finding) for finding in found.findings],
         "interrupted": found.interrupted,

@@ -38,25 +38,16 @@ def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
 
 def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
     found = assess(system(2.0), budget=100, confidence=0.99)
-    assert found.interval == (0.0, upper_bound(0, 100, 0.995)) and found.splitting is None
+    assert found.interval == (0.0, upper_bound(0, 100, 0.995))
     assert "between" not in found.text
     assert found.bound == pytest.approx(1 - 0.01 ** (1 / 100))
     for part in (
         "0 of 100 random simulations violate",
-        "With 99 % confidence, the probability of a violation is at most 0.045",
+        "With 99 % confidence (one-sided), the probability of a violation is at most 0.045",
         "smallest robustness of these was +1.0",
         "bias uniform in [-1, 1]",
     ):
         assert part in found.text
-
-
-def test_splitting_takes_its_part_of_the_budget_and_is_marked_as_an_estimate() -> None:
-    counts: list[int] = []
-    found = assess(system(0.998), budget=3800, splitting=3750, seed=1, progress=counts.append)
-    assert found.drawn == 50 and found.splitting is not None
-    assert counts[-1] == 50 + found.splitting.simulations <= 3800
-    assert found.splitting.low <= 1e-3 <= found.splitting.high
-    assert "Estimate, not a bound" in found.text
 
 
 def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
@@ -101,8 +92,6 @@ def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
     [
         ({"budget": 0}, "budget"),
         ({"budget": 10, "confidence": 95}, "between 0 and 1"),
-        ({"budget": 10, "splitting": 10}, "fewer simulations than the budget"),
-        ({"budget": 1000, "splitting": 20}, "expected 0, or at least"),
     ],
 )
 def test_numbers_out_of_range_are_refused(options: dict[str, float], said: str) -> None:
@@ -115,18 +104,22 @@ def test_a_problem_with_nothing_to_vary_is_refused() -> None:
         assess(lag_problem(inputs=0), budget=5)
 
 
+def interrupting(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Be stopped by the user in the first simulation."""
+    raise KeyboardInterrupt
+
+
 def test_what_was_drawn_when_the_user_stopped_counts() -> None:
     def stop(count: int) -> None:
         if count == 7:
             raise KeyboardInterrupt
 
     found = assess(system(5.0), budget=50, progress=stop)
-    # The simulation that was just counted is lost; nothing else is.
-    assert (found.drawn, found.interrupted) == (6, True)
-    assert found.bound == upper_bound(0, 6, 0.95)
+    assert (found.drawn, found.interrupted) == (7, True)
+    assert found.bound == upper_bound(0, 7, 0.95)
     assert "Stopped by the user" in found.text
     with pytest.raises(KeyboardInterrupt):
-        assess(system(5.0), budget=50, progress=lambda count: stop(7))
+        assess(lag_problem(response=interrupting), budget=50)
 
 
 def test_a_search_that_found_nothing_is_stated_beside_the_bound() -> None:
