@@ -19,10 +19,10 @@ from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import join, join_fmu
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.sections import AnyRequirement, InputSection, ModelChanges
+from falsifier.problem.sections import InputSection, ModelChanges
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import Parameterization, ProblemSource, Target
-from falsifier.problem.spec import Spec, parse_spec, read_spec
+from falsifier.problem.spec import AnyRequirement, Spec, parse_spec, read_spec
 from falsifier.problem.template_arguments import template_arguments
 
 _OPTION = "--template"

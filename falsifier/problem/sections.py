@@ -1,33 +1,18 @@
 """The sections of a spec file."""
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
-    Discriminator,
     Field,
-    Tag,
     model_validator,
 )
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
 from falsifier.fmu.systems import Extrapolation, Isolation, Loops, Method
-from falsifier.problem.templates import (
-    TEMPLATES,
-    Dwell,
-    NeverTogether,
-    Order,
-    Overshoot,
-    RampLimit,
-    Response,
-    Rise,
-    Settles,
-    StaysWithin,
-)
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -247,76 +232,6 @@ class RequirementSection(ModelChanges):
     def signals(self) -> tuple[tuple[str, str], ...]:
         """Return nothing: the formula is checked as a whole."""
         return ()
-
-
-class _TemplateChanges(ModelChanges):
-    """What a requirement by template may override."""
-
-    description: str = Field("", description="Its meaning in words.")
-
-
-class SettlesSection(_TemplateChanges, Settles):
-    """A requirement by the template ``settles``."""
-
-
-class OvershootSection(_TemplateChanges, Overshoot):
-    """A requirement by the template ``overshoot``."""
-
-
-class RiseSection(_TemplateChanges, Rise):
-    """A requirement by the template ``rise``."""
-
-
-class ResponseSection(_TemplateChanges, Response):
-    """A requirement by the template ``response``."""
-
-
-class StaysWithinSection(_TemplateChanges, StaysWithin):
-    """A requirement by the template ``stays_within``."""
-
-
-class NeverTogetherSection(_TemplateChanges, NeverTogether):
-    """A requirement by the template ``never_together``."""
-
-
-class DwellSection(_TemplateChanges, Dwell):
-    """A requirement by the template ``dwell``."""
-
-
-class RampLimitSection(_TemplateChanges, RampLimit):
-    """A requirement by the template ``ramp_limit``."""
-
-
-class OrderSection(_TemplateChanges, Order):
-    """A requirement by the template ``order``."""
-
-
-TemplateSection = (
-    Annotated[SettlesSection, Tag("<settles>")]
-    | Annotated[OvershootSection, Tag("<overshoot>")]
-    | Annotated[RiseSection, Tag("<rise>")]
-    | Annotated[ResponseSection, Tag("<response>")]
-    | Annotated[StaysWithinSection, Tag("<stays_within>")]
-    | Annotated[NeverTogetherSection, Tag("<never_together>")]
-    | Annotated[DwellSection, Tag("<dwell>")]
-    | Annotated[RampLimitSection, Tag("<ramp_limit>")]
-    | Annotated[OrderSection, Tag("<order>")]
-)
-
-
-def _kind_of_requirement(section: object) -> str | None:
-    """Return which section a requirement is; None if there is no such template."""
-    name = getattr(section, "template", None)
-    if isinstance(section, Mapping):
-        name = section.get("template")
-    if name is None:
-        return "<formula>"
-    return f"<{name}>" if name in TEMPLATES else None
-
-
-AnyRequirement = Annotated[
-    Annotated[RequirementSection, Tag("<formula>")] | TemplateSection, Discriminator(_kind_of_requirement)
-]
 
 
 class ProfileSection(ModelChanges):

@@ -10,42 +10,43 @@ these sections that sets a key wins::
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, rejected
 from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
-    AnyRequirement,
     Components,
     ComponentSection,
     Connections,
     ConnectionSection,
     ContextSection,
     CouplingSection,
-    DwellSection,
     FreeSection,
     Inputs,
     InputSection,
     ModelChanges,
     ModelSection,
-    NeverTogetherSection,
-    OrderSection,
-    OvershootSection,
     Parameters,
     ParameterSection,
     ProfileSection,
-    RampLimitSection,
     RequirementSection,
-    ResponseSection,
-    RiseSection,
-    SettlesSection,
-    StaysWithinSection,
     Strict,
 )
-from falsifier.problem.templates import TEMPLATES
+from falsifier.problem.templates import (
+    TEMPLATES,
+    Dwell,
+    NeverTogether,
+    Order,
+    Overshoot,
+    RampLimit,
+    Response,
+    Rise,
+    Settles,
+    StaysWithin,
+)
 
 Section = TypeVar("Section", bound=BaseModel)
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
@@ -66,20 +67,35 @@ _SECTIONS: Mapping[str, type[BaseModel]] = {
     "profiles": ProfileSection,
     "free": FreeSection,
     "<formula>": RequirementSection,
-    "<settles>": SettlesSection,
-    "<overshoot>": OvershootSection,
-    "<rise>": RiseSection,
-    "<response>": ResponseSection,
-    "<stays_within>": StaysWithinSection,
-    "<never_together>": NeverTogetherSection,
-    "<dwell>": DwellSection,
-    "<ramp_limit>": RampLimitSection,
-    "<order>": OrderSection,
+    **{f"<{name}>": template for name, template in TEMPLATES.items()},
 }
 # Parts of pydantic's locations that are no keys.
 _STEPS = ("tuple", "function-before")
 # Sections of which there is one, without a name of its own.
 _SINGLE = ("model", "free", "coupling", "context")
+
+
+def _kind_of_requirement(section: object) -> str | None:
+    """Return which section a requirement is; None if there is no such template."""
+    name = section.get("template") if isinstance(section, Mapping) else getattr(section, "template", None)
+    if name is None:
+        return "<formula>"
+    return f"<{name}>" if name in TEMPLATES else None
+
+
+AnyRequirement = Annotated[
+    Annotated[RequirementSection, Tag("<formula>")]
+    | Annotated[Settles, Tag("<settles>")]
+    | Annotated[Overshoot, Tag("<overshoot>")]
+    | Annotated[Rise, Tag("<rise>")]
+    | Annotated[Response, Tag("<response>")]
+    | Annotated[StaysWithin, Tag("<stays_within>")]
+    | Annotated[NeverTogether, Tag("<never_together>")]
+    | Annotated[Dwell, Tag("<dwell>")]
+    | Annotated[RampLimit, Tag("<ramp_limit>")]
+    | Annotated[Order, Tag("<order>")],
+    Discriminator(_kind_of_requirement),
+]
 
 
 class Spec(Strict):

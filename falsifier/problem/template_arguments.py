@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from math import floor, isfinite
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from falsifier.errors import FalsifierError, FormulaError
+from falsifier.problem.sections import ModelChanges
 from falsifier.stl import Formula, parse
 from falsifier.stl.expression import Arithmetic, Call, Expression, Number
 from falsifier.stl.formula import Always, And, Implies, Next, Not, Predicate, Window
@@ -32,8 +33,8 @@ class TemplateError(FalsifierError):
         super().__init__(message)
 
 
-class Grid(NamedTuple):
-    """The times at which formulas are judged; a step of 0 stands for one that is not chosen yet."""
+class Clock(NamedTuple):
+    """The end of the simulation and the step of the samples, in s; a step of 0 is not chosen yet."""
 
     stop_time: float
     step: float
@@ -108,10 +109,9 @@ Duration = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class Template(BaseModel):
-    """Arguments of one template."""
+class Template(ModelChanges):
+    """A requirement by template: its arguments, and what it overrides."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     # One line on what it requires, for lists.
     summary: ClassVar[str] = ""
     # Arguments that name signals.
@@ -119,6 +119,8 @@ class Template(BaseModel):
     conditions_in: ClassVar[tuple[str, ...]] = ()
     # Arguments that are times in s.
     times: ClassVar[tuple[str, ...]] = ()
+
+    description: str = Field("", description="Its meaning in words.")
 
     def expanded(self, stop_time: float, step: float = 0.0) -> str:
         """Return the text of the formula.
@@ -130,7 +132,7 @@ class Template(BaseModel):
         Raises:
             TemplateError: naming the argument that does not fit the simulation.
         """
-        return str(self._formula(Grid(stop_time, step)))
+        return str(self._formula(Clock(stop_time, step)))
 
     def signals(self) -> Iterator[tuple[str, str]]:
         """Yield the argument and the name of each signal in it."""
@@ -143,7 +145,7 @@ class Template(BaseModel):
                 if isinstance(text, str):
                     yield from ((key, name) for name in parse(text).signals)
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         raise NotImplementedError
 
 
@@ -174,7 +176,7 @@ def scaled(share: float, reference: Expression) -> Expression:
 
 def after_moment(
     template: Template,
-    grid: Grid,
+    clock: Clock,
     after: float | str,
     body: Callable[[float, float], Formula],
     *,
@@ -185,7 +187,7 @@ def after_moment(
 
     Args:
         template: the template, for errors.
-        grid: times of the simulation.
+        clock: end of the simulation, and step.
         after: time in s, or the condition.
         body: what must hold, given the moment and the end relative to the time of evaluation, in s.
         lasts: time in s for which it must hold; None: to the end of the simulation.
@@ -193,16 +195,16 @@ def after_moment(
     """
     if isinstance(after, str):
         assert lasts is not None
-        return each_time(template, grid, parse(after), body(0.0, lasts), lasts, during)
+        return each_time(template, clock, parse(after), body(0.0, lasts), lasts, during)
     if during is not None:
         raise TemplateError("during", "applies only if after is a condition; state the time in after")
-    end = grid.stop_time if lasts is None else after + lasts
+    end = clock.stop_time if lasts is None else after + lasts
     start = after + (getattr(template, "time", 0.0) if lasts is None else 0.0)
     needed = max(start, end)
-    if needed > grid.stop_time:
+    if needed > clock.stop_time:
         raise TemplateError(
             _longest(template),
-            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: shorten the "
+            f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: shorten the "
             "times or simulate longer",
         )
     return body(after, end)
@@ -216,7 +218,7 @@ def _longest(template: Template) -> str:
 
 def each_time(
     template: Template,
-    grid: Grid,
+    clock: Clock,
     condition: Formula,
     body: Formula,
     reach: float,
@@ -224,29 +226,29 @@ def each_time(
 ) -> Formula:
     """Return that something holds each time when a condition becomes true."""
     becomes = And(Not(condition), Next(condition))
-    window = span(template, grid, reach + grid.step, during)
+    window = span(template, clock, reach + clock.step, during)
     return Always(Implies(becomes, Next(body)), window)
 
 
-def span(template: Template, grid: Grid, reach: float, during: tuple[float, float] | None) -> Window:
+def span(template: Template, clock: Clock, reach: float, during: tuple[float, float] | None) -> Window:
     """Return the window in which it applies: the given one, or as long as the simulation allows."""
-    inner = [parse(t).horizon(grid.step) for t in _conditions(template)]
-    latest = grid.stop_time - reach - max(inner, default=0.0)
-    if grid.step:
-        latest = floor(latest / grid.step + 1e-6) * grid.step
+    inner = [parse(t).horizon(clock.step) for t in _conditions(template)]
+    latest = clock.stop_time - reach - max(inner, default=0.0)
+    if clock.step:
+        latest = floor(latest / clock.step + 1e-6) * clock.step
     start, end = during or (0.0, latest)
     if during is not None and not 0 <= start <= end:
         raise TemplateError(
             "during", f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]"
         )
-    if end > latest + 1e-9 * grid.stop_time or latest < 0:
-        needed = grid.stop_time - latest + (0.0 if during is None else end)
+    if end > latest + 1e-9 * clock.stop_time or latest < 0:
+        needed = clock.stop_time - latest + (0.0 if during is None else end)
         cure = "shorten the times or simulate longer"
         if during is not None and latest >= start:
             cure = f"end the window at {latest:g} s, {cure}"
         raise TemplateError(
             _longest(template) if during is None else "during",
-            f"needs values up to {needed:g} s, but the simulation ends at {grid.stop_time:g} s: {cure}",
+            f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: {cure}",
         )
     return window_of(start, end)
 

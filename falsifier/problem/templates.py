@@ -22,10 +22,10 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from falsifier.problem.template_arguments import (
+    Clock,
     Condition,
     Duration,
     Finite,
-    Grid,
     Margin,
     Moment,
     Template,
@@ -76,7 +76,7 @@ class Settles(Template):
     )
     during: tuple[Finite, Finite] | None = _DURING
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         inside = near(self.signal, self.reference, self.within)
         if isinstance(self.after, str) and self.stays is None:
             raise TemplateError(
@@ -87,7 +87,7 @@ class Settles(Template):
         def settled(start: float, end: float) -> Formula:
             return Always(inside, window_of(start + self.time, end))
 
-        return after_moment(self, grid, self.after, settled, lasts=stays, during=self.during)
+        return after_moment(self, clock, self.after, settled, lasts=stays, during=self.during)
 
 
 class Overshoot(Template):
@@ -109,7 +109,7 @@ class Overshoot(Template):
     )
     during: tuple[Finite, Finite] | None = _DURING
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         if isinstance(self.after, str) and self.duration is None:
             raise TemplateError(
                 "duration", "this key is missing: after a condition, say for how long it applies"
@@ -119,7 +119,7 @@ class Overshoot(Template):
         bounded = Predicate("<=", Arithmetic("-", *sides), size_of(self.at_most, reference, "at_most"))
         return after_moment(
             self,
-            grid,
+            clock,
             self.after,
             lambda start, end: Always(bounded, window_of(start, end)),
             lasts=self.duration,
@@ -159,13 +159,13 @@ class Rise(Template):
             )
         return self
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         operator: Comparison = ">=" if self.direction == "up" else "<="
         level = scaled(share_of(self.reaches) or 0.0, term(self.reference))
         reached = Predicate(operator, term(self.signal), level)
         return after_moment(
             self,
-            grid,
+            clock,
             self.after,
             lambda start, _end: Eventually(reached, window_of(start, start + self.time)),
             lasts=self.time,
@@ -190,7 +190,7 @@ class Response(Template):
     )
     during: tuple[Finite, Finite] | None = _DURING
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         then: Formula = parse(self.then)
         if self.stays:
             then = Always(then, window_of(0.0, self.stays))
@@ -198,8 +198,8 @@ class Response(Template):
         reach = self.time + self.stays
         when = parse(self.when)
         if self.on == "true":
-            return Always(Implies(when, answer), span(self, grid, reach, self.during))
-        return each_time(self, grid, when, answer, reach, self.during)
+            return Always(Implies(when, answer), span(self, clock, reach, self.during))
+        return each_time(self, clock, when, answer, reach, self.during)
 
 
 class StaysWithin(Template):
@@ -226,8 +226,8 @@ class StaysWithin(Template):
             raise ValueError(f"low is {self.low:g}, more than high, {self.high:g}: exchange them")
         return self
 
-    def _formula(self, grid: Grid) -> Formula:
-        window = span(self, grid, 0.0, self.during)
+    def _formula(self, clock: Clock) -> Formula:
+        window = span(self, clock, 0.0, self.during)
         if self.reference is not None and self.within is not None:
             return Always(near(self.signal, self.reference, self.within), window)
         signal = term(self.signal)
@@ -249,9 +249,9 @@ class NeverTogether(Template):
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions.")
     during: tuple[Finite, Finite] | None = _DURING
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         pairs: list[Formula] = [Not(And(a, b)) for a, b in combinations(map(parse, self.conditions), 2)]
-        return Always(reduce(And, pairs), span(self, grid, 0.0, self.during))
+        return Always(reduce(And, pairs), span(self, clock, 0.0, self.during))
 
 
 class Dwell(Template):
@@ -275,7 +275,7 @@ class Dwell(Template):
             raise ValueError("at_least is more than at_most")
         return self
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         condition = parse(self.condition)
         parts: list[Formula] = []
         if self.at_least is not None:
@@ -283,7 +283,7 @@ class Dwell(Template):
         if self.at_most is not None:
             parts.append(Eventually(Not(condition), window_of(0.0, self.at_most)))
         reach = max(self.at_least or 0.0, self.at_most or 0.0)
-        return each_time(self, grid, condition, reduce(And, parts), reach, self.during)
+        return each_time(self, clock, condition, reduce(And, parts), reach, self.during)
 
 
 class RampLimit(Template):
@@ -335,10 +335,10 @@ class RampLimit(Template):
             return term(self.rate)
         return Name(f"der({term(self.signal).signals[0]})")
 
-    def _formula(self, grid: Grid) -> Formula:
+    def _formula(self, clock: Clock) -> Formula:
         if self.over is None or self.range is None:
             slow = Predicate("<=", Call("abs", (self._rate(),)), Number(self.limit))
-            return Always(slow, span(self, grid, 0.0, self.during))
+            return Always(slow, span(self, clock, 0.0, self.during))
         change, signal = self.limit * self.over, term(self.signal)
         low, high = self.range
         parts: list[Formula] = []
@@ -348,7 +348,7 @@ class RampLimit(Template):
                 here = Predicate(operator, signal, Number(tidy(level)))  # type: ignore[arg-type]
                 later = Predicate(operator, signal, Number(tidy(bound)))  # type: ignore[arg-type]
                 parts.append(Implies(here, Always(later, window_of(0.0, self.over))))
-        return Always(_balanced(parts), span(self, grid, self.over, self.during))
+        return Always(_balanced(parts), span(self, clock, self.over, self.during))
 
 
 class Order(Template):
@@ -361,8 +361,8 @@ class Order(Template):
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions, in order.")
     during: tuple[Finite, Finite] | None = _DURING
 
-    def _formula(self, grid: Grid) -> Formula:
-        window = span(self, grid, 0.0, self.during)
+    def _formula(self, clock: Clock) -> Formula:
+        window = span(self, clock, 0.0, self.during)
         rest = window_of(0.0, window.end - window.start)
         parts: list[Formula] = []
         for first, later in pairwise(map(parse, self.conditions)):

@@ -6,8 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from falsifier.errors import SpecError
-from falsifier.problem.sections import InputSection, ParameterSection, RequirementSection, RiseSection
+from falsifier.problem.sections import InputSection, ParameterSection, RequirementSection
 from falsifier.problem.spec import overlay, parse_spec, read_spec
+from falsifier.problem.templates import Rise
 
 GOOD: dict[str, Any] = {
     "model": {"fmu": "a.fmu"},
@@ -133,7 +134,7 @@ def test_a_range_is_in_order_and_excludes_a_value() -> None:
 
 
 def test_a_template_is_a_requirement_with_changes_of_its_own() -> None:
-    section = RiseSection.model_validate(
+    section = Rise.model_validate(
         {"template": "rise", "signal": "y", "reference": 10, "time": 2, "stop_time": 5.0}
     )
     assert (section.signal, section.stop_time) == ("y", 5.0)
