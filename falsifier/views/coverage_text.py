@@ -8,6 +8,7 @@ from falsifier.analyses.coverage import Coverage, ModeCoverage, PairCoverage, Ra
 from falsifier.analyses.range_parts import FAST, PACES, SLOW
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, listed
+from falsifier.views.text import Fact
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8
@@ -42,6 +43,19 @@ def coverage_text(found: Coverage, name: str) -> str:
     if found.modes:
         lines += ["modes", *_aligned([_mode_row(m) for m in found.modes])]
     return "\n".join(map(one_line, lines))
+
+
+def tried_facts(found: Coverage) -> list[Fact]:
+    """Return of each input and parameter which values were tried, and which never; in one line each."""
+    never: dict[str, list[str]] = {}
+    for name, gap in _gap_rows(found):
+        never.setdefault(name, []).append(gap)
+    facts = []
+    for r in found.ranges:
+        name, bounds, values, parts, _ = _range_row(r)
+        missing = f"; never tried: {'; '.join(never[r.searched.name])}" if r.searched.name in never else ""
+        facts.append((name, f"tried {values} of {bounds}, {parts} parts{missing}"))
+    return facts
 
 
 def coverage_json(found: Coverage) -> dict[str, Any]:

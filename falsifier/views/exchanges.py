@@ -14,12 +14,10 @@ from falsifier.llm.messages import Exchange, Message
 from falsifier.llm.usage import count_tokens
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, Sample, iterations
-from falsifier.views.html import Html, el, join
+from falsifier.views.html import Html, el, join, table
 
 # Characters of a part's first line that name it.
 _LONGEST_NAME = 60
-# Notebook front ends align table cells to the right by default.
-_LEFT = "text-align: left"
 _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
@@ -134,7 +132,7 @@ def _parts(exchange: Exchange) -> Html:
                 counts[_name(part)] += count_tokens(part, exchange.llm)
     total = sum(counts.values()) or 1
     rows = [(name, str(n), f"{100 * n / total:.0f} %") for name, n in counts.items()]
-    return _table(("part of the prompt", "tokens", "share"), rows)
+    return table(("part of the prompt", "tokens", "share"), rows, label="Parts of the prompt")
 
 
 def _name(part: str) -> str:
@@ -158,20 +156,12 @@ def _times(shown: Sequence[Iteration]) -> Html:
                 "; ".join(o.text for o in one.samples),
             )
         )
-    return _table(
-        ("sample", "proposed by", "questions [s]", "other proposal time [s]", "simulation [s]", "outcome"),
-        rows,
+    header = (
+        "sample",
+        "proposed by",
+        "questions [s]",
+        "other proposal time [s]",
+        "simulation [s]",
+        "outcome",
     )
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> Html:
-    head = el("tr", *(el("th", name, scope="col", style=_LEFT) for name in header))
-    body = (el("tr", *(el("td", cell, style=_LEFT) for cell in row)) for row in rows)
-    return el(
-        "div",
-        el("table", el("thead", head), el("tbody", *body)),
-        class_="scroll",
-        tabindex="0",
-        role="region",
-        aria_label=header[0],
-    )
+    return table(header, rows, label="Time per iteration")

@@ -1,7 +1,7 @@
 """The result of a run as text or JSON."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,9 @@ from falsifier.search.parameterization import parameterization_note, parameteriz
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
 from falsifier.stl.margins import margin_words, signed
+
+# A name and what is said under it: a row of a table, or a line of text.
+Fact = tuple[str, str]
 
 
 def result_text(result: Result) -> str:
@@ -157,23 +160,39 @@ def _levels_json(result: Result) -> list[dict[str, Any]]:
 
 def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
     """Say what decided an evaluation, and what was simulated."""
-    verdict = evaluation.verdict
-    lines = []
-    if verdict is not None:
-        lines += [f"  {line}" for line in broken_rows(verdict)]
-        info = problem.info
-        values = ", ".join(
-            f"{name} = {value:g}{_unit(info[name].unit if name in info else '')}"
-            for name, value in verdict.values.items()
-        )
-        meaning = margin_words(verdict.robustness, verdict.predicate)
-        lines.append(f"  robustness     {signed(verdict.robustness)} ({meaning})")
-        lines.append(f"  critical time  {verdict.critical_time:.6g} s, decided by {verdict.predicate}")
-        lines.append(f"  values then    {values}")
-    lines += [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]
-    if evaluation.candidate.rationale:
-        lines.append(f"  rationale      {evaluation.candidate.rationale}")
-    return lines
+    units = {variable.name: variable.unit for variable in problem.info.variables}
+    facts = verdict_facts(evaluation.verdict, units)
+    facts += [("rationale", evaluation.candidate.rationale)] if evaluation.candidate.rationale else []
+    lines = fact_lines(facts)
+    at = len(lines) - bool(evaluation.candidate.rationale)
+    inputs = [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]
+    return [*lines[:at], *inputs, *lines[at:]]
+
+
+def verdict_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
+    """Return what broke, the robustness, what decided it and when, with the values then.
+
+    Args:
+        verdict: the verdict; without one, there is nothing to tell.
+        units: units of the signals, by name; those without one may be missing.
+    """
+    if verdict is None:
+        return []
+    values = (f"{name} = {value:.6g} {units.get(name, '')}".strip() for name, value in verdict.values.items())
+    return [
+        *(("what broke" if k == 0 else "", line) for k, line in enumerate(broken_lines(verdict))),
+        (
+            "robustness",
+            f"{signed(verdict.robustness)} ({margin_words(verdict.robustness, verdict.predicate)})",
+        ),
+        ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
+        ("values then", ", ".join(values)),
+    ]
+
+
+def fact_lines(facts: Iterable[Fact]) -> list[str]:
+    """Return facts as rows of text."""
+    return [f"  {name:<14} {text}" for name, text in facts]
 
 
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
@@ -258,7 +277,3 @@ def seconds_text(spent: Spent) -> str:
         f"{spent.seconds:.1f} s; simulator {spent.simulation_seconds:.2f} s, "
         f"engine {spent.engine_seconds:.2f} s"
     )
-
-
-def _unit(unit: str) -> str:
-    return f" {unit}" if unit else ""

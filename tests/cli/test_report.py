@@ -17,7 +17,7 @@ def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> N
     assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
     run = next((tmp_path / "c" / "runs").iterdir())
     command("report", str(run), "-o", "one.html")
-    assert "1 requirement, 1 run," in (tmp_path / "one.html").read_text()
+    assert "1 of 1 requirement violated, 1 run," in (tmp_path / "one.html").read_text()
 
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:

@@ -126,5 +126,5 @@ def test_findings_are_on_the_terminal_in_json_and_in_reports(tmp_path: Path) -> 
     assert result_json(result)["findings"][0]["simulation"] == result.findings[0].simulation
     assert result_json(result)["parameterization"] == "fixed"
     assert load_run(tmp_path).findings == result.findings
-    assert "what this does not show" in markdown_report(tmp_path)
+    assert "What this does not show" in markdown_report(tmp_path)
     assert "The condition x &gt;= 2 never held" in html_report(tmp_path)

@@ -49,7 +49,7 @@ def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path)
     assert "2 questions before sample 2, 1500 tokens, 3 s: robustness +" in html
     assert "no idea" in html and "<b>Rejected: </b>" in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt; answer 1" in html and EVIL not in html
-    assert '<td style="text-align: left">samples</td>' in html
+    assert '<th scope="row" style="text-align: left">samples</th>' in html
     assert "as in the question before" in html
     assert html.count("You search for a counterexample") == 1 + 7, "the text once, its share in each question"
 
@@ -58,7 +58,7 @@ def test_the_time_of_each_iteration_is_told(run: Path) -> None:
     times = exchanges_html(run, name(), most=10).partition('class="times"')[2]
     rows = times.partition("<tbody>")[2].split("<tr>")[1:]
     assert len(rows) == 6
-    questions = [re.findall(r">([^<]*)</td>", row)[2] for row in rows]
+    questions = [re.findall(r">([^<]*)</td>", row)[1] for row in rows]
     assert questions == ["1.5", "3", "1.5", "1.5", "1.5", "1.5"]
 
 
@@ -74,7 +74,7 @@ def test_the_report_and_a_notebook_show_them(run: Path) -> None:
     page = html_report(run)
     assert "What was asked, and what came of it" in page
     assert page.count('class="exchange"') == 6
-    assert "questions included, on average" in page
+    assert "questions included" in page
     result = falsify(impossible(), llm=ScriptedChat(script), budget=2, directory=run.parent / "second")
     assert result_html(result).count('class="exchange"') == 2
 

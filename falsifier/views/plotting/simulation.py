@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # In inches; and the number of characters of a title's line.
-_PANEL_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 0.18, 110
+_PANEL_HEIGHT, _INPUT_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
 # A margin below this share of a panel's height is enlarged, with this share of the simulated time around it.
 _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
@@ -107,9 +107,10 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
     """
     from matplotlib.figure import Figure
 
-    height = _PANEL_HEIGHT * len(drawn) + _LINE_HEIGHT * (title.count("\n") + 1)
+    heights = [_PANEL_HEIGHT if panel.limits is None else _INPUT_HEIGHT for panel in drawn]
+    height = sum(heights) + _LINE_HEIGHT * (title.count("\n") + 1)
     figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
-    axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False)[:, 0]
+    axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     group = ""
     for ax, panel in zip(axes, drawn, strict=True):
         plot_panel(ax, panel, _decided_colour(verdict))

@@ -8,7 +8,8 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.report.content import replay_command, run_command, searches, unshown
+from falsifier.views.report.commands import replay_command, run_command
+from falsifier.views.report.content import searches, unshown
 from falsifier.views.text import broken_lines
 
 

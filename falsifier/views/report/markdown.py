@@ -1,61 +1,105 @@
-"""The report as Markdown, short enough for a pull request."""
+"""The report as Markdown, in the order of the page and short enough for a pull request."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
-from falsifier.core.words import counted
-from falsifier.stl.margins import signed
+from falsifier.views.report.commands import replay_command, run_command
 from falsifier.views.report.content import (
-    Content,
     Section,
+    Shown,
+    Side,
+    advice,
     gather,
-    replay_command,
-    run_command,
+    input_table,
+    limit_facts,
+    result_text,
+    tried,
+    trouble_lines,
     unshown_lines,
 )
+from falsifier.views.text import Fact, verdict_facts
 
 
-def markdown_report(directory: Path) -> str:
-    """Summarize a run or a campaign.
+def markdown_report(*directories: Path) -> str:
+    """Summarize runs or campaigns; several are compared.
 
     Raises:
-        JournalError: if the directory is neither, or is damaged.
+        JournalError: if a directory is neither, or is damaged.
     """
-    content = gather(directory)
-    parts = [f"# Falsification report: {markdown_text(content.title)}", content.table.markdown().rstrip()]
-    parts += [_section(section) for section in content.sections if any(r.falsified for r in section.runs)]
-    parts += [_unshown(section) for section in content.sections if unshown_lines(section)]
-    return "\n\n".join([*parts, _environment(content)]) + "\n"
+    content = gather(*directories)
+    parts = [f"# Falsification report: {markdown_text(content.title)}"]
+    for name, sections in content.requirements.items():
+        for side, section in zip(content.sides, sections, strict=True):
+            where = f" in {markdown_text(side.title)}" if len(sections) > 1 else ""
+            if section is None:
+                parts.append(f"## {markdown_text(name)}{where}: not searched")
+            else:
+                parts += _verdict(section, where)
+    parts += [side.table.markdown().rstrip() for side in content.sides if side.table is not None]
+    return "\n\n".join([*parts, *map(_environment, content.sides)]) + "\n"
 
 
-def _unshown(section: Section) -> str:
-    """What the searches of a requirement could not show."""
-    items = [f"- {markdown_text(one_line(line))}" for line in unshown_lines(section)]
-    return "\n".join([f"## {markdown_text(section.heading)}: what this does not show", "", *items])
+def _verdict(section: Section, where: str) -> list[str]:
+    """What a card of the page shows, without its picture."""
+    parts = [
+        f"## {markdown_text(section.heading)}{where}: {section.status}",
+        markdown_text(one_line(section.sentence)),
+        f"**{_capital(markdown_text(one_line(result_text(section))))}.**",
+    ]
+    if section.shown:
+        parts += _found(section.shown[0])
+    if section.status != "violated":
+        parts += _listed("What was tried", (f"{name}: {text}" for name, text in tried(section)))
+        parts += _listed("What this does not show", unshown_lines(section))
+    parts += _listed("Incomplete runs and unconfirmed violations", trouble_lines(section))
+    parts.append(markdown_code(section.formula))
+    if section.shown:
+        run = section.shown[0].run
+        commands = [replay_command(run)] if run.falsified else []
+        commands.append(run_command(run.manifest.request, shared=run.shared))
+        listing = "\n".join(map(one_line, commands))
+        parts.append(f"```sh\n{listing}\n```")
+    return parts
 
 
-def _section(section: Section) -> str:
-    """A falsified requirement, with the counterexample found in the fewest simulations."""
-    run = min((run for run in section.runs if run.falsified), key=lambda run: run.simulations)
-    lines = [f"## {markdown_text(section.heading)}: falsified", markdown_code(section.formula)]
-    if run.verdict is not None:
-        if run.verdict.breach is not None:
-            lines.append(f"What broke: {markdown_text(one_line(run.verdict.breach.text))}.")
-        lines.append(
-            f"Robustness {signed(run.verdict.robustness)} at t = {run.verdict.critical_time:.6g} s, "
-            f"decided by {markdown_code(run.verdict.predicate)}, after "
-            f"{counted(run.simulations, 'simulation')} with {markdown_text(run.method.label)}, "
-            f"seed {run.seed}."
+def _found(shown: Shown) -> list[str]:
+    parts = [_facts(limit_facts(shown.verdict, shown.units))] if shown.verdict else []
+    if shown.candidate.signals:
+        parts.append(input_table(shown).markdown().rstrip())
+    if shown.candidate.parameters:
+        parts.append(
+            _facts(
+                (f"{n} =", f"{v:.10g} {shown.units.get(n, '')}")
+                for n, v in shown.candidate.parameters.items()
+            )
         )
-    commands = (replay_command(run), run_command(run.manifest.request, shared=run.shared))
-    listing = "\n".join(map(one_line, commands))
-    lines.append(f"```sh\n{listing}\n```")
-    return "\n\n".join(lines)
+    if shown.explanation:
+        parts.append(markdown_text(one_line(shown.explanation)))
+    if shown.run.falsified:
+        parts.append(f"Confirmed: {markdown_text(one_line(shown.run.reason))}.")
+    parts.append(_facts(verdict_facts(shown.verdict, shown.units)))
+    if advice(shown):
+        parts.append(f"Simpler, and explained: {markdown_code(advice(shown))}")
+    return parts
 
 
-def _environment(content: Content) -> str:
-    if not content.runs:
+def _facts(facts: Iterable[Fact]) -> str:
+    return "\n".join(f"- {markdown_text(one_line(f'{name} {text}'.strip()))}" for name, text in facts)
+
+
+def _listed(title: str, lines: Iterable[str]) -> list[str]:
+    items = [f"- {markdown_text(one_line(line))}" for line in lines]
+    return ["\n".join([f"{title}:", "", *items])] if items else []
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _environment(side: Side) -> str:
+    if not side.runs:
         return "No run has started yet."
-    manifest = content.runs[0].manifest
+    manifest = side.runs[0].manifest
     packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
     return f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}."

@@ -1,166 +1,332 @@
-"""The report as one self-contained HTML page.
-
-Its only scripts are the plotting library's and the one that calls it; its policy forbids all others and
-the network.
-"""
+"""The report as one self-contained HTML page, which runs no script and asks no network for anything."""
 
 from base64 import b64encode
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
-from falsifier.core.words import choices, counted
+from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
-from falsifier.views.html import Html, el, join
+from falsifier.views.html import Html, el, join, picture, table
+from falsifier.views.report.commands import replay_command, run_command
 from falsifier.views.report.content import (
     Content,
     Section,
     Shown,
+    Side,
+    Status,
+    advice,
     gather,
+    input_table,
     level_facts,
-    outcome,
-    replay_command,
-    run_command,
+    limit_facts,
+    result_text,
+    run_name,
     searches,
+    tried,
+    trouble_lines,
     unshown_lines,
 )
-from falsifier.views.report.figures import history_figure, rate_figure, simulation_figures
-from falsifier.views.report.plots import columns, scripts
+from falsifier.views.text import Fact, verdict_facts
 
-_HINT = (
-    "Plots: drag a rectangle to zoom, point at a curve to read its values; the buttons beside a plot "
-    "move it, zoom with the wheel, reset and save it. The plots of one simulation are zoomed together."
-)
-# Maximum number of runs per requirement, and of questions on the whole page, that are shown: a prompt has
-# some 20 kB, and a page that is sent around should stay below a few MB.
-_MOST_TALKS = 3
-_MOST_QUESTIONS = 30
+if TYPE_CHECKING:
+    from falsifier.views.plotting import Figure
 
-# Columns of the table that name a row, and those that are folded away so that the others fit on a screen.
+# Maximum number of counterexamples of a requirement that are drawn, of runs whose questions are shown, and of
+# questions on the whole page: a page that is sent around should stay below a few MB.
+_MOST_DRAWN, _MOST_TALKS, _MOST_QUESTIONS = 3, 3, 30
+# Longer tables of inputs are folded.
+_MOST_ROWS = 12
+
+_BADGES: dict[Status, str] = {
+    "violated": "violated",
+    "not violated": "no violation found",
+    "not finished": "not finished",
+    "failed": "failed",
+}
+# Columns of the table of statistics that name a row, and those that are folded away so that the others fit.
 _KEYS = ("requirement", "method")
 _FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
-def html_report(directory: Path) -> str:
-    """Report on a run or a campaign.
+def html_report(*directories: Path) -> str:
+    """Report on runs or campaigns; several are compared side by side.
 
     Raises:
-        JournalError: if the directory is neither, or is damaged.
+        JournalError: if a directory is neither, or is damaged.
     """
-    return page(gather(directory))
+    return page(gather(*directories))
 
 
 def page(content: Content) -> str:
-    """Lay out a report."""
-    run = scripts() if content.sections else []
-    fineness = columns(sum(len(shown.panels) for section in content.sections for shown in section.shown))
-    asking = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in content.sections)
-    most = max(1, _MOST_QUESTIONS // max(1, asking))
+    """Lay out a report: verdicts first, then what they rest on."""
+    talks = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in _sections(content))
+    most = max(1, _MOST_QUESTIONS // max(1, talks))
+    names = list(content.requirements)
+    return document(
+        f"Falsification report: {content.title}",
+        el("a", "Skip to the results", href="#verdicts", class_="skip"),
+        el("header", el("h1", content.title), *(el("p", overview(side)) for side in content.sides)),
+        _navigation(names) if len(names) > 1 else Html(""),
+        el(
+            "main",
+            el(
+                "div",
+                *(
+                    _verdicts(content, name, sections, most)
+                    for name, sections in content.requirements.items()
+                ),
+                id="verdicts",
+            ),
+            *(_statistics(side) for side in content.sides),
+            *(_environment(side) for side in content.sides),
+        ),
+    )
+
+
+def document(title: str, *body: Html, script: str = "") -> str:
+    """Return a page with the style of reports, whose policy forbids all scripts but this one.
+
+    Args:
+        title: title of the page.
+        body: content.
+        script: a script that may ask the page's own server for more.
+    """
+    digest = b64encode(sha256(script.encode()).digest()).decode()
+    allowed = f"script-src 'sha256-{digest}'; connect-src 'self'; " if script else ""
+    policy = f"default-src 'none'; {allowed}style-src 'unsafe-inline'; img-src data:"
     style = Html(files("falsifier.views.report").joinpath("style.css").read_text(encoding="utf-8"))
-    title = f"Falsification report: {content.title}"
     head = el(
         "head",
         el("meta", charset="utf-8"),
         el("meta", name="viewport", content="width=device-width, initial-scale=1"),
         el("meta", name="color-scheme", content="light dark"),
-        el("meta", http_equiv="Content-Security-Policy", content=_policy(run)),
+        el("meta", http_equiv="Content-Security-Policy", content=policy),
         el("title", title),
         el("style", style),
     )
-    body = el(
-        "body",
-        el("a", "Skip to the results", href="#requirements", class_="skip"),
-        el("header", el("h1", title), el("p", _overview(content))),
-        _navigation(content),
-        el(
-            "main",
-            _requirements(content),
-            _summary(content),
-            *(_section(section, fineness, most) for section in content.sections),
-            _environment(content),
-        ),
-        *(el("script", Html(text)) for text in run),
-    )
-    return f"<!DOCTYPE html>\n{el('html', head, body, lang='en')}\n"
+    last = [el("script", Html(script))] if script else []
+    return f"<!DOCTYPE html>\n{el('html', head, el('body', *body, *last), lang='en')}\n"
 
 
-def _policy(scripts: list[str]) -> str:
-    """Content Security Policy: these scripts by their hash, styles and pictures of the page, nothing else."""
-    hashes = [b64encode(sha256(text.encode()).digest()).decode() for text in scripts]
-    allowed = " ".join(f"'sha256-{digest}'" for digest in hashes) or "'none'"
-    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data: blob:"
-
-
-def _overview(content: Content) -> str:
-    runs = content.runs
-    falsified = sum(run.falsified for run in runs)
+def overview(side: Side) -> str:
+    """Say in one line what a directory contains."""
+    runs = side.runs
     failed = sum(run.status == "failed" for run in runs)
     open_ = sum(not run.finished for run in runs) - failed
-    started = min((run.manifest.started for run in runs), default="")
+    violated = sum(section.status == "violated" for section in side.sections)
     parts = [
-        counted(len(content.sections), "requirement"),
-        f"{counted(len(runs), 'run')}, {falsified} falsified",
+        f"{side.title}: {violated} of {counted(len(side.sections), 'requirement')} violated",
+        counted(len(runs), "run"),
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
         total(run.spent for run in searches(runs)).simulations_text,
-        f"started {started}",
+        f"started {min((run.manifest.started for run in runs), default='')}",
     ]
     return ", ".join(parts) + "."
 
 
-def _navigation(content: Content) -> Html:
-    names = {"requirements": "Requirements", "summary": "Numbers"}
-    names |= {_anchor(section): section.name for section in content.sections} | {"environment": "Environment"}
-    links = [el("li", el("a", name, href=f"#{anchor}")) for anchor, name in names.items()]
-    return el("nav", el("ul", *links), aria_label="Sections")
+def drawn(make: "Callable[[], Figure]", description: str) -> Html:
+    """Draw a figure into the page; if it cannot be drawn, say so."""
+    from falsifier.views.plotting import svg
+
+    try:
+        content = svg(make())
+    except Exception as error:  # whatever a drawing library thinks of values and names that others chose
+        return el("p", f"Not drawn: {error}", class_="note")
+    return el("figure", picture(content, "svg+xml", description))
 
 
-def _requirements(content: Content) -> Html:
-    """One line per requirement: what came of it, and what it means."""
-    rows = tuple((s.name, outcome(s), s.description or s.formula) for s in content.sections)
-    table = Table("Requirements", ("requirement", "result", "meaning"), rows)
+def facts_html(facts: Iterable[Fact]) -> Html:
+    """Show names and what is said under them."""
+    return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
+
+
+def card_html(section: Section, *, title: str = "", more: Sequence[Html] = ()) -> Html:
+    """Show the verdict on a requirement: what was found, or what was tried.
+
+    Args:
+        section: the requirement.
+        title: heading of the card; without one, that of the requirement.
+        more: what stands below.
+    """
+    status = section.status
+    found = _found(section.shown[0]) if section.shown else []
     return el(
-        "section", el("h2", "Requirements"), _table(table, _anchors(content), "words"), id="requirements"
+        "article",
+        el("h2", title or section.heading, " ", el("span", _BADGES[status], class_="badge")),
+        el("p", section.sentence, class_="sentence"),
+        el("p", result_text(section), class_="result"),
+        *found,
+        *(_untested(section) if status != "violated" else ()),
+        _lines("Incomplete runs and unconfirmed violations", list(trouble_lines(section))),
+        *more,
+        class_=f"card {status.replace(' ', '-')}",
     )
 
 
-def _summary(content: Content) -> Html:
-    anchors, table = _anchors(content), content.table
-    main = table.only(*(name for name in table.header if name not in _FOLDED))
-    folded = table.only(*(name for name in table.header if name in (*_KEYS, *_FOLDED)))
+def _sections(content: Content) -> list[Section]:
+    return [section for side in content.sides for section in side.sections]
+
+
+def _navigation(names: Sequence[str]) -> Html:
+    links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in names]
+    return el("nav", el("ul", *links), aria_label="Requirements")
+
+
+def _anchor(name: str) -> str:
+    return f"requirement-{file_name(name)}"
+
+
+def _verdicts(content: Content, name: str, sections: Sequence[Section | None], most: int) -> Html:
+    """The cards of one requirement, side by side if several directories are compared."""
+    cards = []
+    for side, section in zip(content.sides, sections, strict=True):
+        title = f"{section.heading if section else name}: {side.title}" if len(sections) > 1 else ""
+        if section is None:
+            cards.append(
+                el("article", el("h2", title), el("p", "Not searched here.", class_="note"), class_="card")
+            )
+        else:
+            cards.append(card_html(section, title=title, more=[_details(section, most)]))
+    return el("section", *cards, id=_anchor(name), class_="sides")
+
+
+def _found(shown: Shown) -> list[Html]:
+    """What violates, or came nearest: limit and value, picture, inputs, why, and whether it is confirmed."""
+    run, verdict = shown.run, shown.verdict
+    what = "counterexample" if run.falsified else "simulation nearest to a violation"
+    named = f"The shrunk {what}" if shown.is_shrunk else f"The {what}"
+    if shown.panels:
+        seen = _simulation(shown)
+    else:
+        lost = "its file is damaged or missing" if shown.is_lost else "its trajectory was not kept"
+        seen = el("p", f"{named} is not shown: {lost}.", class_="note")
+    inputs = input_table(shown)
+    listed = table(inputs.header, inputs.rows, label=inputs.title, numbers=True)
+    if len(inputs.rows) > _MOST_ROWS:
+        listed = el("details", el("summary", f"Table of {counted(len(inputs.rows), 'row')}"), listed)
+    parameters = facts_html(
+        (f"{n} =", f"{v:.10g} {shown.units.get(n, '')}".strip())
+        for n, v in shown.candidate.parameters.items()
+    )
+    return [
+        el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else Html(""),
+        el("h3", named),
+        seen,
+        el("h3", "Inputs, as they are entered in a simulator"),
+        listed if inputs.rows else Html(""),
+        parameters if shown.candidate.parameters else Html(""),
+        join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else Html(""),
+        facts_html([("confirmed", run.reason)]) if run.falsified else Html(""),
+        el("p", "Simpler, and explained: ", el("code", advice(shown)), class_="note")
+        if advice(shown)
+        else Html(""),
+    ]
+
+
+def _simulation(shown: Shown) -> Html:
+    from falsifier.views.plotting import plot_panels
+
+    names = ", ".join(panel.title for panel in shown.panels)
+    return drawn(lambda: plot_panels(shown.panels, shown.verdict), f"over time: {names}")
+
+
+def _untested(section: Section) -> list[Html]:
+    """What was tried without a violation, and what was not tested."""
+    what = tried(section)
+    return [
+        join(el("h3", "What was tried"), facts_html(what)) if what else Html(""),
+        _lines("What this does not show", unshown_lines(section)),
+    ]
+
+
+def _lines(title: str, lines: Sequence[str]) -> Html:
+    return join(el("h3", title), el("ul", *(el("li", line) for line in lines))) if lines else Html("")
+
+
+def _details(section: Section, most: int) -> Html:
+    """What a verdict rests on: formula, runs, robustness over simulations, other finds, questions."""
+    from falsifier.views.plotting import plot_history, plot_rates
+
+    runs, first = section.runs, section.shown[:1]
+    held = held_text(runs[0].manifest.not_searched)
+    histories = [
+        drawn(partial(plot_history, *members), f"Robustness over simulations, {label}")
+        for label, members in section.by_method.items()
+    ]
+    rates = drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations")
     return el(
-        "section",
-        el("h2", "Numbers"),
-        _table(main, anchors),
-        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded, anchors)),
-        *(el("p", note, class_="note") for note in content.table.notes),
-        el("p", _HINT, class_="note hint"),
-        id="summary",
+        "details",
+        el("summary", f"Formula, {counted(len(runs), 'run')}, engines and seeds"),
+        el("p", el("code", section.formula), class_="formula"),
+        *(_shown_details(one) for one in first),
+        facts_html([("not searched", held)]) if held else Html(""),
+        _runs(runs),
+        *histories,
+        rates if len(runs) > 1 else Html(""),
+        *(_other(one) for one in section.shown[1:_MOST_DRAWN]),
+        _questions(section, most),
+        class_="more",
     )
 
 
-def _anchors(content: Content) -> dict[str, str]:
-    return {section.name: _anchor(section) for section in content.sections}
+def _runs(runs: Sequence[Run]) -> Html:
+    rows = [
+        (
+            run_name(run),
+            run.status,
+            run.spent.simulations_text,
+            signed(run.verdict.robustness) if run.verdict else "–",
+            _seconds(run),
+            replay_command(run) if run.falsified else run.reason,
+        )
+        for run in runs
+    ]
+    header = ("run", "ended", "simulations", "robustness", "seconds on average", "replay, or why it ended")
+    return table(header, rows, label="Runs")
 
 
-def _table(table: Table, anchors: dict[str, str], kind: str = "") -> Html:
-    header = el("tr", *(el("th", name, scope="col") for name in table.header))
-    rows = []
-    for row in table.rows:
-        first = el("a", row[0], href=f"#{anchors[row[0]]}") if row[0] in anchors else row[0]
-        rows.append(el("tr", el("th", first, scope="row"), *(el("td", cell) for cell in row[1:])))
-    body = el("table", el("thead", header), el("tbody", *rows), class_=kind or None)
-    return _scrolling(body, table.title)
+def _seconds(run: Run) -> str:
+    """Mean times of a run."""
+    if not run.simulations:
+        return "–"
+    spent, count = run.spent, run.simulations
+    asked = ", questions included" if spent.calls else ""
+    return (
+        f"simulation {spent.simulation_seconds / count:.3g}, "
+        f"proposal {spent.engine_seconds / count:.3g}{asked}"
+    )
 
 
-def _scrolling(content: Html, label: str) -> Html:
-    """Wide content in its own scrolling region, reachable by keyboard."""
-    return el("div", content, class_="scroll", tabindex="0", role="region", aria_label=label)
+def _shown_details(shown: Shown) -> Html:
+    """What engineers of searches ask about a simulation, and how it is repeated."""
+    run, rationale = shown.run, shown.candidate.rationale
+    facts = [*verdict_facts(shown.verdict, shown.units), *level_facts(run)]
+    facts += [("rationale", rationale)] if rationale else []
+    commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
+    if run.falsified:
+        commands.insert(0, ("replay it", replay_command(run)))
+    coded = el("dl", *(join(el("dt", name), el("dd", el("code", text))) for name, text in commands))
+    return join(facts_html(facts), coded)
+
+
+def _other(shown: Shown) -> Html:
+    """A counterexample of another run."""
+    return el(
+        "details",
+        el("summary", f"{run_name(shown.run)}: after {shown.run.spent.simulations_text}"),
+        *_found(shown),
+        _shown_details(shown),
+    )
 
 
 def _questions(section: Section, most: int) -> Html:
@@ -169,115 +335,37 @@ def _questions(section: Section, most: int) -> Html:
     if not asked:
         return Html("")
     parts = [
-        join(
-            el("h4", f"{run.method.label}, seed {run.seed}"),
-            exchanges_html(run.directory, run.requirement, most=most),
-        )
+        join(el("h4", run_name(run)), exchanges_html(run.directory, run.requirement, most=most))
         for run in asked[:_MOST_TALKS]
     ]
-    rest = "".join(
-        f" {run.method.label}, seed {run.seed}: falsifier report {run.directory}."
-        for run in asked[_MOST_TALKS:]
-    )
+    rest = "".join(f" {run_name(run)}: falsifier report {run.directory}." for run in asked[_MOST_TALKS:])
     note = el("p", f"Not shown here:{rest}", class_="note") if rest else Html("")
     return join(el("h3", "What was asked, and what came of it"), *parts, note)
 
 
-def _section(section: Section, fineness: int, most: int) -> Html:
-    drawn = [history_figure(runs, label) for label, runs in section.by_method.items()]
-    if len(section.runs) > 1:
-        drawn.append(rate_figure(section.by_method))
-    found = any(shown.run.falsified for shown in section.shown)
-    title = "Counterexamples" if found else "Closest to a violation"
+def _statistics(side: Side) -> Html:
+    if side.table is None:
+        return Html("")
+    main = side.table.only(*(name for name in side.table.header if name not in _FOLDED))
+    folded = side.table.only(*(name for name in side.table.header if name in (*_KEYS, *_FOLDED)))
     return el(
         "section",
-        el("h2", section.heading),
-        el("p", section.description) if section.description else Html(""),
-        el("p", el("code", section.formula), class_="formula")
-        if section.heading == section.name
-        else Html(""),
-        *drawn,
-        el("h3", title),
-        *(_shown(shown, fineness, opened=i == 0) for i, shown in enumerate(section.shown)),
-        _questions(section, most),
-        _findings(section),
-        _troubles(section),
-        id=_anchor(section),
+        el("h2", f"Statistics: {side.title}"),
+        _table(main),
+        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded)),
+        *(el("p", note, class_="note") for note in side.table.notes),
+        class_="statistics",
     )
 
 
-def _shown(shown: Shown, fineness: int, *, opened: bool) -> Html:
-    run, verdict = shown.run, shown.run.verdict
-    robustness = f"robustness {signed(verdict.robustness)}" if verdict else "no verdict"
-    heading = f"{run.method.label}, seed {run.seed}: {run.spent.simulations_text}, {robustness}"
-    facts: list[tuple[str, str]] = [("confirmed" if run.falsified else run.status, run.reason)]
-    if verdict is not None:
-        values = ", ".join(f"{name} = {value:.6g}" for name, value in verdict.values.items())
-        facts += [("what broke", verdict.breach.text)] if verdict.breach else []
-        facts += [
-            ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
-            ("values then", values),
-        ]
-    facts += [(f"{c.role} {c.label}", c.text) for c in choices(shown.candidate)]
-    if run.simulations:
-        facts.append(("time per iteration", _time(run)))
-    if shown.is_lost:
-        facts.append(("trajectory", "not shown: its file is damaged or missing"))
-    facts += level_facts(run)
-    facts += [("not searched", held_text(run.manifest.not_searched))] if run.manifest.not_searched else []
-    commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
-    if run.falsified:
-        commands.insert(0, ("replay the counterexample", replay_command(run)))
-    rationale = shown.candidate.rationale
-    return el(
-        "details",
-        el("summary", heading),
-        simulation_figures(shown.panels, verdict.moment if verdict else None, fineness),
-        _facts(facts),
-        el("blockquote", rationale, title="the engine's rationale") if rationale else Html(""),
-        el("dl", *(join(el("dt", k), el("dd", el("code", v))) for k, v in commands)),
-        open="" if opened else None,
-    )
+def _table(shown: Table) -> Html:
+    rows = [(el("a", first, href=f"#{_anchor(first)}"), *rest) for first, *rest in shown.rows]
+    return table(shown.header, rows, label=shown.title, numbers=True)
 
 
-def _time(run: Run) -> str:
-    """Mean times of a run."""
-    spent, count = run.spent, run.simulations
-    return (
-        f"simulation {spent.simulation_seconds / count:.3g} s, proposal {spent.engine_seconds / count:.3g} s"
-        f"{', questions included' if spent.calls else ''}, on average"
-    )
-
-
-def _facts(facts: list[tuple[str, str]]) -> Html:
-    return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
-
-
-def _findings(section: Section) -> Html:
-    """What the searches could not show."""
-    items = [el("li", line) for line in unshown_lines(section)]
-    return join(el("h3", "What this does not show"), el("ul", *items)) if items else Html("")
-
-
-def _troubles(section: Section) -> Html:
-    """Runs that failed or were interrupted, and violations that were not confirmed."""
-    items = [
-        el("li", f"{run.method.label}, seed {run.seed}: {run.status}: {run.reason}")
-        for run in section.runs
-        if run.status in ("failed", "interrupted")
-    ]
-    items += [
-        el("li", f"{run.method.label}, seed {run.seed}, simulation {index + 1}: {outcome}")
-        for run in section.runs
-        for index, outcome in run.unconfirmed.items()
-    ]
-    title = "Incomplete runs and unconfirmed violations"
-    return join(el("h3", title), el("ul", *items)) if items else Html("")
-
-
-def _environment(content: Content) -> Html:
+def _environment(side: Side) -> Html:
     facts: dict[str, str] = {}
-    for manifest in (run.manifest for run in content.runs):
+    for manifest in (run.manifest for run in side.runs):
         facts |= {
             "falsifier": manifest.falsifier,
             "Python": manifest.python,
@@ -285,8 +373,4 @@ def _environment(content: Content) -> Html:
             **manifest.packages,
             **{path: f"SHA-256 {digest}" for path, digest in manifest.hashes.items()},
         }
-    return el("section", el("h2", "Environment"), _facts(list(facts.items())), id="environment")
-
-
-def _anchor(section: Section) -> str:
-    return f"requirement-{file_name(section.name)}"
+    return el("details", el("summary", f"Versions and files: {side.title}"), facts_html(facts.items()))

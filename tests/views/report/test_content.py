@@ -9,7 +9,8 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.report import junit_report, markdown_report
-from falsifier.views.report.content import gather, run_command
+from falsifier.views.report.commands import run_command
+from falsifier.views.report.content import gather
 from falsifier.views.report.page import html_report
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import mostly_broken
@@ -17,9 +18,9 @@ from tests.problems import mostly_broken
 
 def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) -> None:
     record_ad_hoc(tmp_path, {"a": "G (y <= 5)", "b": "G (y <= 6)"})
-    assert [s.heading for s in gather(tmp_path).sections] == ["stl-1: G (y <= 5)", "stl-2: G (y <= 6)"]
-    assert [s.heading for s in gather(tmp_path / "a").sections] == ["G (y <= 5)"]
-    assert "<h2>stl-2: G (y &lt;= 6)</h2>" in html_report(tmp_path)
+    headings = [[s.heading for s in gather(place).sides[0].sections] for place in (tmp_path, tmp_path / "a")]
+    assert headings == [["stl-1: G (y <= 5)", "stl-2: G (y <= 6)"], ["G (y <= 5)"]]
+    assert "<h2>stl-2: G (y &lt;= 6) " in html_report(tmp_path)
 
 
 def test_a_search_can_be_repeated_from_its_command() -> None:
