@@ -13,7 +13,7 @@ COPY specs ./specs
 COPY fmus ./fmus
 RUN pip install --no-cache-dir -c constraints.txt . && falsifier --version
 
-# Any user may write here: compiled loops, pictures' fonts and replies of language models are kept in it.
+# Any user may write here: pictures' fonts and replies of language models are kept in it.
 ENV HOME=/home/falsifier
 RUN useradd --create-home falsifier && chmod 1777 /home/falsifier
 USER falsifier

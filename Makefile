@@ -10,7 +10,7 @@ PIP_INSTALL := install --quiet --disable-pip-version-check --no-compile
 # of processor time instead of 6, and most others three to five times as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test lint types types-linux types-win32 types-darwin compiled pytest docs notebooks fmus worker clean
+.PHONY: demo test lint types types-linux types-win32 types-darwin pytest docs notebooks fmus worker clean
 
 # `falsifier run` exits with 1 if it falsified the requirement, which is what the demo expects.
 demo: .venv/installed
@@ -18,7 +18,7 @@ demo: .venv/installed
 
 # Two cores share what comes before the tests, as the tests then do.
 test:
-	+$(MAKE) --no-print-directory --jobs=2 --output-sync=target .venv/test .venv-export/installed compiled types lint
+	+$(MAKE) --no-print-directory --jobs=2 --output-sync=target .venv/test .venv-export/installed types lint
 	+$(MAKE) --no-print-directory pytest
 
 lint: .venv/test
@@ -36,10 +36,6 @@ types-win32 types-darwin: types-%: .venv/test
 	$(BIN)/mypy --platform $* --cache-dir .mypy_cache/$* --follow-imports silent \
 		$$(grep -rlE 'sys\.platform|operating_system|^ *(import|from) (os|signal|socket|subprocess|ctypes)\b' \
 			--include='*.py' falsifier)
-
-# Compiles the loops once, where tests side by side would each do it.
-compiled: .venv/test
-	$(BIN)/python -m tests.compiling
 
 pytest: .venv/test .venv-export/installed
 	$(BIN)/pytest -n 2 --dist worksteal

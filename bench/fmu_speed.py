@@ -1,7 +1,7 @@
 """Time spent inside the bundled FMUs per simulation: set inputs, doStep, get outputs in a compiled loop.
 
 Usage: python bench/fmu_speed.py [fmus/AT.fmu ...]; default: all FMI 2.0 FMUs in fmus/ with real inputs.
-Prints the table. Committed result: bench/fmu_speed.md.
+Prints the table; it needs numba (``pip install numba``). Committed result: bench/fmu_speed.md.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@
     problem = Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})
     result = falsify(problem, budget=300)
 
-Heavy dependencies (numba, litellm, matplotlib) are imported on first use.
+Heavy dependencies (litellm, matplotlib) are imported on first use.
 
 The code is divided into fifteen packages. Each imports only from itself and from those above it::
 

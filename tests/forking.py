@@ -29,7 +29,6 @@ _SLOW = (
     "matplotlib.backends.backend_agg",
     "matplotlib.figure",
     "matplotlib.font_manager",
-    "numba",
     "pytest",
     "rtamt",
     "scipy.interpolate",

@@ -105,7 +105,7 @@ def test_an_installed_sdist_falsifies_a_bundled_problem_anywhere(
     done = subprocess.run(
         [tmp_path / "env" / "bin" / "falsifier", "run", "AT1", "--out", "run"],
         cwd=elsewhere,
-        env={"HOME": str(tmp_path), "NUMBA_OPT": "0"},  # compiles in two thirds of the time
+        env={"HOME": str(tmp_path)},
         capture_output=True,
         text=True,
         timeout=300,

@@ -13,7 +13,7 @@ from falsifier.core.arguments import whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines.box import UnitBox
-from falsifier.engines.uniform import Uniform
+from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem, check_limits

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace, nearest_value
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
@@ -23,6 +23,30 @@ _LARGEST = 1e25
 def learnable(numbers: ArrayLike) -> NDArray[np.float64]:
     """Return numbers, of any shape, with infinite and huge ones cut to what can be calculated with."""
     return np.clip(np.asarray(numbers, dtype=np.float64), -_LARGEST, _LARGEST)
+
+
+def settled(
+    points: Array, ranges: Sequence[InputRange | ParameterRange], groups: Sequence[NDArray[np.intp]]
+) -> Array:
+    """Return the points, shape (..., d), that the candidates of these points have.
+
+    Integers, Booleans and enumerations are at the nearest number, what cannot vary is at 0.
+
+    Args:
+        points: points in [0, 1]^d.
+        ranges: range of each input and parameter.
+        groups: indices of the coordinates of each.
+    """
+    result = np.array(points, dtype=np.float64)
+    for r, group in zip(ranges, groups, strict=True):
+        if r.low == r.high:
+            result[..., group] = 0.0
+        elif r.kind != "real":
+            levels, which = np.unique(np.clip(result[..., group], 0.0, 1.0), return_inverse=True)
+            values = [nearest_value(r, r.low + (r.high - r.low) * float(v)) for v in levels]
+            scaled = (np.array(values) - r.low) / (r.high - r.low)
+            result[..., group] = scaled[which].reshape(result[..., group].shape)
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +81,10 @@ class UnitBox:
         """Indices of the coordinates of each input and each parameter, in the space's order."""
         names = [d.name for d in self.space.dimensions]
         return [np.flatnonzero([n == name for n in names]) for name in self.space.names]
+
+    def settled(self, points: Vector) -> Vector:
+        """Return the points, shape (..., d), that the candidates of these points have."""
+        return settled(points, (*self.space.inputs, *self.space.parameters), self.groups)
 
     def candidate(self, point: Vector, *, origin: str, rationale: str) -> Candidate:
         """Return the candidate for a point, clipped to the box."""

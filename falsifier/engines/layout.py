@@ -1,4 +1,4 @@
-"""Layouts: the parameterizations in which the engine searches, as vectors in [0, 1]^d."""
+"""The parameterizations in which engines search, as vectors in [0, 1]^d, and the time grid of their cells."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,9 +9,51 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, nearest_value
-from falsifier.engines.box import Array
-from falsifier.engines.grid import Grid
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.engines.box import Array, settled
+from falsifier.problem.problem import Problem
+
+# Cells over the formula's horizon on which free inputs are held and outputs predicted: enough for pieces of
+# 1 % of the horizon.
+CELLS = 100
+# Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
+_MAX_HORIZONS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class TimeGrid:
+    """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation.
+
+    Attributes:
+        step: step in s.
+        cells: number of cells over the horizon.
+        all_cells: number of complete cells until the end of the simulation, at most twenty horizons.
+    """
+
+    step: float
+    cells: int
+    all_cells: int
+
+    @classmethod
+    def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "TimeGrid":
+        """Return a grid of ``cells`` cells over the horizon, fewer if needed for cells of ``shortest`` s."""
+        horizon = min(horizon, stop_time) if horizon > 0 else stop_time
+        count = max(1, min(cells, round(horizon / shortest)))
+        step = horizon / count
+        rest = int(stop_time / step + 1e-6)
+        return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
+
+    @classmethod
+    def of(cls, problem: Problem, *, cells: int = CELLS) -> "TimeGrid":
+        """Return the grid over the horizon of a problem's requirement."""
+        interval = problem.experiment.output_interval
+        horizon = problem.requirement.formula.horizon(interval)
+        return cls.over(horizon, problem.space.stop_time, cells=cells, shortest=interval)
+
+    @property
+    def middles(self) -> Array:
+        """Middle times of the horizon's cells in s, shape (cells,)."""
+        return np.asarray((np.arange(self.cells) + 0.5) * self.step)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,24 +123,13 @@ class Layout:
 
         Integers, Booleans and enumerations are at the nearest number, what cannot vary is at 0.
         """
-        if not self.has_gaps:
-            return points
-        result = np.array(points, dtype=np.float64)
-        for r, group in zip(self._ranges, self.groups, strict=True):
-            if r.low == r.high:
-                result[..., group] = 0.0
-            elif r.kind != "real":
-                levels, which = np.unique(np.clip(result[..., group], 0.0, 1.0), return_inverse=True)
-                values = [nearest_value(r, r.low + (r.high - r.low) * float(v)) for v in levels]
-                scaled = (np.array(values) - r.low) / (r.high - r.low)
-                result[..., group] = scaled[which].reshape(result[..., group].shape)
-        return result
+        return settled(points, self._ranges, self.groups) if self.has_gaps else points
 
     @property
     def _ranges(self) -> tuple[InputRange | ParameterRange, ...]:
         return (*self.space.inputs, *self.space.parameters)
 
-    def inputs(self, points: Array, grid: Grid) -> Array:
+    def inputs(self, points: Array, grid: TimeGrid) -> Array:
         """Return scaled inputs and parameters in the horizon's cells for m points, (m, cells, groups)."""
         values = np.empty((len(points), grid.cells, len(self.groups)))
         for j, group in enumerate(self.groups):
@@ -161,7 +192,7 @@ class Layout:
         return tuple(levels)
 
 
-def planning_layout(space: SearchSpace, grid: Grid) -> Layout:
+def planning_layout(space: SearchSpace, grid: TimeGrid) -> Layout:
     """Return the layout with held cells for free inputs and the spec's control points for fixed ones."""
     return Layout(
         space,
@@ -191,6 +222,7 @@ def _read(coding: Coding, values: Array, at: Array) -> Array:
         return np.asarray(values[:, np.searchsorted(knots, at, side="right") - 1])
     if coding.interpolation == "linear":
         return np.stack([np.interp(at, knots, row) for row in values])
-    from falsifier.engines.curves import read_curves
+    from scipy.interpolate import PchipInterpolator
 
-    return np.clip(read_curves(knots, values, at), 0.0, 1.0)
+    curves = PchipInterpolator(knots, values, axis=1)(at)
+    return np.asarray(np.clip(curves, 0.0, 1.0))

@@ -68,13 +68,13 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             uses_robustness=False,
         ),
         "uniform": Registered(
-            "falsifier.engines.uniform:Uniform", "uniform random points", uses_robustness=False
+            "falsifier.engines.simple:Uniform", "uniform random points", uses_robustness=False
         ),
         "sobol": Registered(
-            "falsifier.engines.sobol:Sobol", "scrambled Sobol sequence", uses_robustness=False
+            "falsifier.engines.simple:Sobol", "scrambled Sobol sequence", uses_robustness=False
         ),
         "corners": Registered(
-            "falsifier.engines.corners:Corners", "constant extremes first, then random", uses_robustness=False
+            "falsifier.engines.simple:Corners", "constant extremes first, then random", uses_robustness=False
         ),
         "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),

@@ -28,7 +28,7 @@ from falsifier.search.parameterization import parameterization_note, parameteriz
 from falsifier.search.refine import levels_of
 from falsifier.search.request import RunRequest
 
-_RECORDED_PACKAGES = ("litellm", "numba", "numpy", "rtamt", "scipy")
+_RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
 
 
 class _Strict(BaseModel):

@@ -3,15 +3,14 @@ import pytest
 
 from falsifier.core.signals import Interpolation
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Coding, Layout, planning_layout
+from falsifier.engines.layout import Coding, Layout, TimeGrid, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
 from falsifier.testing import FREE, START, lag_problem
 
 
 def test_layouts_keep_to_the_allowed_parameterization() -> None:
     free, fixed = (lag_problem(free=free, inputs=2, parameters=[START]) for free in (FREE, None))
-    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
     rng = np.random.default_rng(0)
     for problem in (free, fixed):
         layout = planning_layout(problem.space, grid)
@@ -33,7 +32,7 @@ def test_points_are_settled_where_their_candidates_are() -> None:
     gear = ParameterRange("gear", 0.5, 3.7, kind="integer")
     mode = ParameterRange("mode", 1.0, 7.0, kind="enumeration", items=items)
     space = SearchSpace((switch, still, real), (gear, mode), 10.0)
-    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
     layout = planning_layout(space, grid)
     points = np.random.default_rng(0).random((20, layout.dimension))
     settled = layout.settled(points)
@@ -56,7 +55,7 @@ def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolati
     space = lag_problem(free=None, inputs=1, parameters=[START]).space
     layout = Layout(space, (Coding(times, interpolation, fine=False),))
     assert layout.starts.tolist() == [times[max(i - back, 0)] for i in range(6)] + [0.0]
-    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
     point = np.random.default_rng(0).random(7)
     before = layout.inputs(point[None], grid)[0, :, 0]
     for i, start in enumerate(layout.starts[:5]):
@@ -70,7 +69,7 @@ def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolati
 
 def test_a_point_near_a_constant_extreme_is_known_as_one() -> None:
     problem = lag_problem(free=FREE, inputs=2, parameters=[START])
-    layout = planning_layout(problem.space, Grid.over(10.0, 10.0, cells=100, shortest=0.05))
+    layout = planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05))
     assert layout.nearest_extreme(layout.constant((0.05, 0.95, 1.0)), within=0.1) == (0, 1, 1)
     assert layout.nearest_extreme(layout.constant((0.05, 0.8, 1.0)), within=0.1) is None
     stepping_in_time = layout.constant((0.0, 0.0, 0.0))

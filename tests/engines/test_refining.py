@@ -8,7 +8,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.engines.refining import COPIES, Refining, Stage
-from falsifier.engines.uniform import Uniform
+from falsifier.engines.simple import Uniform
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem

@@ -1,8 +1,8 @@
 from collections import deque
 
 from falsifier.engines.protocol import Engine
+from falsifier.engines.simple import Uniform
 from falsifier.engines.starting import Starting
-from falsifier.engines.uniform import Uniform
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.testing import EngineContract, lag_problem

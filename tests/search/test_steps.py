@@ -1,4 +1,4 @@
-from falsifier.engines.uniform import Uniform
+from falsifier.engines.simple import Uniform
 from falsifier.llm.replay import ScriptedChat
 from falsifier.search.steps import Live
 from falsifier.testing import lag_problem

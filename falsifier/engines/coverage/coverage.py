@@ -6,13 +6,10 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines.coverage.explorer import Explorer, Idea
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import planning_layout
+from falsifier.engines.layout import TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-# Cells over the formula's horizon on which free inputs are held.
-_CELLS = 100
 # Ideas, then random points, among which one that was not simulated is looked for.
 _IDEAS, _DRAWS = 10, 100
 
@@ -23,10 +20,7 @@ class Coverage:
     name = "coverage"
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
-        space, interval = problem.space, problem.experiment.output_interval
-        horizon = problem.requirement.formula.horizon(interval)
-        grid = Grid.over(horizon, space.stop_time, cells=_CELLS, shortest=interval)
-        self.layout = planning_layout(space, grid)
+        self.layout = planning_layout(problem.space, TimeGrid.of(problem))
         self.seed = seed
         self._explorer = Explorer(problem, self.layout)
         self._known: set[int] = set()
@@ -41,7 +35,8 @@ class Coverage:
         for evaluation in evaluations:
             self.avoid(evaluation.candidate)
             if evaluation.trajectory is not None:
-                self._explorer.learn(self.layout.point(evaluation.candidate), evaluation.trajectory)
+                point = self.layout.point(evaluation.candidate)
+                self._explorer.learn(point, evaluation.trajectory, 0.0, 0.0)
 
     def avoid(self, candidate: Candidate) -> None:
         """Do not propose a candidate, because it is about to be simulated."""

@@ -8,7 +8,7 @@ Systems are causal: inputs that stay the same up to a time do what they did unti
 
 from collections import Counter, defaultdict
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from falsifier.problem.problem import Problem
 
 # Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
 _NEW_END, _REPEATED = 0.6, 0.2
+# Of what follows the lowest robustness: a small change, a new end from an earlier time; else one from then.
+_SLIGHT, _EARLIER = 0.2, 0.2
+# Two values of robustness that differ by at most this share of their size are the same level.
+_SAME_LEVEL = 1e-6
 
 
 @dataclass(slots=True, eq=False)
@@ -66,6 +70,8 @@ class Explorer:
         self._reached: dict[Mark, Reached] = {}
         self._by_source: dict[str, list[Mark]] = defaultdict(list)
         self._hits: Counter[Mark] = Counter()
+        self._lowest = inf
+        self._at_lowest: list[Reached] = []
         self._new: Counter[str] = Counter()
         self._seen = 0
 
@@ -80,9 +86,21 @@ class Explorer:
         """Whether levels are known at which something changes."""
         return self._aimed is not None
 
-    def learn(self, point: Array, trajectory: Trajectory) -> bool:
-        """Add a simulation to the archive; return whether a discrete signal did something new."""
+    def learn(self, point: Array, trajectory: Trajectory, robustness: float, critical: float) -> bool:
+        """Add a simulation to the archive; return whether a discrete signal did something new.
+
+        Args:
+            point: the input, shape (d,).
+            trajectory: what it did.
+            robustness: robustness of the requirement.
+            critical: time in s that decided the robustness.
+        """
         self._seen += 1
+        difference = robustness - self._lowest
+        if difference < -_SAME_LEVEL * abs(robustness):
+            self._lowest, self._at_lowest = robustness, []
+        if difference <= _SAME_LEVEL * abs(robustness):
+            self._at_lowest.append(Reached(point, critical))
         marks = self._marker.marks(trajectory)
         new = {mark.source for mark in marks if mark not in self._reached}
         self._new.update(new)
@@ -124,6 +142,21 @@ class Explorer:
             point = programs.repeated(rng, reached.point, reached.time, source.point, span)
             return Idea(point, f"{where}, followed by what made {describe(other)}")
         return Idea(programs.moved(rng, reached.point), f"{where}, slightly changed")
+
+    def propose_lower(self, rng: np.random.Generator) -> Idea:
+        """Return an input that reached the lowest robustness, continued differently after that was decided.
+
+        Where robustness has few values, this is how the next lower one is reached from this one.
+        """
+        reached = min(self._at_lowest, key=lambda r: (r.tries, r.time))
+        reached.tries += 1
+        where = f"the input that made the robustness {self._lowest:.4g} at {reached.time:.3g} s"
+        kind = rng.random()
+        if kind < _SLIGHT:
+            return Idea(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+        # Now and then from an earlier time: it may have been too late.
+        time = reached.time * (rng.random() if kind < _SLIGHT + _EARLIER else 1.0)
+        return Idea(self._programs.another_end(rng, reached.point, time), f"{where}, continued differently")
 
     def _choose(self, rng: np.random.Generator) -> Mark | None:
         """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""

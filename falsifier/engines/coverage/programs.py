@@ -14,6 +14,8 @@ from falsifier.engines.layout import Layout
 _MAX_LEVELS = 32
 # Share of pieces of a real input that are at a bound.
 _AT_BOUND = 0.6
+# Where an input has few control points, the probability that all of them are drawn, each by itself.
+_INDEPENDENT = 0.5
 # Share of inputs that keep their value in a new tail, if there are several.
 _KEPT = 0.25
 # If levels are known at which something changes: share of values between or at these.
@@ -79,6 +81,8 @@ class Programs:
         """Return the program that is the same up to a time in s, and drawn again after it."""
         point = self._parameters(rng, point)
         pace = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2)))))
+        if rng.random() < _INDEPENDENT and not any(self._layout.is_fine):
+            pace = 0.5
         moving = rng.random(len(self._times)) >= _KEPT
         if moving.size:
             moving[rng.integers(len(moving))] = True

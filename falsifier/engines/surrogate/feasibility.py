@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Layout, TimeGrid
 
 # Log odds of a failure before anything is known, and the strength of that belief and of small weights.
 _PRIOR, _RIDGE = -1.0, 0.1
@@ -24,7 +23,7 @@ class Feasibility:
         grid: the cells over which inputs are summarized.
     """
 
-    grid: Grid
+    grid: TimeGrid
     _features: list[Array] = field(default_factory=list)
     _failed: list[bool] = field(default_factory=list)
     _weights: Array | None = None

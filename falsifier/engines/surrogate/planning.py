@@ -1,8 +1,6 @@
-"""Optimisation on predicted traces: evolution, gradient steps towards bounds, preference for extremes."""
+"""Optimisation on predicted trajectories: evolution, then steps towards bounds along the gradient."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +14,6 @@ from falsifier.engines.surrogate.variation import mutations, random_points
 _SAME_POINT = 1e-3
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Plan:
-    """A point with its predicted scaled robustness.
-
-    Attributes:
-        point: the point in [0, 1]^d.
-        cost: predicted scaled robustness.
-        is_simple: whether it was preferred because it is extreme.
-    """
-
-    point: Array
-    cost: float
-    is_simple: bool
-
-
 def plan(
     predict: Callable[[Array], Array],
     layout: Layout,
@@ -39,9 +22,8 @@ def plan(
     critical: Array,
     seen: Array,
     settings: Settings,
-    snap: float,
     rng: np.random.Generator,
-) -> Plan:
+) -> Array:
     """Return the most promising point that has not been simulated yet, or one that has if none else is found.
 
     Args:
@@ -51,7 +33,6 @@ def plan(
         critical: their critical times as shares of the horizon, shape (e,).
         seen: all simulated or pending points, shape (s, d).
         settings: sizes of the populations.
-        snap: maximum difference of predicted cost up to which a simple point is preferred to the best one.
         rng: random generator.
     """
     bred = settings.pool // 3
@@ -63,36 +44,23 @@ def plan(
         ]
     )
     pool, costs = _best(layout, children, predict(children), settings.parents)
-    for _ in range(settings.generations - 1):
-        children = mutations(layout, rng, pool, settings.children)
+    blocks = _blocks(layout, settings.directions)
+    for step in range(settings.generations + settings.bound_steps):
+        if step < settings.generations:
+            children = mutations(layout, rng, pool, settings.children)
+        else:
+            base = pool[0 if (step - settings.generations) % 2 == 0 else rng.integers(min(5, len(pool)))]
+            children = layout.settled(_towards_bounds(predict, base, blocks))
         pool, costs = _best(
             layout,
             np.concatenate([pool, children]),
             np.concatenate([costs, predict(children)]),
             settings.parents,
         )
-    blocks = _blocks(layout, settings.directions)
-    for step in range(settings.vertex_steps):
-        base = pool[0] if step % 2 == 0 else pool[rng.integers(min(5, len(pool)))]
-        towards = layout.settled(_towards_bounds(predict, base, blocks))
-        pool, costs = _best(
-            layout,
-            np.concatenate([pool, towards]),
-            np.concatenate([costs, predict(towards)]),
-            settings.parents,
-        )
-    simple = np.array([p for p in _simple_points(layout, pool) if not is_seen(p, seen)])
-    if len(simple):
-        simple_costs = predict(simple)
-        best = int(np.argmin(simple_costs))
-        if simple_costs[best] <= costs[0] + snap:
-            return Plan(simple[best], float(simple_costs[best]), is_simple=True)
     # The additional points are used only if the whole pool has been simulated before.
     others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
     points = np.concatenate([pool, *others])
-    unseen = next((i for i, point in enumerate(points) if not is_seen(point, seen)), 0)
-    cost = costs[unseen] if unseen < len(costs) else predict(points[unseen][None])[0]
-    return Plan(points[unseen], float(cost), is_simple=False)
+    return np.asarray(next((point for point in points if not is_seen(point, seen)), points[0]))
 
 
 def _best(layout: Layout, points: Array, costs: Array, count: int) -> tuple[Array, Array]:
@@ -130,34 +98,6 @@ def _towards_bounds(predict: Callable[[Array], Array], base: Array, blocks: NDAr
     points = [base + share * (corner - base) for share in (0.1, 0.3, 0.6, 1.0)]
     points += [np.where(size > share * size.max(), corner, base) for share in (0.1, 0.3)]
     return np.array(points)
-
-
-def _simple_points(layout: Layout, pool: Array) -> Iterator[Array]:
-    """Yield variants of the best points in which all inputs are at bounds and nearly constant."""
-    if len(layout.groups) <= 4:
-        choices: Sequence[tuple[float | None, ...]] = list(
-            product((None, 0.0, 1.0), repeat=len(layout.groups))
-        )
-        for levels in choices:
-            for base in pool[:3]:
-                point = base.copy()
-                for group, level in zip(layout.groups, levels, strict=True):
-                    if level is not None:
-                        point[group] = level
-                point = layout.settled(point)
-                if _is_at_bounds(layout, point):
-                    yield point
-    for base in pool[:5]:
-        point = layout.settled(np.round(base))
-        if _is_at_bounds(layout, point):
-            yield point
-
-
-def _is_at_bounds(layout: Layout, point: Array) -> bool:
-    """Whether nearly all coordinates (99 %) are at a bound and equal to their neighbours."""
-    extreme = np.mean((point == 0.0) | (point == 1.0))
-    changing = np.mean([np.mean(np.diff(point[g]) != 0) if len(g) > 1 else 0.0 for g in layout.groups])
-    return bool(extreme - changing > 0.99)
 
 
 def is_seen(point: Array, seen: Array) -> bool:

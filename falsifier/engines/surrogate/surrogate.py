@@ -1,29 +1,26 @@
-"""The surrogate engine: learn the dynamics, plan on them, simulate, refit."""
+"""The surrogate engine: arms that search in different ways on one history, rated by what they bring."""
 
 from collections.abc import Callable, Sequence
-from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from math import inf
+from itertools import zip_longest
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.box import Array
-from falsifier.engines.corner_walk import CornerWalk, Levels
+from falsifier.engines.box import Array, BoxEngine
+from falsifier.engines.cma import CMA
 from falsifier.engines.coverage import Explorer
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Layout, planning_layout
-from falsifier.engines.surrogate.aims import Aims
-from falsifier.engines.surrogate.arms import choose_arm, flatness, has_lead, quality
-from falsifier.engines.surrogate.coarse import coarse_formula, inner_windows
-from falsifier.engines.surrogate.direct import Seen, propose
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.simple import Corners, Uniform
+from falsifier.engines.surrogate.changes import Seen, propose_change
 from falsifier.engines.surrogate.feasibility import Feasibility
-from falsifier.engines.surrogate.forecast import Ensemble, Forecast
-from falsifier.engines.surrogate.history import History, Sample, scaled_costs
-from falsifier.engines.surrogate.opening import opening
+from falsifier.engines.surrogate.forecast import Forecast, Forecaster
+from falsifier.engines.surrogate.history import History, Sample
 from falsifier.engines.surrogate.planning import is_seen, plan
+from falsifier.engines.surrogate.policy import Levels, Policy
+from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
+from falsifier.engines.surrogate.region import TrustRegion
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
@@ -32,6 +29,28 @@ from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
 _DRAWS = 100
+# Maximum number of switching inputs: if that many random ones did not violate, more will not.
+_MOST_SWITCHING = 8
+# Share of each range within which another engine's constant input stands for the extreme.
+_NEAR_EXTREME = 0.1
+# Rating of each arm before its first proposals. Dynamics need a few proposals to become good; of the others,
+# those that use what was simulated come first.
+_PRIORS = {
+    "dynamics": 0.8,
+    "changes": 0.3,
+    "levels": 0.3,
+    "region": 0.2,
+    "switching": 0.2,
+    "coverage": 0.1,
+    "context": 0.2,
+    "uniform": 0.1,
+    "corners": 0.1,
+    "cma": 0.1,
+}
+# Without inputs there is no time in which dynamics would tell more than the final robustness.
+_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8}
+# The arms with a share of turns that no rating takes away.
+_SIMPLE = ("coverage", "uniform", "corners", "cma")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,25 +58,22 @@ class Pending:
     """What the engine remembers about a candidate until it is told its evaluation.
 
     Attributes:
-        arm: the engine's arm that proposed it.
+        arm: the arm that proposed it.
+        candidate: the candidate.
         point: its point in the layout, in [0, 1]^d.
-        why: rationale of the candidate.
-        levels: its levels, for a constant extreme.
-        forecast: predictions of the dynamics, if they proposed it.
+        forecast: prediction of the dynamics, if they proposed it.
     """
 
     arm: str
+    candidate: Candidate
     point: Array
-    why: str
-    levels: Levels | None = None
     forecast: Forecast | None = None
 
 
 class Surrogate:
-    """Learns the dynamics from whole trajectories and proposes inputs with a low predicted robustness.
+    """Plans on learnt dynamics, and searches in simpler ways beside that.
 
-    In addition it searches directly, by changes of the best inputs; the arm that does better gets more turns.
-    Where most simulations have the same robustness, what they covered leads the search.
+    Each way is an arm; an arm that brings more has more turns, and none of the simple ones loses all of them.
     """
 
     name = "surrogate"
@@ -65,31 +81,28 @@ class Surrogate:
     def __init__(self, problem: Problem, *, seed: int, settings: Settings | None = None) -> None:
         self.problem, self.seed, self.settings = problem, seed, settings or Settings()
         space, formula = problem.space, problem.requirement.formula
-        interval = problem.experiment.output_interval
-        self.grid = Grid.over(
-            formula.horizon(interval), space.stop_time, cells=self.settings.cells, shortest=interval
-        )
+        self.grid = TimeGrid.of(problem, cells=self.settings.cells)
         self.layout = planning_layout(space, self.grid)
-        self.history = History(problem, self.grid, self.layout, self.settings)
+        self.history = History(problem, self.grid, self.layout)
         self.feasibility = Feasibility(self.grid)
+        self.forecaster = Forecaster(self.settings, self.layout)
         self._explorer = Explorer(problem, self.layout)
-        self._aims = Aims(self.settings)
-        self._lowest = inf
-        self.dynamics = Ensemble(self.settings)
-        windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
-        self._windows = windows
-        self._opening = opening(
-            self.settings,
-            has_inputs=bool(space.inputs),
-            windows=windows,
-            needs_several=coarse_formula(formula, self.grid.step).root.needs_several,
-        )
-        self._walk = CornerWalk(len(self.layout.groups))
-        self._asked = self._planned = self._simple = 0
+        self._corners = Corners(problem, seed=seed)
+        self._engines: dict[str, BoxEngine] = {
+            "region": TrustRegion(problem, seed=seed),
+            "uniform": Uniform(problem, seed=seed),
+            "corners": self._corners,
+            "cma": CMA(problem, seed=seed),
+        }
+        priors = _PRIORS if space.inputs else _PRIORS_OF_PARAMETERS
+        self._policy = Policy(priors, _SIMPLE, self.settings)
+        self._levels = Levels()
+        self._windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
+        self._opening = self._first_kinds()
+        self._asked = self._switched = 0
         self._pending: dict[object, Pending] = {}
         self._suggested: list[Array] = []
         self._failed: list[Array] = []
-        self._stood_for: list[tuple[Array, float]] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates, each from the arm that is chosen for it."""
@@ -98,25 +111,28 @@ class Surrogate:
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add the evaluations to the history; those of its own candidates also rate arms and forecasts."""
         for evaluation in evaluations:
-            told = self.problem.space.admit(evaluation.candidate)
-            pending = self._pending.pop(told.key, None)
-            sample = self.history.add(evaluation, pending.arm if pending else "")
-            point = self.layout.point(told)
+            pending = self._pending.pop(evaluation.candidate.key, None)
+            point = self.layout.point(evaluation.candidate) if pending is None else pending.point
+            sample = self.history.add(evaluation, point)
             self.feasibility.add(self.layout, point, failed=sample is None)
-            is_new = sample is not None and sample.robustness < self._lowest
-            if evaluation.trajectory is not None:
-                is_new |= self._explorer.learn(point, evaluation.trajectory)
-            self._aims.learn(aimed=pending is not None and pending.arm == "levels", is_new=is_new)
-            self._lowest = min(self._lowest, sample.robustness if sample is not None else inf)
+            for engine in self._engines.values():
+                engine.tell([evaluation])
+            worth, is_new = 0.0, False
             if sample is None:
                 self._failed.append(point)
+            else:
+                worth = self._levels.add(sample.robustness)
+                assert evaluation.trajectory is not None, "a sample has one"
+                critical = sample.critical * self.grid.step * self.grid.cells
+                is_new = self._explorer.learn(point, evaluation.trajectory, sample.robustness, critical)
             if pending is not None:
-                self._settle(pending, sample)
-            elif sample is not None:
-                self._hear(point, sample)
+                self._policy.learn(pending.arm, worth, is_new=is_new)
+                self._judge(pending, sample)
+            elif sample is not None and self.layout.nearest_extreme(point, within=_NEAR_EXTREME):
+                self._corners.hear(self._corners.box.point(evaluation.candidate), sample.robustness)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
-        """Return the verdicts that the better dynamics predict for candidates, without simulating them.
+        """Return the verdicts that the dynamics predict for candidates, without simulating them.
 
         The robustness is in the requirement's own unit. The list is empty until two simulations are known.
         It changes nothing: what is asked next is the same without it.
@@ -124,48 +140,52 @@ class Surrogate:
         if len(self.history.samples) < 2 or not candidates:
             return []
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
-        # A copy learns: an automaton from these samples, and trust in it, would change what is asked next.
-        other = copy(self)
-        other.dynamics, other.history = self.dynamics.copy(), self.history.copy()
-        other._fit(rng)
+        fitted = self._fitted(self.history.by_scaled_cost(), rng)
         points = np.array([self.layout.point(c) for c in candidates])
-        return other.dynamics.verdicts(self.layout, other.history.scaled_objective(), points)
-
-    @property
-    def recent_error(self) -> float:
-        """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
-        return self.dynamics.recent_error
+        return fitted.verdicts(self.history.scaled_cost(), points)
 
     def suggest(self, candidates: Sequence[Candidate]) -> None:
         """Add candidates to those from which the next plan is bred."""
         self._suggested = [self.layout.point(c) for c in candidates]
 
     @property
+    def recent_error(self) -> float:
+        """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
+        return self.forecaster.recent_error
+
+    @property
     def is_trusted(self) -> bool:
         """Whether recent predictions were good."""
-        return self.dynamics.is_trusted
+        return self.forecaster.is_trusted
 
     @property
     def misses(self) -> int:
         """Number of planned inputs, counted back from the last one, that did not violate as predicted."""
-        return self.dynamics.misses
+        return self.forecaster.misses
 
-    def _settle(self, pending: Pending, sample: Sample | None) -> None:
-        """Learn from the evaluation of one of the engine's own candidates."""
-        if pending.levels is not None:
-            self._walk.learn(pending.levels, None if sample is None else sample.robustness)
+    def _judge(self, pending: Pending, sample: Sample | None) -> None:
         if pending.forecast is not None and sample is not None:
-            objective = self.history.scaled_objective()
-            self.dynamics.judge(pending.forecast, sample.values, objective, violated=sample.robustness < 0)
-            if self.dynamics.is_surprised:
-                self.history.learner.doubt()
+            cost = self.history.scaled_cost()
+            violated = sample.robustness < 0
+            self.forecaster.judge(pending.forecast, sample.margins, cost, violated=violated)
 
-    def _hear(self, point: Array, sample: Sample) -> None:
-        """Learn from another engine's candidate; near a constant extreme, that one need not be simulated."""
-        levels = self.layout.nearest_extreme(point, within=self.settings.near_extreme)
-        if levels is not None:
-            self._walk.heard(levels, sample.robustness)
-            self._stood_for.append((self.layout.constant(levels), sample.robustness))
+    def _first_kinds(self) -> list[str]:
+        """Return the kinds of the first inputs, in order.
+
+        Formulas with nested windows are violated by inputs that change a few times per inner window, so
+        switching inputs come first. Requirements that a single extreme can violate start with constant
+        extremes. If a violation requires several conditions at once, stepping inputs show how the outputs
+        depend on the inputs.
+        """
+        settings = self.settings
+        if not self.problem.space.inputs:
+            return ["corners"] * settings.corners
+        if self._windows:
+            turns = zip_longest(["switching"] * settings.bangs, ["corners"] * settings.pauses)
+            return [kind for turn in turns for kind in turn if kind is not None]
+        if needs_several(self.problem.requirement.formula):
+            return ["stepping"] * settings.probes
+        return ["corners"] * settings.constants
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
@@ -177,16 +197,17 @@ class Surrogate:
         if self._is_repeated(pending):
             pending = self._unseen(rng) or pending
         self._asked += 1
-        candidate = self.layout.candidate(pending.point, origin=self.name, rationale=pending.why)
-        self._pending[candidate.key] = pending
-        return candidate
+        self._pending[pending.candidate.key] = pending
+        return pending.candidate
 
     def _objection(self, pending: Pending) -> float:
         """Return the excess risk that its simulation fails, plus 1 if that would repeat another one.
 
-        A plan that repeats one has found nothing else: another one would take as long and repeat one, too.
+        Plans and changes have considered the risk, and the evolution strategy waits for each of its points.
         """
-        return self._risk(pending) + (pending.forecast is None and self._is_repeated(pending))
+        considered = pending.arm in ("dynamics", "changes", "cma")
+        risk = 0.0 if considered else float(self.feasibility.excess(self.layout, pending.point[None])[0])
+        return risk + self._is_repeated(pending)
 
     def _is_repeated(self, pending: Pending) -> bool:
         return is_seen(pending.point, self._tried)
@@ -196,7 +217,9 @@ class Surrogate:
         points = self.layout.settled(rng.random((_DRAWS, self.layout.dimension)))
         tried = self._tried
         point = next((p for p in points if not is_seen(p, tried)), None)
-        return None if point is None else Pending("random", point, "random: all other ideas were simulated")
+        return (
+            None if point is None else self._made("random", point, "random: all other ideas were simulated")
+        )
 
     @property
     def _tried(self) -> Array:
@@ -204,104 +227,100 @@ class Surrogate:
         asked = [p.point for p in self._pending.values()] + self._failed
         return np.concatenate([self.history.points, np.array(asked).reshape(-1, self.layout.dimension)])
 
-    def _risk(self, pending: Pending) -> float:
-        """Return the excess risk that its simulation fails; plans and the direct search considered it."""
-        if pending.arm == "direct" or pending.forecast is not None:
-            return 0.0
-        return float(self.feasibility.excess(self.layout, pending.point[None])[0])
-
     def _propose(self, rng: np.random.Generator) -> Pending:
-        kind = self._opening[self._asked] if self._asked < len(self._opening) else ""
-        if not self.problem.space.inputs and not self._walk.settled:
-            # With parameters only, there are few extremes, and they often violate.
-            kind = "constant"
-        if kind == "constant" and (levels := self._walk.next(rng)) is not None:
-            point = self.layout.constant(levels)
-            return Pending("constant", point, "constant extremes", levels)
-        if kind == "switching":
-            return self._switch(rng)
-        if kind == "stepping":
-            point = stepping(self.layout, rng, self.settings.probe_pieces)
-            return Pending("stepping", point, "steps through many levels of each input")
-        if len(self.history.samples) < 2:
-            point = random_points(self.layout, rng, 1)[0]
-            return Pending("random", point, "random: too few simulations to learn from yet")
-        arm = self._choose_arm(rng)
-        if arm == "coverage":
-            idea = self._explorer.propose(rng)
-            return Pending("coverage", idea.point, idea.why)
-        if arm == "levels":
-            idea = self._explorer.propose(rng, aimed=True)
-            return Pending("levels", idea.point, f"levels of the context files: {idea.why}")
-        if arm == "dynamics":
-            return self._plan(rng)
-        return self._switch(rng) if arm == "switching" else self._search(rng)
+        arm = self._opening[self._asked] if self._asked < len(self._opening) else self._choose(rng)
+        if engine := self._engines.get(arm):
+            return self._asked_of(arm, engine)
+        match arm:
+            case "switching":
+                return self._switch(rng)
+            case "stepping":
+                point = stepping(self.layout, rng, self.settings.probe_pieces)
+                return self._made(arm, point, "steps through many levels of each input")
+            case "dynamics":
+                return self._plan(rng)
+            case "changes":
+                return self._change(rng)
+            case "random":
+                point = random_points(self.layout, rng, 1)[0]
+                return self._made(arm, point, "random: too few simulations to learn from yet")
+            case "levels":
+                idea = self._explorer.propose_lower(rng)
+                return self._made(arm, idea.point, idea.why)
+        idea = self._explorer.propose(rng, aimed=arm == "context")
+        why = f"levels of the context files: {idea.why}" if arm == "context" else idea.why
+        return self._made(arm, idea.point, why)
 
-    def _choose_arm(self, rng: np.random.Generator) -> str:
-        settings = self.settings
-        if self._explorer.has_levels and rng.random() < self._aims.share:
-            return "levels"
-        costs = self.history.direct_costs()
-        is_flat = len(costs) >= settings.flat_start and flatness(costs) >= settings.flat
-        # Where all outputs are continuous, the dynamics know how they leave a plateau.
-        if is_flat and self._explorer.has_modes:
-            # Once something is better than the plateau, that is a lead, too.
-            share = settings.coverage_led_share if has_lead(costs) else settings.coverage_share
-            if rng.random() < share:
-                return "coverage"
-        if self._planned < settings.trial and rng.random() < settings.trial_share:
-            return "dynamics"
-        arms = [s.arm for s in self.history.samples]
-        may_switch = bool(self._windows) and arms.count("switching") < settings.most_bangs
-        names = ("dynamics", "direct", "switching") if may_switch else ("dynamics", "direct")
-        qualities = {
-            name: quality(name, arms, costs, window=settings.bandit_window, power=settings.bandit_power)
-            for name in names
+    def _asked_of(self, arm: str, engine: BoxEngine) -> Pending:
+        """Ask another engine; what it asks for although it was simulated is told to it at once."""
+        for _ in range(self.settings.retries + 1):
+            (candidate,) = engine.ask()
+            point = self.layout.point(candidate)
+            known = next((s for s in self.history.samples if is_seen(point, s.point[None])), None)
+            if known is None:
+                break
+            verdict = Verdict(known.robustness, 0.0, "")
+            engine.tell([Evaluation(candidate, verdict=verdict)])
+        return Pending(arm, candidate, point)
+
+    def _made(self, arm: str, point: Array, why: str, forecast: Forecast | None = None) -> Pending:
+        candidate = self.layout.candidate(point, origin=self.name, rationale=why)
+        return Pending(arm, candidate, point, forecast)
+
+    def _choose(self, rng: np.random.Generator) -> str:
+        """Choose among the arms that can propose something now."""
+        if len(self.history.samples) < 2:
+            return "random"
+        has_inputs, differs = bool(self.problem.space.inputs), not self._levels.is_plateau
+        can = {
+            # Of signals with few values, dynamics that are linear know nothing.
+            "dynamics": differs and not self._levels.is_staircase,
+            "changes": differs,
+            "region": differs,
+            "cma": differs,
+            "corners": not self._corners.is_done,
+            "switching": bool(self._windows) and self._switched < _MOST_SWITCHING,
+            "coverage": has_inputs,
+            "context": self._explorer.has_levels,
+            "levels": has_inputs and self._levels.is_staircase,
         }
-        if self.dynamics.is_trusted and qualities["dynamics"] == max(qualities.values()):
-            return "dynamics" if rng.random() < settings.trusted_share else "direct"
-        return choose_arm(qualities, rng, least=settings.least_share)
+        arms = [arm for arm in _PRIORS if can.get(arm, True)]
+        trial = len(self._opening) + self.settings.trial
+        return self._policy.choose(arms, rng, reserved=self._asked >= trial)
 
     def _switch(self, rng: np.random.Generator) -> Pending:
+        self._switched += 1
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
         why = f"inputs take a random bound{_pace(self.layout, dwell)}"
-        return Pending("switching", switching(self.layout, rng, dwell), why)
+        return self._made("switching", switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
         settings, samples = self.settings, self.history.samples
-        objective = self.history.scaled_objective()
-        order = self._fit(rng)
-        points, elites = self.history.points, order[: settings.elites]
+        order = self.history.by_scaled_cost()
+        self.forecaster = self._fitted(order, rng)
+        cost = self.history.scaled_cost()
         suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
         self._suggested = []
-        # The exact extreme may violate if what stands for it is the best sample so far.
-        replaced = [extreme for extreme, robustness in self._stood_for if robustness > self._lowest]
-        result = plan(
-            self._with_risk(self.dynamics.predictor(self.layout, objective)),
+        elites = [samples[i] for i in order[: settings.elites]]
+        point = plan(
+            self._with_risk(self.forecaster.predictor(cost)),
             self.layout,
-            elites=np.concatenate([suggested, points[elites]]),
-            critical=np.array([*(1.0 for _ in suggested), *(samples[i].critical for i in elites)]),
-            seen=np.concatenate([self._tried, np.array(replaced).reshape(-1, self.layout.dimension)]),
-            settings=self._plan_settings(),
-            snap=0.0 if self.dynamics.is_exact else settings.snap * settings.snap_decay**self._simple,
+            elites=np.concatenate([suggested, [e.point for e in elites]]),
+            critical=np.array([*(1.0 for _ in suggested), *(e.critical for e in elites)]),
+            seen=self._tried,
+            settings=settings,
             rng=rng,
         )
-        self._planned += 1
-        self._simple += result.is_simple
-        why = (
-            f"the {self.dynamics.chosen} dynamics predict a scaled robustness of {result.cost:.3g}"
-            f"{', preferred for its simple shape' if result.is_simple else ''}"
-        )
-        forecast = self.dynamics.forecast(self.layout, objective, result.point)
-        return Pending("dynamics", result.point, why, forecast=forecast)
+        forecast = self.forecaster.forecast(cost, point)
+        why = f"the learnt dynamics predict a scaled robustness of {forecast.cost:.3g}"
+        return self._made("dynamics", point, why, forecast)
 
-    def _plan_settings(self) -> Settings:
-        settings = self.settings
-        if not self.dynamics.is_exact:
-            return settings
-        share = settings.exact_share / max(self.dynamics.load, 1.0)
-        pool, children = (max(round(share * n), settings.parents) for n in (settings.pool, settings.children))
-        return replace(settings, pool=pool, children=children)
+    def _fitted(self, order: Sequence[int], rng: np.random.Generator) -> Forecaster:
+        """Return the forecaster fitted to the best and the latest simulations; the first is the very best."""
+        samples, most = self.history.samples, self.settings.most_traces
+        latest = range(max(0, len(samples) - most), len(samples))
+        kept = list(dict.fromkeys([*order[: most // 3], *reversed(latest)]))[:most]
+        return self.forecaster.fitted([samples[i].trace for i in kept], 0, rng)
 
     def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
         """Return predicted costs that also count the risk of a failure, if there has been one."""
@@ -310,29 +329,16 @@ class Surrogate:
         weight = self.settings.risk_weight
         return lambda points: predict(points) + weight * self.feasibility.excess(self.layout, points)
 
-    def _fit(self, rng: np.random.Generator) -> NDArray[np.intp]:
-        """Fit the dynamics; return the indices of the samples, those with the lowest robustness first."""
-        samples = self.history.samples
-        objective = self.history.scaled_objective()
-        order = np.argsort(scaled_costs(samples, objective), kind="stable")
-        best = [int(i) for i in order[: self.settings.best_count]]
-        traces = [s.trace for s in samples]
-        automaton = self.history.automaton(self.seed)
-        self.dynamics.fit(traces, best, rng, automaton=automaton, switched=objective.is_relaxed)
-        return order
-
-    def _search(self, rng: np.random.Generator) -> Pending:
+    def _change(self, rng: np.random.Generator) -> Pending:
         samples, horizon = self.history.samples, self.grid.step * self.grid.cells
-        # What a predicate does in the rest of an inner window counts, too.
-        rest = min(self._windows, default=0.0)
+        # What a predicate does in the rest of an inner window counts, too; and where levels lead, the next
+        # one may be decided later.
+        rest = horizon if self._levels.is_staircase else min(self._windows, default=0.0)
         decided = np.array([s.critical * horizon + rest for s in samples])
-        if self.history.scaled_objective().is_relaxed:
-            # A plateau is decided anywhere: relaxed formulas may be decided later.
-            decided[:] = horizon
-        seen = Seen(self.history.points, np.array(self.history.direct_costs()), decided)
+        seen = Seen(self.history.points, self.history.robustness, decided)
         risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
-        draw = propose(seen, self.layout, self.settings, rng, risk)
-        return Pending("direct", draw.point, draw.why)
+        point, why = propose_change(seen, self.layout, self.settings, rng, risk)
+        return self._made("changes", point, why)
 
 
 def _pace(layout: Layout, dwell: float) -> str:

@@ -1,4 +1,4 @@
-"""Random points in a layout, and random changes of good ones."""
+"""Random points in a layout, and random changes of good ones, many at a time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +8,32 @@ from falsifier.engines.layout import Layout
 
 # Share of children that are crossed over with another parent.
 _CROSSED = 0.25
+# Cumulative probabilities of the changes of held cells: a bound, any level, a small step, a switch moved
+# in time; the rest shifts the whole signal.
+_TO_BOUND, _TO_LEVEL, _STEPPED, _SWITCH_MOVED = 0.35, 0.5, 0.65, 0.85
+# The same for control points: a bound, a small step; the rest to any level.
+_POINT_TO_BOUND, _POINT_STEPPED = 0.1, 0.95
+# Standard deviations of a small step: coarse, medium or fine, equally likely.
+_STEPS = (0.3, 0.1, 0.03)
+# Maximum shift in time, as a share of the horizon.
+_REACH = 0.05
+
+Bools = NDArray[np.bool_]
 
 
 def random_points(layout: Layout, rng: np.random.Generator, count: int) -> Array:
     """Return structured random points, shape (count, d): with few or many pieces, at bounds or in between."""
-    from falsifier.engines.surrogate.breeding import draw
-
     points = np.empty((count, layout.dimension))
-    draw(points, *_groups(layout), rng)
+    for group, fine in zip(layout.groups, layout.is_fine, strict=True):
+        size = len(group)
+        if fine:  # each order of magnitude of the number of pieces is equally likely
+            share = np.exp(rng.random((count, 1)) * np.log(size + 1)) / size
+        else:
+            share = 1.0 - 0.9 * rng.random((count, 1))
+        begins = rng.random((count, size)) < share
+        begins[:, 0] = False
+        levels = _levels(rng, (count, size), at_bounds=rng.random((count, 1)) < 0.6)
+        points[:, group] = np.take_along_axis(levels, np.cumsum(begins, axis=1), axis=1)
     return layout.settled(points)
 
 
@@ -37,34 +55,21 @@ def mutations(
         critical: critical time of each parent as a share of the horizon, shape (p,), or None if unknown. If
             known, half of the changes of held cells end there, because only earlier inputs led to it.
     """
-    from falsifier.engines.surrogate.breeding import change, cross
-
     chosen = rng.integers(0, len(parents), count)
-    children = parents[chosen]
-    ends, is_fine = _groups(layout)
-    cross(children, parents, ends, len(layout.codings), _CROSSED, rng)
-    until = np.full(count, np.nan) if critical is None else critical[chosen]
-    change(children, until, ends, is_fine, rng)
-    return layout.settled(children)
+    children = _crossed(layout, rng, parents[chosen], parents)
+    return _changed(layout, rng, children, None if critical is None else critical[chosen])
 
 
 def changed(layout: Layout, rng: np.random.Generator, points: Array) -> Array:
     """Return a copy of the points, shape (m, d), each with one to three random changes."""
-    from falsifier.engines.surrogate.breeding import change
-
-    result = points.copy()
-    change(result, np.full(len(points), np.nan), *_groups(layout), rng)
-    return layout.settled(result)
+    return _changed(layout, rng, points.copy(), None)
 
 
 def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
     """Return one point: every ``dwell`` s, with a random phase, each input is set to a random bound."""
-    point = np.empty(layout.dimension)
-    for j, group in enumerate(layout.groups):
-        if j >= len(layout.codings):
-            point[group] = rng.random()
-            continue
-        piece = (np.asarray(layout.codings[j].times) / dwell + rng.random()).astype(int)
+    point = rng.random(layout.dimension)
+    for coding, group in zip(layout.codings, layout.groups, strict=False):
+        piece = (np.asarray(coding.times) / dwell + rng.random()).astype(int)
         point[group] = rng.integers(0, 2, int(piece[-1]) + 1)[piece]
     return layout.settled(point)
 
@@ -97,11 +102,11 @@ def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds:
     pieces = int(rng.integers(1, most_pieces + 1))
     cells = max((len(group) for group in layout.groups), default=1)
     ends = np.cumsum(np.exp(rng.random(pieces - 1) * np.log(cells)) // 1) / cells
-    values = []
+    point = rng.random(layout.dimension)
     for group in layout.groups[: len(layout.codings)]:
-        levels = _levels(rng, pieces, at_bounds)
-        values.append(levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")])
-    return layout.settled(np.concatenate([*values, rng.random(len(layout.space.parameters))]))
+        levels = _levels(rng, pieces, at_bounds=rng.random(pieces) < at_bounds)
+        point[group] = levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")]
+    return layout.settled(point)
 
 
 def held_from(
@@ -119,18 +124,96 @@ def held_from(
     result = points.copy()
     starts = rng.random(len(points)) * np.minimum(until, layout.starts.max(initial=0.0))
     for group in layout.groups[: len(layout.codings)]:
-        levels = _levels(rng, len(points), at_bounds)
+        levels = _levels(rng, len(points), at_bounds=rng.random(len(points)) < at_bounds)
         is_end = layout.starts[group] >= starts[:, None]
         result[:, group] = np.where(is_end, levels[:, None], points[:, group])
     return layout.settled(result)
 
 
-def _levels(rng: np.random.Generator, count: int, at_bounds: float) -> Array:
-    """Draw levels in [0, 1], at a bound with the given probability, shape (count,)."""
-    levels = rng.random(count)
-    return np.where(rng.random(count) < at_bounds, np.rint(levels), levels)
+def _levels(rng: np.random.Generator, shape: int | tuple[int, ...], *, at_bounds: Bools) -> Array:
+    """Draw levels in [0, 1], where wanted at a bound."""
+    levels = rng.random(shape)
+    return np.where(at_bounds, np.rint(levels), levels)
 
 
-def _groups(layout: Layout) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Return the end of each group of coordinates, and whether it consists of many held cells."""
-    return np.array([group[-1] + 1 for group in layout.groups]), np.array(layout.is_fine)
+def _crossed(layout: Layout, rng: np.random.Generator, children: Array, parents: Array) -> Array:
+    """Replace the signals of a share of children with another parent's from a random time on."""
+    rows = np.flatnonzero(rng.random(len(children)) < _CROSSED)
+    others = parents[rng.integers(0, len(parents), len(rows))]
+    time = rng.random((len(rows), 1))
+    for j, group in enumerate(layout.groups):
+        if j >= len(layout.codings):  # a parameter is the other parent's or not
+            time = rng.random((len(rows), 1)) * 2 - 1
+        later = np.arange(len(group)) / len(group) >= time
+        children[np.ix_(rows, group)] = np.where(later, others[:, group], children[np.ix_(rows, group)])
+    return children
+
+
+def _changed(layout: Layout, rng: np.random.Generator, children: Array, until: Array | None) -> Array:
+    """Change one group of each child, one to three times, in place."""
+    times = rng.integers(1, 4, len(children))
+    for turn in range(3):
+        which = np.where(turn < times, rng.integers(0, len(layout.groups), len(children)), -1)
+        for j, group in enumerate(layout.groups):
+            rows = np.flatnonzero(which == j)
+            if not len(rows):
+                continue
+            values = children[np.ix_(rows, group)]
+            if layout.is_fine[j]:
+                ends = None if until is None else until[rows]
+                children[np.ix_(rows, group)] = _changed_pieces(values, ends, rng)
+            else:
+                children[np.ix_(rows, group)] = _changed_control_points(values, rng)
+    return layout.settled(children)
+
+
+def _changed_pieces(values: Array, until: Array | None, rng: np.random.Generator) -> Array:
+    """Return held signals, shape (m, cells), each changed in one way."""
+    count, size = values.shape
+    cells, kind, reach = np.arange(size), rng.random((count, 1)), max(1, int(_REACH * size))
+    # A stretch of any order of magnitude.
+    length = np.maximum(1, np.exp(rng.random(count) * np.log(size)).astype(np.intp))
+    start = (size * rng.random(count)).astype(np.intp)
+    stop = start + length
+    if until is not None:
+        ends_there = rng.random(count) < 0.5
+        stop = np.where(ends_there, (until * size).astype(np.intp) + 1, stop)
+        start = np.where(ends_there, stop - length, start)
+    inside = (start[:, None] <= cells) & (cells < stop[:, None])
+    level = _levels(rng, (count, 1), at_bounds=kind < _TO_BOUND)
+    stepped = np.clip(values + _steps(rng, (count, 1)), 0.0, 1.0)
+    stretched = np.where(inside, np.where(kind < _TO_LEVEL, level, stepped), values)
+    shift = rng.integers(-reach, reach + 1, (count, 1))
+    shifted = np.take_along_axis(values, (cells - shift) % size, axis=1)
+    moved = _switch_moved(values, np.asarray(rng.integers(1, reach + 1, count)), rng)
+    return np.where(kind < _STEPPED, stretched, np.where(kind < _SWITCH_MOVED, moved, shifted))
+
+
+def _switch_moved(values: Array, shift: NDArray[np.int64], rng: np.random.Generator) -> Array:
+    """Return held signals, each with one switch moved to an earlier or a later cell."""
+    count, size = values.shape
+    if size < 2:
+        return values
+    switches = values[:, 1:] != values[:, :-1]
+    at = 1 + np.argmax(switches * rng.random(switches.shape), axis=1)
+    rows, earlier = np.arange(count), rng.random(count) < 0.5
+    start, stop = np.where(earlier, at - shift, at), np.where(earlier, at, at + shift)
+    level = np.where(earlier, values[rows, at], values[rows, at - 1])
+    cells = np.arange(size)
+    return np.where((start[:, None] <= cells) & (cells < stop[:, None]), level[:, None], values)
+
+
+def _changed_control_points(values: Array, rng: np.random.Generator) -> Array:
+    """Return control points, shape (m, k), of which some are changed in each row, at least one."""
+    count, size = values.shape
+    moves = rng.random((count, size)) < np.where(rng.random((count, 1)) < 0.5, 0.2, 0.5)
+    moves[np.arange(count), rng.integers(0, size, count)] = True
+    kind = rng.random((count, size))
+    stepped = np.clip(values + _steps(rng, (count, size)), 0.0, 1.0)
+    level = _levels(rng, (count, size), at_bounds=kind < _POINT_TO_BOUND)
+    is_step = (kind >= _POINT_TO_BOUND) & (kind < _POINT_STEPPED)
+    return np.where(moves, np.where(is_step, stepped, level), values)
+
+
+def _steps(rng: np.random.Generator, shape: tuple[int, int]) -> Array:
+    return rng.choice(_STEPS, shape) * rng.standard_normal(shape)

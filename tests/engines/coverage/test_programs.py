@@ -4,12 +4,11 @@ import pytest
 from falsifier.core.space import Freedom
 from falsifier.engines.box import Array
 from falsifier.engines.coverage.programs import Programs
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Layout, planning_layout
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.testing import FREE, START, lag_problem
 from tests.engines.coverage.support import lock_problem
 
-GRID = Grid.over(10.0, 10.0, cells=50, shortest=0.1)
+GRID = TimeGrid.over(10.0, 10.0, cells=50, shortest=0.1)
 
 
 def layout_of(*, inputs: int) -> Layout:

@@ -1,8 +1,7 @@
 import numpy as np
 
 from falsifier.engines.box import Array
-from falsifier.engines.grid import Grid
-from falsifier.engines.layout import Layout, planning_layout
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.engines.surrogate.variation import (
     held_from,
     mutations,
@@ -16,7 +15,7 @@ from falsifier.testing import FREE, START, lag_problem
 
 def test_changes_near_the_critical_time_leave_what_comes_later_alone() -> None:
     problem = lag_problem(free=FREE)
-    grid = Grid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
     layout = planning_layout(problem.space, grid)
     parents = np.full((1, 100), 0.5)
     rng = np.random.default_rng(0)
@@ -31,7 +30,7 @@ def test_changes_near_the_critical_time_leave_what_comes_later_alone() -> None:
 
 def free_layout(cells: int = 100) -> Layout:
     problem = lag_problem(free=FREE, parameters=[START])
-    return planning_layout(problem.space, Grid.over(10.0, 10.0, cells=cells, shortest=0.05))
+    return planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=cells, shortest=0.05))
 
 
 def pieces(points: Array) -> Array:
@@ -76,7 +75,7 @@ def test_stepping_inputs_go_through_all_levels_once() -> None:
 
 def test_paced_inputs_change_together_after_pieces_of_all_lengths() -> None:
     problem = lag_problem(free=FREE, inputs=2, parameters=[START])
-    layout = planning_layout(problem.space, Grid.over(10.0, 10.0, cells=100, shortest=0.05))
+    layout = planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05))
     rng = np.random.default_rng(0)
     firsts, counts = [], []
     for _ in range(400):

@@ -1,1 +1,0 @@
-"""A hybrid automaton learnt from trajectories: modes, guards and resets with located events."""

@@ -1,0 +1,105 @@
+"""Whose turn it is: shares of turns by what each arm's latest proposals brought."""
+
+from bisect import bisect_left, insort
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+
+import numpy as np
+
+from falsifier.engines.surrogate.settings import Settings
+
+# What a new lowest robustness is worth at least; all the way to 0, it is worth 1.
+_STEP_DOWN = 0.5
+# What another new value among so many of the lowest different ones is worth; on a plateau there is none.
+_NEAR, _LOWEST = 0.25, 5
+# What something new that a discrete signal did is worth.
+_NEW_MARK = 0.1
+# Number of proposals as which an arm's prior rating counts at first.
+_PRIOR_WEIGHT = 2.0
+# Rating of an arm of which nothing is known or remembered, and as how many proposals that always counts.
+_UNKNOWN, _UNKNOWN_WEIGHT = 0.05, 1.0
+# Two values of robustness that differ by less than this share of the larger one are the same level.
+_SAME = 1e-6
+# Robustness is a staircase if it has at most one value per so many simulations, from so many values on.
+_PER_LEVEL, _FEWEST = 4, 2
+
+
+@dataclass
+class Levels:
+    """The different values of robustness so far, in order."""
+
+    values: list[float] = field(default_factory=list)
+    simulations: int = 0
+
+    @property
+    def lowest(self) -> float:
+        """The lowest robustness; inf before the first one."""
+        return self.values[0] if self.values else inf
+
+    @property
+    def is_plateau(self) -> bool:
+        """Whether all of several simulations had the same robustness."""
+        return self.simulations >= _PER_LEVEL and len(self.values) == 1
+
+    @property
+    def is_staircase(self) -> bool:
+        """Whether many simulations had few different values of robustness, which lead down in steps."""
+        count = len(self.values)
+        return count >= _FEWEST and self.simulations >= _PER_LEVEL * count
+
+    def add(self, robustness: float) -> float:
+        """Add a simulation; return from 0 to 1 what its robustness is worth."""
+        self.simulations += 1
+        lowest, place = self.lowest, bisect_left(self.values, robustness)
+        near = self.values[max(0, place - 1) : place + 1]
+        if any(abs(robustness - v) <= _SAME * max(abs(v), abs(robustness)) for v in near):
+            return 0.0
+        insort(self.values, robustness)
+        if place == 0 and lowest < inf:
+            way = 1.0 - max(robustness, 0.0) / lowest if lowest > 0.0 else 1.0
+            return _STEP_DOWN + (1.0 - _STEP_DOWN) * way
+        return _NEAR if 0 < place < _LOWEST else 0.0
+
+
+class Policy:
+    """Draws the arm that proposes next.
+
+    A discounted rating with reserved shares: what an arm brought per proposal, of which older ones count
+    less. ``design/search.md`` says what is proven of it.
+
+    Args:
+        priors: rating of each arm before its first proposals, from 0 to 1.
+        simple: the arms with a reserved share.
+        settings: memory, sharpness and reserved share.
+    """
+
+    def __init__(self, priors: Mapping[str, float], simple: Sequence[str], settings: Settings) -> None:
+        self._settings, self._simple = settings, frozenset(simple)
+        self._brought = {arm: _PRIOR_WEIGHT * prior for arm, prior in priors.items()}
+        self._turns = dict.fromkeys(priors, _PRIOR_WEIGHT)
+
+    def learn(self, arm: str, worth: float, *, is_new: bool) -> None:
+        """Rate an arm by the worth of a proposal, and by whether a discrete signal did something new."""
+        if arm in self._turns:
+            memory = self._settings.memory
+            self._brought[arm] = memory * self._brought[arm] + max(worth, _NEW_MARK * is_new)
+            self._turns[arm] = memory * self._turns[arm] + 1.0
+
+    def rating(self, arm: str) -> float:
+        """Return what the arm's latest proposals brought on average, from 0 to 1."""
+        brought = self._brought[arm] + _UNKNOWN * _UNKNOWN_WEIGHT
+        return brought / (self._turns[arm] + _UNKNOWN_WEIGHT)
+
+    def choose(self, arms: Sequence[str], rng: np.random.Generator, *, reserved: bool) -> str:
+        """Draw one of the arms that can propose now.
+
+        Args:
+            arms: names of the arms.
+            rng: random generator.
+            reserved: whether the simple arms have their share.
+        """
+        kept = np.array([self._settings.reserved * (reserved and arm in self._simple) for arm in arms])
+        ratings = np.array([self.rating(arm) for arm in arms]) ** self._settings.sharpness
+        shares = kept + (1.0 - kept.sum()) * ratings / ratings.sum()
+        return arms[int(rng.choice(len(arms), p=shares / shares.sum()))]

@@ -1,0 +1,219 @@
+"""What planning minimises: robustness of many predicted trajectories, with margins in comparable units.
+
+The formula is written anew for the grid of predictions: each predicate becomes a signal of its own, its
+margin divided by the margin's spread, and windows are rounded to cells. The monitor judges thousands at once.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, floor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.space import SearchSpace
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.box import Array, learnable
+from falsifier.engines.layout import TimeGrid
+from falsifier.stl import Monitor, Verdict
+from falsifier.stl.expression import Name, Number
+from falsifier.stl.formula import (
+    Always,
+    And,
+    Eventually,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Until,
+    Window,
+)
+
+Margins = list[Array]
+
+# Maximum distance in cells of a window bound from a grid point at which it counts as that point.
+_ROUNDING = 1e-6
+# Margins of predicates over discrete signals only are cut to this on both sides: they have no slope.
+_DISCRETE = 0.5
+
+
+@dataclass(frozen=True)
+class PredictedCost:
+    """Robustness of trajectories on the grid, with each predicate's margin divided by its scale.
+
+    Attributes:
+        space: the search space, for the ranges of inputs in the formula.
+        grid: the grid of the predictions.
+        outputs: names of the predicted outputs.
+        predicates: distinct predicates of the formula.
+        discrete: whether each predicate compares only signals with few values.
+        scales: scale of each predicate's margin.
+        constants: values of signals that the formula names and no candidate varies: inputs kept constant.
+    """
+
+    space: SearchSpace
+    grid: TimeGrid
+    outputs: tuple[str, ...]
+    predicates: tuple[Predicate, ...]
+    discrete: tuple[bool, ...]
+    scales: tuple[float, ...]
+    constants: Mapping[str, float]
+    _monitor: Monitor = field(repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        formula: Formula,
+        space: SearchSpace,
+        grid: TimeGrid,
+        outputs: Sequence[str],
+        *,
+        discrete: frozenset[str],
+        constants: Mapping[str, float],
+    ) -> "PredictedCost":
+        """Return the cost for a formula, with all scales 1 until ``rescaled``."""
+        predicates = formula.predicates
+        on_grid = _on_grid(formula, grid.step, {p: _signal(i) for i, p in enumerate(predicates)})
+        # Rounded windows may end beyond the grid; the last values then continue.
+        samples = max(grid.cells, round(on_grid.horizon(1.0))) + 1
+        return cls(
+            space,
+            grid,
+            tuple(outputs),
+            predicates,
+            tuple({*p.left.signals, *p.right.signals} <= discrete for p in predicates),
+            (1.0,) * len(predicates),
+            constants,
+            Monitor(on_grid, 1.0, samples),
+        )
+
+    def margins(self, states: Array, inputs: Array) -> Margins:
+        """Return each predicate's margin at the grid points of the horizon, shape (m, cells + 1) each.
+
+        Args:
+            states: outputs, shape (m, cells + 1, outputs).
+            inputs: scaled inputs, shape (m, cells, inputs).
+        """
+        columns: dict[str, Any] = {name: states[..., i] for i, name in enumerate(self.outputs)}
+        columns |= {name: np.full(states.shape[:2], value) for name, value in self.constants.items()}
+        for j, r in enumerate(self.space.inputs):
+            held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
+            columns[r.name] = r.low + (r.high - r.low) * held
+        found = []
+        with np.errstate(all="ignore"):  # what is not finite is cut by ``learnable``
+            for predicate, discrete in zip(self.predicates, self.discrete, strict=True):
+                values = np.broadcast_to(_margin(predicate, columns), states.shape[:2])
+                found.append(np.clip(values, -_DISCRETE, _DISCRETE) if discrete else values)
+        return found
+
+    def cost(self, margins: Margins) -> Array:
+        """Return the scaled robustness of each trajectory, shape (m,)."""
+        return np.asarray(self._monitor.batch(self._columns(margins)))
+
+    def verdicts(self, margins: Margins) -> list[Verdict]:
+        """Return the verdict on each trajectory, in this cost's unit."""
+        columns = self._columns(margins)
+        times = np.arange(float(self._monitor.samples))
+        verdicts = []
+        for row in range(len(margins[0])):
+            verdict = self._monitor.evaluate(Trajectory(times, {n: c[row] for n, c in columns.items()}))
+            decider = next(p for i, p in enumerate(self.predicates) if verdict.predicate == str(_signal(i)))
+            time = self.grid.step * min(verdict.critical_time, self.grid.cells)
+            verdicts.append(Verdict(verdict.robustness, time, str(decider)))
+        return verdicts
+
+    def rescaled(self, seen: Sequence[Margins]) -> "PredictedCost":
+        """Return the cost with each margin scaled by the standard deviation of its simulated values."""
+        scales = []
+        for i, discrete in enumerate(self.discrete):
+            spread = float(np.std(np.concatenate([margins[i] for margins in seen])))
+            scales.append(_DISCRETE if discrete else max(spread, 1e-9))
+        return replace(self, scales=tuple(scales))
+
+    def plain(self) -> "PredictedCost":
+        """Return the cost in the requirement's own unit."""
+        return replace(self, scales=(1.0,) * len(self.scales))
+
+    def _columns(self, margins: Margins) -> dict[str, NDArray[np.float64]]:
+        beyond = self._monitor.samples - self.grid.cells - 1
+        return {
+            f"p{i}": np.pad(learnable(np.nan_to_num(m)) / s, ((0, 0), (0, beyond)), mode="edge")
+            for i, (m, s) in enumerate(zip(margins, self.scales, strict=True))
+        }
+
+
+def needs_several(formula: Formula, *, negated: bool = False) -> bool:
+    """Return whether a violation requires several conditions at once: the normal form has a disjunction."""
+    match formula:
+        case Not(operand):
+            return needs_several(operand, negated=not negated)
+        case Until() | Iff():
+            return True
+        case And(left, right) if not negated:
+            return needs_several(left) or needs_several(right)
+        case Or(left, right) | Implies(left, right) if negated:
+            turned = isinstance(formula, Implies)
+            return needs_several(left, negated=not turned) or needs_several(right, negated=True)
+        case And() | Or() | Implies():
+            return True
+    return any(needs_several(child, negated=negated) for child in formula.children)
+
+
+def inner_windows(formula: Formula, *, nested: bool = False) -> list[float]:
+    """Return the lengths in s of the windows below another temporal operator."""
+    lengths = []
+    if isinstance(formula, (Always, Eventually, Until)):
+        if nested and formula.window is not None:
+            lengths.append(formula.window.end - formula.window.start)
+        nested = True
+    for child in formula.children:
+        lengths += inner_windows(child, nested=nested)
+    return lengths
+
+
+def _signal(index: int) -> Predicate:
+    return Predicate(">", Name(f"p{index}"), Number(0.0))
+
+
+def _on_grid(formula: Formula, step: float, signals: Mapping[Predicate, Predicate]) -> Formula:
+    """Return a formula over the predicates' margins, whose windows count cells."""
+    if isinstance(formula, Predicate):
+        return signals[formula]
+    match formula:
+        case Not(operand) | Next(operand):
+            return type(formula)(_on_grid(operand, step, signals))
+        case Always(operand, window) | Eventually(operand, window):
+            return type(formula)(_on_grid(operand, step, signals), _in_cells(window, step))
+    left, right = (_on_grid(child, step, signals) for child in formula.children)
+    match formula:
+        case Until(_, _, window):
+            return Until(left, right, _in_cells(window, step))
+        case And() | Or() | Implies() | Iff():
+            return type(formula)(left, right)
+    raise TypeError(f"no predicted robustness for {type(formula).__name__}")
+
+
+def _in_cells(window: Window | None, step: float) -> Window | None:
+    if window is None:
+        return None
+    if 0 < window.end < step:
+        return Window(1.0, 1.0)  # a window shorter than a cell is approximated by the next grid point
+    first = ceil(window.start / step - _ROUNDING)
+    return Window(float(first), float(max(first, floor(window.end / step + _ROUNDING))))
+
+
+def _margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
+    left, right = predicate.left.evaluate(columns), predicate.right.evaluate(columns)
+    match predicate.operator:
+        case "<" | "<=":
+            return np.asarray(right - left)
+        case ">" | ">=":
+            return np.asarray(left - right)
+        case "==":
+            return -np.abs(left - right)
+        case "!=":
+            return np.asarray(np.abs(left - right))

@@ -1,0 +1,113 @@
+"""Search without dynamics: changes of the best inputs, and the trust region."""
+
+import numpy as np
+import pytest
+
+from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.space import ParameterRange, SearchSpace
+from falsifier.engines.box import Array
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.surrogate.changes import Seen, propose_change
+from falsifier.engines.surrogate.region import TrustRegion
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import Verdict, parse
+from falsifier.testing import FREE, START, lag, lag_problem
+from tests.engines.surrogate.support import SETTINGS
+
+
+def layout_of(cells: int = 100) -> Layout:
+    problem = lag_problem(free=FREE, parameters=[START])
+    return planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=cells, shortest=0.05))
+
+
+def seen(points: Array, costs: list[float], decided: float) -> Seen:
+    return Seen(points, np.array(costs), np.full(len(points), decided))
+
+
+def test_random_points_come_first() -> None:
+    _, why = propose_change(
+        seen(np.zeros((3, 101)), [1.0, 2.0, 3.0], 5.0), layout_of(), SETTINGS, np.random.default_rng(0)
+    )
+    assert why.startswith("random")
+
+
+def test_the_best_are_changed_before_the_time_that_decided() -> None:
+    layout, rng = layout_of(), np.random.default_rng(1)
+    points = np.repeat(np.linspace(0.2, 0.8, 9)[:, None], 101, axis=1)
+    history = seen(points, list(range(9)), 3.0)
+    parents = []
+    for _ in range(60):
+        point, why = propose_change(history, layout, SETTINGS, rng)
+        if why.startswith("random"):
+            continue
+        same = (np.abs(points - point) < 1e-9).mean(axis=1)
+        parents.append(int(np.argmax(same)))
+        changes = np.abs(point - points[parents[-1]]) > 1e-9
+        assert changes[layout.starts <= 3.0].any(), "a later change alone cannot lower it"
+    assert parents.count(0) > 0.5 * len(parents)
+
+
+def test_of_equally_good_ones_each_is_changed() -> None:
+    layout, rng = layout_of(), np.random.default_rng(2)
+    points = np.repeat(np.linspace(0.2, 0.8, 9)[:, None], 101, axis=1)
+    found = [propose_change(seen(points, [1.0] * 9, 10.0), layout, SETTINGS, rng)[0] for _ in range(60)]
+    parents = {int(np.argmax((np.abs(points - point) < 1e-9).mean(axis=1))) for point in found}
+    assert len(parents) > 5
+
+
+def test_risky_changes_are_avoided() -> None:
+    layout, rng = layout_of(), np.random.default_rng(3)
+    history = seen(np.full((9, 101), 0.5), list(range(9)), 10.0)
+
+    def risk(points: Array) -> Array:
+        return np.asarray(points.max(axis=1))
+
+    highest = [float(propose_change(history, layout, SETTINGS, rng, risk)[0].max()) for _ in range(40)]
+    assert np.mean(highest) < 0.75
+
+
+def parameters_problem(kind: str, count: int) -> Problem:
+    ranges = tuple(
+        ParameterRange(
+            f"p{i}", 0, 20, kind="integer" if kind == "integer" or (kind == "mixed" and i % 2) else "real"
+        )
+        for i in range(count)
+    )
+    variables = (
+        *(Variable(r.name, kind=r.kind, causality="parameter", start=1.0, settable=True) for r in ranges),
+        Variable("x", causality="output"),
+    )
+    return Problem(
+        FunctionModel(lag, ModelInfo("bowl", variables=variables)),
+        Requirement("BOWL", parse("G (x <= 1)")),
+        SearchSpace((), ranges, 1.0),
+        Experiment(1.0, 0.1, ("x",)),
+    )
+
+
+@pytest.mark.parametrize("kind", ["real", "integer", "mixed"])
+def test_the_trust_region_finds_the_bottom_of_a_bowl_in_few_simulations(kind: str) -> None:
+    problem = parameters_problem(kind, 6)
+    target = np.array([3.0, 17.0, 8.0, 20.0, 0.0, 11.0])
+    engine = TrustRegion(problem, seed=0)
+    lowest = np.inf
+    for _ in range(70):
+        (candidate,) = engine.ask()
+        distance = float(np.abs(problem.space.encode(candidate) - target).sum())
+        lowest = min(lowest, distance)
+        engine.tell([Evaluation(candidate, verdict=Verdict(distance, 0.0, "bowl"))])
+    assert lowest <= 6.0, "uniform points come within about 22"
+
+
+def test_the_trust_region_starts_again_where_nothing_improves() -> None:
+    problem = parameters_problem("real", 2)
+    engine = TrustRegion(problem, seed=0)
+    reasons = []
+    for _ in range(60):
+        (candidate,) = engine.ask()
+        reasons.append(candidate.rationale)
+        engine.tell([Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))])
+    starts = [i for i, why in enumerate(reasons) if why.startswith("a new start")]
+    assert max(starts) > 20 and len(starts) < 30

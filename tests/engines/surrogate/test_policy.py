@@ -1,0 +1,54 @@
+"""Whose turn it is."""
+
+import numpy as np
+import pytest
+
+from falsifier.engines.surrogate.policy import Levels, Policy
+from tests.engines.surrogate.support import SETTINGS
+
+
+def told(*robustness: float) -> tuple[Levels, list[float]]:
+    levels = Levels()
+    return levels, [levels.add(r) for r in robustness]
+
+
+def test_steps_down_count_by_how_far_they_go() -> None:
+    _, worth = told(4.0, 3.0, 1.5, 1.5, 3.0, 2.0, -1.0)
+    assert worth == [0.0, 0.625, 0.75, 0.0, 0.0, 0.25, 1.0]
+
+
+def test_many_simulations_with_few_levels_are_a_staircase_and_with_one_a_plateau() -> None:
+    levels, _ = told(*[3.0] * 4)
+    assert levels.is_plateau and not levels.is_staircase
+    levels, _ = told(*[3.0, 2.0] * 4)
+    assert levels.is_staircase and not levels.is_plateau
+    levels, _ = told(*np.linspace(3.0, 2.0, 8).tolist())
+    assert not levels.is_staircase
+
+
+def shares(policy: Policy, arms: list[str], *, reserved: bool) -> dict[str, float]:
+    rng = np.random.default_rng(0)
+    drawn = [policy.choose(arms, rng, reserved=reserved) for _ in range(2000)]
+    return {arm: drawn.count(arm) / 2000 for arm in arms}
+
+
+def test_an_arm_that_brings_more_has_more_turns_and_a_simple_one_keeps_its_share() -> None:
+    policy = Policy({"a": 0.3, "b": 0.3, "simple": 0.1}, ["simple"], SETTINGS)
+    for _ in range(10):
+        policy.learn("a", 0.5, is_new=False)
+        policy.learn("b", 0.0, is_new=False)
+        policy.learn("someone else", 1.0, is_new=True)
+    arms = ["a", "b", "simple"]
+    without, kept = (shares(policy, arms, reserved=reserved) for reserved in (False, True))
+    assert without["a"] > 0.9 and without["simple"] < 0.05
+    assert kept["simple"] == pytest.approx(SETTINGS.reserved, abs=0.03)
+
+
+def test_on_a_plateau_ratings_fall_until_all_are_alike_and_new_marks_raise_one() -> None:
+    policy = Policy({"a": 0.8, "b": 0.1}, [], SETTINGS)
+    for _ in range(40):
+        policy.learn("a", 0.0, is_new=False)
+        policy.learn("b", 0.0, is_new=False)
+    assert shares(policy, ["a", "b"], reserved=False)["a"] < 0.8
+    policy.learn("b", 0.0, is_new=True)
+    assert shares(policy, ["a", "b"], reserved=False)["b"] > 0.6

@@ -1,0 +1,104 @@
+"""Uniform and Sobol points, corners: the engines that are yardsticks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.engines import make_engine
+from falsifier.engines.simple import CornerWalk
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.stl import Verdict
+from falsifier.testing import START, drive, lag_problem, simulated
+from tests.engines.support import NamedEngine, box_problem
+
+
+class TestUniform(NamedEngine):
+    engine = "uniform"
+
+
+class TestSobol(NamedEngine):
+    engine = "sobol"
+
+
+class TestCorners(NamedEngine):
+    engine = "corners"
+
+
+def test_uniform_points_fill_the_box_alone_or_in_batches() -> None:
+    problem = box_problem()
+    points = np.array([problem.space.encode(c) for c in make_engine("uniform", problem, seed=2).ask(400)])
+    assert np.abs(points.mean(axis=0)).max() < 0.125
+    assert points.min() < -0.975 and points.max() > 0.975
+    one, other = (make_engine("uniform", problem, seed=7) for _ in range(2))
+    assert [c.key for c in one.ask(3)] == [c.key for _ in range(3) for c in other.ask()]
+
+
+def test_sobol_points_are_more_even_than_random_ones_as_far_as_there_are_direction_numbers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def evenness(points: int) -> list[bool]:
+        problem = lag_problem(points=points)
+        drawn = np.array([problem.space.encode(c) for c in make_engine("sobol", problem, seed=2).ask(64)])
+        return [len(set(np.histogram(c, bins=16, range=(-1, 1))[0])) == 1 for c in drawn.T]
+
+    assert all(evenness(5))
+    monkeypatch.setattr("scipy.stats.qmc.Sobol.MAXDIM", 2)
+    assert evenness(5) == [True, True, False, False, False]
+
+
+def test_corners_come_first_and_each_once() -> None:
+    problem = lag_problem(inputs=2, parameters=[START])
+    engine = make_engine("corners", problem, seed=1)
+    asked = drive(engine, simulated(problem, lambda x: float(3 - x.max())), rounds=9)
+    corners = {(*(s.values for s in c.signals.values()), *c.parameters.values()) for c in asked[:8]}
+    assert len(corners) == 8
+    assert all(abs(v) == 1.0 for c in asked[:8] for s in c.signals.values() for v in s.values)
+    assert any(abs(v) != 1.0 for s in asked[8].signals.values() for v in s.values)
+
+
+def test_an_input_without_effect_costs_one_simulation() -> None:
+    def judge(candidate: Candidate) -> Evaluation:
+        u, _, w = (candidate.signals[name].values[0] for name in "uvw")
+        return Evaluation(candidate, verdict=Verdict(3.0 - u - w, 0.0, "u + w <= 3"))
+
+    asked = drive(make_engine("corners", lag_problem(inputs=3), seed=0), judge, rounds=4)
+    assert min(judge(c).robustness or 0.0 for c in asked) == 1.0
+
+
+def test_what_has_a_single_value_has_one_extreme_and_reasons_name_the_levels() -> None:
+    problem = lag_problem(inputs=2)
+    u, v = problem.space.inputs
+    problem = replace(problem, space=replace(problem.space, inputs=(replace(u, low=0.5, high=0.5), v)))
+    first, second, third = make_engine("corners", problem, seed=0).ask(3)
+    assert {first.rationale, second.rationale} == {"constant extremes: v low", "constant extremes: v high"}
+    assert third.rationale == "uniform random: all corners were tried"
+    assert first.signals["u"].values == second.signals["u"].values
+
+
+def test_a_failed_corner_is_tried_once_and_never_built_upon() -> None:
+    rng = np.random.default_rng(3)
+    walk = CornerWalk(3)
+    first = walk.next(rng)
+    assert first is not None
+    walk.learn(first, None)
+    second = walk.next(rng)
+    assert second is not None
+    walk.learn(second, 1.0)
+    third = walk.next(rng)
+    assert third not in (None, first, second)
+    assert sum(a != b for a, b in zip(second, third or (), strict=True)) == 1, "the best one is built upon"
+
+
+def test_a_corner_that_was_heard_of_is_built_upon_and_not_tried() -> None:
+    walk = CornerWalk(2)
+    walk.heard((0, 0), 1.0)
+    rng = np.random.default_rng(0)
+    first = walk.next(rng)
+    assert first in ((0, 1), (1, 0))
+    walk.learn(first, 2.0)
+    walk.heard(first, 0.5)
+    assert walk.next(rng) == tuple(1 - level for level in first), "its own simulation counts"
+    assert not walk.is_done
+    assert walk.next(rng) is not None and walk.is_done and walk.next(rng) is None
