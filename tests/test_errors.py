@@ -3,7 +3,7 @@ import pickle
 import pytest
 
 from falsifier import errors
-from falsifier.errors import FalsifierError, SimulationError, SpecError, did_you_mean, rejected
+from falsifier.errors import FalsifierError, SimulationError, did_you_mean, rejected
 
 TREE = [
     value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, FalsifierError)
@@ -13,12 +13,6 @@ TREE = [
 def test_every_error_is_of_one_tree_and_never_ends_like_a_falsification() -> None:
     assert len(TREE) >= 10
     assert {error.exit_code for error in TREE} == {2, 3}
-
-
-def test_a_spec_error_begins_with_its_file_and_key() -> None:
-    assert str(SpecError("what", file="a.toml", key="inputs.u")) == "a.toml: inputs.u: what"
-    assert str(SpecError("what", key="inputs.u")) == "inputs.u: what"
-    assert str(SpecError("what")) == "what"
 
 
 def test_a_failed_simulation_travels_between_processes_with_what_it_knows() -> None:
@@ -68,7 +62,3 @@ def test_a_rejected_value_is_shown_where_only_the_expected_one_is_told(
     message: str, given: object, text: str
 ) -> None:
     assert rejected(message, given) == text
-
-
-def test_long_rejected_values_are_cut() -> None:
-    assert len(rejected("Input should be short", "x" * 10_000)) < 120

@@ -81,15 +81,6 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").code == 5
 
 
-def test_distributed_tests_give_the_same(repository: Path) -> None:
-    done = run_pytest(repository, "--falsifier", "specs", "-n", "2")
-    assert "1 failed, 1 passed" in done.out, done.out
-
-
-def test_without_the_option_specs_are_no_tests(repository: Path) -> None:
-    assert run_pytest(repository, "specs").code == 5
-
-
 def test_a_broken_spec_is_an_error_that_names_the_key(repository: Path) -> None:
     broken = repository / "broken.toml"
     broken.write_text(SPEC.replace("control_points = 2", "control_pionts = 2"))

@@ -104,19 +104,6 @@ def test_a_name_that_would_split_messages_is_refused(name: str, tmp_path: Path) 
         assert one_line(str(caught.value)) == str(caught.value)
 
 
-def test_a_key_with_a_line_break_does_not_split_the_message() -> None:
-    with pytest.raises(SpecError, match=r"inputs\.a b\.rnge: unknown key") as caught:
-        parse_spec(
-            {
-                "model": {"fmu": "a.fmu"},
-                "inputs": {"a\nb": {"rnge": 1}},
-                "requirements": {"R": {"formula": "x > 0"}},
-            },
-            file="a.toml",
-        )
-    assert "\n" not in str(caught.value)
-
-
 @hostile
 def test_runs_stay_in_their_directory(name: str, tmp_path: Path) -> None:
     place = tmp_path / "here" / "out"

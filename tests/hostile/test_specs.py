@@ -162,12 +162,6 @@ def test_descriptions_of_any_size_are_refused_before_they_are_read(
     clear(error)
 
 
-@pytest.mark.parametrize("limit", ["nan", "NaN", "inf", "-INF"])
-def test_limits_that_limit_nothing_are_none(limit: str) -> None:
-    info = described(FMI2.format(scalar(typed=f'<Real min="{limit}" max="{limit}"/>'))).info
-    assert info["x"].limits == (None, None)
-
-
 def flipped(content: bytes, random: Random) -> bytes:
     changed = bytearray(content)
     for _ in range(random.choice((1, 10, 100))):

@@ -1,13 +1,14 @@
 """What a shared library for Linux says of itself, read from its file (ELF) without loading it.
 
-Names and numbers are those of the System V ABI and of the Linux Standard Base.
+Names and numbers are those of the System V ABI and of the Linux Standard Base. All machines with processes of
+64 bits that FMUs are built for have the least significant byte first.
 """
 
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-_MAGIC = b"\x7fELF"
+_MAGIC, _LITTLE_ENDIAN, _ENTRY_BYTES = b"\x7fELF", 1, 16
 _LOADED, _DYNAMIC = 1, 2  # PT_LOAD, PT_DYNAMIC
 _NEEDED, _STRINGS, _RPATH, _RUNPATH = 1, 5, 15, 29  # DT_NEEDED, DT_STRTAB, DT_RPATH, DT_RUNPATH
 _DEFINED, _REQUIRED = 0x6FFFFFFC, 0x6FFFFFFE  # DT_VERDEF, DT_VERNEED
@@ -20,7 +21,7 @@ class Elf:
     """Contents of an ELF file.
 
     Attributes:
-        bits: 32 or 64.
+        bits: 32 or 64; of a file with 32 bits nothing else is read.
         needed: file names of the libraries that are loaded with it.
         folders: where these are looked up first; ``$ORIGIN`` is the folder of the file.
         required: versions that it needs, each with the file name of the library that defines it.
@@ -28,10 +29,10 @@ class Elf:
     """
 
     bits: int
-    needed: tuple[str, ...]
-    folders: tuple[str, ...]
-    required: tuple[tuple[str, str], ...]
-    defined: frozenset[str]
+    needed: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    required: tuple[tuple[str, str], ...] = ()
+    defined: frozenset[str] = frozenset()
 
 
 def read_elf(content: bytes) -> Elf:
@@ -40,8 +41,10 @@ def read_elf(content: bytes) -> Elf:
     Raises:
         ValueError: if it is not one, or is damaged.
     """
-    if content[:4] != _MAGIC or len(content) < 64 or content[4] not in (1, 2) or content[5] not in (1, 2):
+    if content[:4] != _MAGIC or len(content) < 64 or content[4] not in (1, 2) or content[5] != _LITTLE_ENDIAN:
         raise ValueError("not an ELF file")
+    if content[4] == 1:
+        return Elf(32)
     try:
         return _File(content).read()
     except (struct.error, IndexError, OverflowError) as error:
@@ -51,8 +54,6 @@ def read_elf(content: bytes) -> Elf:
 class _File:
     def __init__(self, content: bytes) -> None:
         self._content = content
-        self._is_64 = content[4] == 2
-        self._order = "<" if content[5] == 1 else ">"
         self._segments = list(self._read_segments())
 
     def read(self) -> Elf:
@@ -66,7 +67,7 @@ class _File:
         # A RUNPATH replaces the RPATH.
         paths = names[_RUNPATH] or names[_RPATH]
         return Elf(
-            bits=64 if self._is_64 else 32,
+            bits=64,
             needed=tuple(names[_NEEDED]),
             folders=tuple(folder for path in paths for folder in path.split(":") if folder),
             required=tuple(self._required(strings, first.get(_REQUIRED))),
@@ -76,27 +77,22 @@ class _File:
     def _unpack(self, kinds: str, offset: int) -> tuple[int, ...]:
         if offset < 0:
             raise IndexError("a position before the file")
-        return struct.unpack_from(self._order + kinds, self._content, offset)
+        return struct.unpack_from(f"<{kinds}", self._content, offset)
 
     def _read_segments(self) -> Iterator[tuple[int, int, int, int]]:
         """Kind, position in the file, address and size in the file of each segment."""
-        (start,) = self._unpack("Q" if self._is_64 else "I", 32 if self._is_64 else 28)
-        size, count = self._unpack("HH", 54 if self._is_64 else 42)
+        (start,) = self._unpack("Q", 32)
+        size, count = self._unpack("HH", 54)
         for k in range(count):
-            at = start + k * size
-            if self._is_64:
-                kind, _, offset, address, _, length = self._unpack("IIQQQQ", at)
-            else:
-                kind, offset, address, _, length = self._unpack("IIIII", at)
+            kind, _, offset, address, _, length = self._unpack("IIQQQQ", start + k * size)
             yield kind, offset, address, length
 
     def _entries(self) -> Iterator[tuple[int, int]]:
         """Tags and values of the dynamic section."""
-        size = 16 if self._is_64 else 8
         for kind, offset, _, length in self._segments:
             if kind == _DYNAMIC:
-                for k in range(min(length // size, _MOST_ENTRIES)):
-                    tag, value = self._unpack("QQ" if self._is_64 else "II", offset + k * size)
+                for k in range(min(length // _ENTRY_BYTES, _MOST_ENTRIES)):
+                    tag, value = self._unpack("QQ", offset + k * _ENTRY_BYTES)
                     if not tag:
                         return
                     yield tag, value

@@ -120,16 +120,6 @@ def test_a_damaged_entry_is_named(tmp_path: Path) -> None:
         read_info(tmp_path / "damaged.fmu")
 
 
-def test_an_unknown_compression_method_is_named(tmp_path: Path) -> None:
-    data = write(tmp_path / "packed.fmu", ("modelDescription.xml", b"<a/>")).read_bytes()
-    for header, position in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
-        at = data.index(header) + position
-        data = data[:at] + b"\x63\x00" + data[at + 2 :]
-    (tmp_path / "packed.fmu").write_bytes(data)
-    with pytest.raises(ModelError, match=r"packed\.fmu: modelDescription\.xml is damaged \(.*compression"):
-        read_info(tmp_path / "packed.fmu")
-
-
 @pytest.mark.parametrize(("header", "name_at"), [(b"PK\x03\x04", 30), (b"PK\x01\x02", 46)])
 def test_a_name_in_no_encoding_is_damage(tmp_path: Path, header: bytes, name_at: int) -> None:
     path = write(tmp_path / "named.fmu", ("modelDescription.xmlü", b"<a/>"))

@@ -8,8 +8,6 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu.description import needed_libraries, wine
-from falsifier.fmu.description.archive import WINDOWS
-from falsifier.fmu.description.libraries import find_libraries, missing_binary_text
 from falsifier.fmu.description.needed_libraries import binary_remarks
 from falsifier.fmu.description.wine import can_run_windows
 from tests.fmu.description.test_elf import library
@@ -94,14 +92,6 @@ def test_what_is_no_library_of_linux_is_said(tmp_path: Path, installed: Path) ->
     )
 
 
-def test_a_library_of_the_other_size_is_not_taken(tmp_path: Path, installed: Path) -> None:
-    (installed / "libz.so.1").write_bytes(library(bits=32))
-    (said,) = binary_remarks(fmu(tmp_path, M__so=library(("libz.so.1",))))
-    assert "M.so needs libz.so.1, which is not installed" in said
-    (said,) = binary_remarks(fmu(tmp_path, M__so=library(bits=32)))
-    assert said == "M.so has 32 bits and cannot be loaded here; export it for 64 bits"
-
-
 def without_linux(tmp_path: Path, folder: str, *, sources: bool = False) -> str:
     packed = tmp_path / "my.fmu"
     with zipfile.ZipFile(packed, "w") as archive:
@@ -176,50 +166,7 @@ def test_a_damaged_binary_is_an_error(tmp_path: Path) -> None:
         binary_remarks(copy)
 
 
-def test_libraries_of_another_platform_are_found_by_its_folder() -> None:
-    names = ["binaries/win64/model.dll", "binaries/x86_64-windows/model.dll", "binaries/linux64/model.so"]
-    for version, folder in (("2.0", "win64"), ("3.0", "x86_64-windows")):
-        found, _ = find_libraries(names, version, {"co-simulation": "model"}, WINDOWS)
-        assert found["co-simulation"].as_posix() == f"binaries/{folder}/model.dll"
-
-
-@pytest.fixture
-def on_linux(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("falsifier.fmu.description.archive.this_platform", lambda: "x86_64-linux")
-
-
-@pytest.mark.usefixtures("on_linux")
-@pytest.mark.parametrize(
-    ("platforms", "said"),
-    [
-        (("x86-windows",), "32-bit Windows cannot be run, because Wine is used for 64-bit Windows only"),
-        (("x86_64-darwin", "aarch64-darwin"), "binaries for macOS run only there"),
-        (("x86-linux", "x86-windows"), "a 32-bit binary cannot be loaded here"),
-    ],
-)
-def test_each_kind_of_binary_that_does_not_help_is_told_why(platforms: tuple[str, ...], said: str) -> None:
-    text = missing_binary_text("FMU", platforms, has_sources=False)
-    assert text.startswith(f"no binary for x86_64-linux, only for {', '.join(platforms)}; ")
-    assert said in text and text.count(";") == 2
-    assert text.endswith(" or for 64-bit Windows") == ("x86-windows" in platforms)
-
-
 @pytest.mark.parametrize("character", ["\\", '"'])
 def test_paths_that_windows_programs_cannot_open_are_refused(character: str) -> None:
     with pytest.raises(ModelError, match="set TMPDIR to another folder"):
         wine.windows_path(Path(f"/tmp/a{character}b/x.dll"))
-
-
-def test_the_libraries_of_wine_are_found_from_its_program(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = tmp_path / "usr" / "bin" / "wine64"
-    own = tmp_path / "usr" / "lib" / "x86_64-linux-gnu" / "wine" / "x86_64-windows"
-    for place in (program, own / "Kernel32.dll", own / "msvcrt.dll"):
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.touch()
-    monkeypatch.setattr(wine, "find_wine", lambda: program)
-    look = wine.wine_libraries.__wrapped__
-    assert look() == {"kernel32.dll", "msvcrt.dll"}
-    monkeypatch.setattr(wine, "find_wine", lambda: None)
-    assert look() == frozenset()

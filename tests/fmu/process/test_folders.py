@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu.process.folders import WorkFolder, remove_work_folder, sweep
+from falsifier.fmu.process.folders import WorkFolder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -45,13 +45,6 @@ def test_the_folder_of_a_killed_owner_is_swept(temporary: Path) -> None:
     assert len(list(temporary.iterdir())) == 2
     sweep()
     assert list(temporary.iterdir()) == []
-
-
-def test_a_folder_may_be_removed_by_another_process_than_its_owner(temporary: Path) -> None:
-    folder = WorkFolder()
-    remove_work_folder(folder.path)
-    assert list(temporary.iterdir()) == []
-    folder.remove()
 
 
 @pytest.mark.parametrize("name", ["falsifier-fmu-mine", "falsifier-fmu-" + "g" * 32, "falsifier-build-x"])

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import Component, Connection, Coupling
+from falsifier.fmu import Component, Coupling
 from falsifier.fmu.systems.network import Method
 from tests.fmu.fixtures import path
-from tests.fmu.small_systems import LOOP, STEP, component, loop, run, sampled_loop, solved, system
+from tests.fmu.small_systems import LOOP, STEP, loop, run, sampled_loop, solved, system
 
 DELAY = Coupling(loops="delay")
 
@@ -30,55 +30,6 @@ def test_gauss_seidel_has_no_delay_and_jacobi_one_step(plant: str, pi: str) -> N
 def test_a_smaller_communication_step_keeps_the_output_grid() -> None:
     found = run(loop(), "plant.x", step_size=0.02)
     np.testing.assert_allclose(found["plant.x"], sampled_loop(0, steps=50, step=0.02)[::5], atol=1e-9)
-
-
-@pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
-def test_a_component_with_a_step_of_its_own_holds_its_outputs_until_the_next(method: str) -> None:
-    model = system(
-        {"plant": "Plant_2", "pi": component("Gain_2", 0.2)},
-        LOOP,
-        Coupling(method),  # type: ignore[arg-type]
-    )
-    x, u, before = [0.0], 2.0, 0.0
-    for k in range(10):
-        x.append(u + (x[-1] - u) * float(np.exp(-0.05)))
-        if (
-            k % 2
-        ):  # at the end of its step the controller sees the plant then, with Jacobi as at its beginning
-            u = 2.0 * (1.0 - (x[-1] if method == "gauss-seidel" else before))
-            before = x[-1]
-    np.testing.assert_allclose(run(model, "plant.x")["plant.x"], x, atol=1e-9)
-
-
-def test_linear_extrapolation_makes_the_coupling_one_order_better() -> None:
-    """b follows a, whose output is known at both ends of each step."""
-    wave = {"a.u": Signal((0.0, 4.0), (0.0, 4.0), "linear")}
-
-    def error(extrapolation: str, step: float) -> float:
-        link = Connection("a.y", extrapolation=extrapolation)  # type: ignore[arg-type]
-        model = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": link})
-        finest = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": Connection("a.y", extrapolation="linear")})
-        exact = run(finest, "b.x", stop=4.0, interval=0.4, step_size=0.001, signals=wave)["b.x"]
-        found = run(model, "b.x", stop=4.0, interval=0.4, step_size=step, signals=wave)["b.x"]
-        return float(np.abs(found - exact).max())
-
-    # The input of a is held too, which costs the same in all of these; constant inputs have no such error.
-    wave = {"a.u": Signal((0.0,), (1.0,))}
-    assert error("hold", 0.1) / error("hold", 0.05) == pytest.approx(2.0, rel=0.1)
-    assert error("linear", 0.1) / error("linear", 0.05) == pytest.approx(4.0, rel=0.1)
-
-
-def test_factors_and_offsets_and_units_are_applied() -> None:
-    link = Connection("a.y", factor=2.0, offset=0.5)
-    model = system(
-        {"a": "Gain_2", "b": "Gain_2"}, {"b.r": link, "b.measured": Connection("a.y", offset=-1.0)}
-    )
-    found = run(model, "b.y")  # a.y = 2, so b.y = 2 (4.5 - 1)
-    np.testing.assert_allclose(found["b.y"], 7.0)
-    millimetres = system({"plant": "Plant_2", "pi": "Gain_2mm"}, LOOP)
-    found = run(millimetres, "plant.x", parameters={"pi.k": 0.002}, signals={"pi.r": Signal((0.0,), (1.0,))})
-    # u = 0.002 (1 - 1000 x) = 0.002 - 2 x: the gain of the other loop, with a smaller reference.
-    np.testing.assert_allclose(found["plant.x"], 0.001 * sampled_loop(0), atol=1e-12)
 
 
 def test_a_loop_at_initialisation_converges_to_its_solution() -> None:
@@ -123,20 +74,6 @@ def test_a_direct_loop_is_iterated_to_its_solution(lead: Path | Component, pi: s
         np.testing.assert_allclose(found["plant.y"], found["plant.x"] + 0.5 * found["pi.y"], atol=1e-8)
         np.testing.assert_allclose(found["pi.y"], 1.0 - found["plant.y"], atol=1e-8)
     model.close()
-
-
-def test_components_with_steps_of_their_own_iterate_when_they_meet() -> None:
-    """The controller's value is held for two steps; where both step, they agree."""
-    pi = component("Gain_2", 0.2)
-    model = system({"plant": "Lead_2", "pi": pi}, LOOP, Coupling(loops="iterate"))
-    found = run(model, "plant.x", "plant.y", "pi.y", parameters={"pi.k": 1.0})
-    u = found["pi.y"]
-    np.testing.assert_allclose(u[2::2], (1.0 - found["plant.y"])[2::2], atol=1e-8)
-    assert u[2:10:2].tolist() == u[3:11:2].tolist()
-    decay = float(np.exp(-0.05))
-    np.testing.assert_allclose(
-        found["plant.x"][1:], u[1:] + (found["plant.x"][:-1] - u[1:]) * decay, atol=1e-9
-    )
 
 
 def test_a_step_that_does_not_converge_is_named_with_its_variables() -> None:
