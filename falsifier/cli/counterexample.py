@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from math import isqrt
 from pathlib import Path
@@ -14,10 +14,11 @@ from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
 from falsifier.cli.llm_options import api_base_option, effort_option, llm_option
 from falsifier.cli.options import budget_option, interface_option, json_option, out_option, run_argument
 from falsifier.cli.output import conclude, say
+from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
-from falsifier.counterexamples.store import Database, Replayed
+from falsifier.counterexamples.store import EXPLANATION, Database, Replayed
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface
@@ -200,6 +201,9 @@ def _shrink(case: Case, *, budget: int, at_most: float | None, out: Path | None,
             files = _written_inputs(problem, found, file)
         else:
             files = write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
+            if found.trajectory is not None:  # for reports, which simulate nothing
+                found.trajectory.save(file.with_suffix(".npz"))
+        case.beside(EXPLANATION).unlink(missing_ok=True)  # it was about another input
     if as_json:
         content: dict[str, Any] = {"violated": found.violated}
         content |= {"outcome": confirmation and confirmation.outcome}
@@ -257,6 +261,8 @@ def _explain(
         explanation = explain(problem, evaluation)
         if case.is_miss:
             picture = draw_evaluation(problem, evaluation, case.beside("nearest-miss.png"))
+    with suppress(OSError):  # it is printed anyway
+        write_whole(case.beside(EXPLANATION), f"{explanation.text}\n")
     words = narrate(explanation, chat) if chat else None
     if as_json:
         told = {"llm": llm, "words": words} if words else None

@@ -36,6 +36,8 @@ from falsifier.stl.margins import signed
 from falsifier.stl.verdict import Verdict
 
 FILE_NAME = "counterexample.json"
+# What falsifier explain has found out, beside the counterexample's file; reports repeat it.
+EXPLANATION = "explanation.txt"
 
 ReplayStatus = Literal["violates", "fragile", "does not violate", "does not fit"]
 

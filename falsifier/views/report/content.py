@@ -16,7 +16,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
-from falsifier.counterexamples.store import beside, shrunk_file
+from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
 from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.problem.problem import held_text
@@ -50,6 +50,7 @@ class Shown:
         verdict: robustness, and what decided it; None if it could not be judged.
         units: units of the signals, by name.
         panels: what to draw; empty if the trajectory was not kept.
+        confirmed: why a counterexample counts.
         is_shrunk: whether it is the shrunk counterexample.
         is_lost: whether a trajectory was kept, but its file is damaged or missing.
     """
@@ -59,13 +60,14 @@ class Shown:
     verdict: Verdict | None
     units: Mapping[str, str]
     panels: list[Panel]
+    confirmed: str
     is_shrunk: bool = False
     is_lost: bool = False
 
     @property
     def explanation(self) -> str:
         """What ``falsifier explain`` has found out; empty if nobody asked."""
-        file = beside(self.run.counterexample_file, "explanation.txt")
+        file = beside(self.run.counterexample_file, EXPLANATION)
         return file.read_text(encoding="utf-8").strip() if file.is_file() else ""
 
 
@@ -317,10 +319,12 @@ def searches(runs: Iterable[Run]) -> list[Run]:
 
 
 def advice(shown: Shown) -> str:
-    """Return which command would say more of a counterexample; empty if it has been used."""
-    if not shown.run.falsified or (shown.is_shrunk and shown.explanation):
+    """Return the command that would simplify or explain a counterexample; empty if both are done."""
+    run = shown.run
+    if not run.falsified or (shown.is_shrunk and shown.explanation):
         return ""
-    return shlex.join(["falsifier", "explain", str(shown.run.directory)])
+    place = str(run.counterexample_file if run.shared else run.directory)
+    return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
 
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
@@ -353,22 +357,23 @@ def _shown(run: Run) -> Shown:
     candidate = recorded_candidates(read_journal(run.directory))[index]
     trajectory = recorded_trajectory(run.directory, run.trajectories.get(index))
     is_lost = trajectory is None and index in run.trajectories
-    return _drawn(run, candidate, trajectory, run.verdict, is_lost=is_lost)
+    return _drawn(run, candidate, trajectory, run.verdict, run.reason, is_lost=is_lost)
 
 
-def _shrunk(run: Run) -> tuple[Candidate, Trajectory, Verdict] | None:
+def _shrunk(run: Run) -> tuple[Candidate, Trajectory, Verdict, str] | None:
     """Return a run's shrunk counterexample, which ``falsifier explain`` leaves in the run directory."""
     file = shrunk_file(run.counterexample_file)
     samples = file.with_suffix(".npz")
     if not run.falsified or not (file.is_file() and samples.is_file()):
         return None
     try:
-        candidate = Candidate.from_json(load_counterexample(file).candidate)
-        trajectory = Trajectory.load(samples)
+        stored, trajectory = load_counterexample(file), Trajectory.load(samples)
+        candidate = Candidate.from_json(stored.candidate)
     except (FalsifierError, OSError, ValueError, KeyError):
         return None  # the original is shown instead
     formula = parse(run.manifest.requirement.formula)
-    return candidate, trajectory, Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
+    verdict = Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
+    return candidate, trajectory, verdict, stored.reason
 
 
 def _drawn(
@@ -376,6 +381,7 @@ def _drawn(
     candidate: Candidate,
     trajectory: Trajectory | None,
     verdict: Verdict | None,
+    confirmed: str,
     *,
     is_shrunk: bool = False,
     is_lost: bool = False,
@@ -394,6 +400,7 @@ def _drawn(
         verdict=verdict,
         units=units,
         panels=drawn,
+        confirmed=confirmed if run.falsified else "",
         is_shrunk=is_shrunk,
         is_lost=is_lost,
     )

@@ -76,11 +76,11 @@ def _found(shown: Shown) -> list[str]:
         )
     if shown.explanation:
         parts.append(markdown_text(one_line(shown.explanation)))
-    if shown.run.falsified:
-        parts.append(f"Confirmed: {markdown_text(one_line(shown.run.reason))}.")
+    if shown.confirmed:
+        parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
     parts.append(_facts(verdict_facts(shown.verdict, shown.units)))
     if advice(shown):
-        parts.append(f"Simpler, and explained: {markdown_code(advice(shown))}")
+        parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
     return parts
 
 

@@ -226,8 +226,8 @@ def _found(shown: Shown) -> list[Html]:
         listed if inputs.rows else Html(""),
         parameters if shown.candidate.parameters else Html(""),
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else Html(""),
-        facts_html([("confirmed", run.reason)]) if run.falsified else Html(""),
-        el("p", "Simpler, and explained: ", el("code", advice(shown)), class_="note")
+        facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else Html(""),
+        el("p", "To simplify and explain it: ", el("code", advice(shown)), class_="note")
         if advice(shown)
         else Html(""),
     ]

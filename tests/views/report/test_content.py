@@ -2,6 +2,11 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.counterexamples.store import save, to_store
+from falsifier.evaluation.confirm import confirm
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
@@ -13,7 +18,7 @@ from falsifier.views.report.commands import run_command
 from falsifier.views.report.content import gather
 from falsifier.views.report.page import html_report
 from tests.campaigns.support import record_ad_hoc
-from tests.problems import mostly_broken
+from tests.problems import hard, mostly_broken
 
 
 def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) -> None:
@@ -60,3 +65,22 @@ def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_pa
         assert result.failures[0].text in plain
         assert "not searched: v = 0 (it is not named beside what is searched" in plain
     assert "gain = 1" in html_report(tmp_path)
+
+
+def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_any(tmp_path: Path) -> None:
+    assert falsify(hard(), "uniform", budget=20, directory=tmp_path).falsified
+    before = gather(tmp_path).sides[0].sections[0].shown[0]
+    assert not before.is_shrunk and not before.explanation
+    assert f"falsifier explain {tmp_path} --shrink" in markdown_report(tmp_path)
+    simpler = evaluate(hard(), Candidate({"u": Signal((0.0,), (1.0,))}))
+    assert simpler.trajectory is not None and simpler.verdict is not None
+    save(to_store(confirm(hard(), simpler)), tmp_path / "shrunk.json")
+    simpler.trajectory.save(tmp_path / "shrunk.npz")
+    (tmp_path / "explanation.txt").write_text("Because of u.\n")
+    shown = gather(tmp_path).sides[0].sections[0].shown[0]
+    assert shown.is_shrunk and shown.verdict == simpler.verdict and shown.candidate == simpler.candidate
+    page = html_report(tmp_path)
+    assert "The shrunk counterexample" in page and "Because of u." in page
+    assert "falsifier explain" not in page
+    (tmp_path / "shrunk.npz").write_bytes(b"damaged")
+    assert not gather(tmp_path).sides[0].sections[0].shown[0].is_shrunk
