@@ -334,7 +334,11 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
 
 
 def recorded_evaluations(
-    directory: Path, records: Sequence[Record], requirement: str | None = None
+    directory: Path,
+    records: Sequence[Record],
+    requirement: str | None = None,
+    *,
+    with_trajectories: bool = True,
 ) -> dict[int, Evaluation]:
     """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
 
@@ -343,6 +347,7 @@ def recorded_evaluations(
         records: records of its journal.
         requirement: name of the requirement whose verdicts to return; None: of each evaluation, the
             requirement whose engine suggested the candidate.
+        with_trajectories: False: leave out the trajectories.
     """
     candidates = recorded_candidates(records)
     turn: dict[int, str] = {}
@@ -358,7 +363,7 @@ def recorded_evaluations(
                 record.status,
                 record.verdicts.get(requirement or turn[record.index]),
                 record.reason,
-                recorded_trajectory(directory, record.trajectory),
+                recorded_trajectory(directory, record.trajectory) if with_trajectories else None,
                 record.seconds,
                 tuple(record.log),
             )

@@ -2,16 +2,21 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from falsifier.core.space import SearchSpace
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.table import Columns, evaluation_columns
+from falsifier.evaluation.table import frame as as_frame
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
 from falsifier.search.levels import Level
 from falsifier.stl.margins import signed
+
+if TYPE_CHECKING:
+    import pandas
 
 ResultStatus = Literal["falsified", "not falsified", "interrupted", "failed"]
 
@@ -80,3 +85,15 @@ class Result:
     def robustness(self) -> float | None:
         """Robustness of the counterexample, otherwise the smallest; None if every simulation failed."""
         return None if self.shown is None else self.shown.robustness
+
+    def columns(self) -> Columns:
+        """Return one row per evaluation, as columns of equal length; see evaluation_columns."""
+        return evaluation_columns(self.evaluations)
+
+    def frame(self) -> "pandas.DataFrame":
+        """Return the same as a data frame of pandas.
+
+        Raises:
+            SpecError: if pandas is not installed.
+        """
+        return as_frame(self.columns())

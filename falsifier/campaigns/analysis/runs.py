@@ -15,8 +15,11 @@ from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.request import Method, method_of
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
+from falsifier.evaluation.table import Columns, evaluation_columns
+from falsifier.evaluation.table import frame as as_frame
 from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
+from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunStatus, read_summary
 from falsifier.search.budget import Spent
@@ -102,6 +105,26 @@ class Run:
     def best_so_far(self) -> NDArray[np.float64]:
         """Smallest robustness up to each evaluation, shape (n,); NaN before the first verdict."""
         return np.fmin.accumulate(self.robustness)
+
+    def columns(self) -> Columns:
+        """Read every evaluation; return one row each, as columns of equal length; see evaluation_columns.
+
+        Raises:
+            JournalError: if the record is damaged.
+        """
+        records = read_journal(self.directory)
+        name = self.manifest.requirement.name
+        found = recorded_evaluations(self.directory, records, name, with_trajectories=False)
+        return evaluation_columns([found[i] for i in range(len(self.robustness))])
+
+    def frame(self) -> "pandas.DataFrame":
+        """Return the same as a data frame of pandas.
+
+        Raises:
+            JournalError: if the record is damaged.
+            SpecError: if pandas is not installed.
+        """
+        return as_frame(self.columns())
 
 
 def load(directory: Path) -> list[Run]:
@@ -201,11 +224,9 @@ def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
     """One row per run, as a pandas data frame.
 
     Raises:
-        ImportError: if pandas is not installed; columns() does not need it.
+        SpecError: if pandas is not installed.
     """
-    import pandas
-
-    return pandas.DataFrame(columns(runs))
+    return as_frame(columns(runs))
 
 
 def _row(run: Run) -> dict[str, Any]:
