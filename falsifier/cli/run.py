@@ -157,6 +157,7 @@ def run(
 @directory_argument
 @jobs_option("runs")
 @executor_option
+@click.option("--budget", type=int, help="Maximum number of simulations of the run, with those before.")
 @total_options
 @quiet_option
 @json_option
@@ -165,6 +166,7 @@ def resume(
     directory: Path,
     jobs: int,
     executor: str | None,
+    budget: int | None,
     total_budget: int | None,
     total_seconds: float | None,
     total_tokens: int | None,
@@ -174,8 +176,9 @@ def resume(
 ) -> None:
     """Continue the run or campaign in DIRECTORY; nothing that is recorded is simulated or asked again.
 
-    --jobs, --executor and the limits apply to campaigns only; a run keeps its own. The limits on simulations,
-    tokens and cost include what was spent before.
+    A run keeps its limits, except that --budget replaces that on simulations, also of a run that has ended.
+    --jobs, --executor and the limits in total apply to campaigns only. The limits on simulations, tokens and
+    cost include what was spent before.
     """
     from falsifier.campaigns.directory import is_campaign, run_directories
     from falsifier.cli.campaign import resume_campaign
@@ -185,20 +188,22 @@ def resume(
     given = (total_budget, total_seconds, total_tokens, total_cost)
     has_limits = any(x is not None for x in given)
     if is_campaign(directory):
+        if budget is not None:
+            raise click.UsageError("--budget: the runs of a campaign keep theirs; --total-budget limits all")
         limits = Budget(*given) if has_limits else None
         resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
     if has_limits or executor is not None or jobs > 1:
         raise click.UsageError(
-            f"{directory}: --jobs, --executor and the limits apply to campaigns only; a run continues with "
-            "the jobs and the limits that it began with"
+            f"{directory}: --jobs, --executor and the limits in total apply to campaigns only; a run "
+            "continues with the jobs and the limits that it began with, except for --budget"
         )
     results: list[Result] = []
     with make_display(quiet=quiet) as display:
         for place in places:
             try:
-                results += resume_run(place, listeners=[display])
+                results += resume_run(place, budget=budget, listeners=[display])
             except JournalError as error:  # such as a run whose problem was made in Python
                 if len(places) == 1:
                     raise

@@ -25,6 +25,9 @@ from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import AnyRequirement, Spec, parse_spec, read_spec
 from falsifier.problem.template_arguments import template_arguments
 
+# Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
+# loading it once more.
+_LOADED: dict[ProblemSource, str] = {}
 _OPTION = "--template"
 # Keys of a requirement in a spec that are no arguments of its template.
 _BESIDE = {*ModelChanges.model_fields, "description"}
@@ -212,6 +215,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         problem = replace(problem, space=problem.space.freed(source.shortest_piece))
     if source.parameterization == "fixed":
         problem = replace(problem, space=problem.space.fixed)
+    _LOADED[source] = problem.fingerprint
     return problem
 
 
@@ -222,9 +226,11 @@ def load_sources(sources: Sequence[ProblemSource]) -> list[Problem]:
 
 def reloadable(problem: Problem) -> ProblemSource | None:
     """Return the source of a problem; None if it was made in Python or changed after it was loaded."""
-    if problem.source is None or load_source(problem.source).fingerprint != problem.fingerprint:
+    source = problem.source
+    if source is None:
         return None
-    return problem.source
+    known = _LOADED.get(source) or load_source(source).fingerprint
+    return source if known == problem.fingerprint else None
 
 
 def _of_spec(source: ProblemSource, *, searches: bool) -> Problem:

@@ -2,7 +2,7 @@
 
 ::
 
-    manifest.json            what was requested, with which versions; written once
+    manifest.json            what was requested, with which versions; written before the first line
     journal.jsonl            what happened, one JSON object per line, append-only
     trajectories/N-SUM.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
     lock                     held while a process writes here

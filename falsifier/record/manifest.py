@@ -24,6 +24,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
 from falsifier.record.journal import MANIFEST
 from falsifier.record.sealed import read_sealed, write_sealed
+from falsifier.search.budget import Budget
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.refine import levels_of
 from falsifier.search.request import RunRequest
@@ -132,6 +133,11 @@ class Manifest(_Strict):
     def fmu_sha256(self) -> str | None:
         """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
         return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
+
+    def with_budget(self, budget: Budget) -> "Manifest":
+        """Return the manifest of the same run with other limits."""
+        request = self.request.model_copy(update={"budget": budget})
+        return self.model_copy(update={"request": request})
 
     def of(self, name: str) -> "Manifest":
         """Return the manifest reduced to one requirement.

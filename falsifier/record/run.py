@@ -288,8 +288,9 @@ def carry_out(
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         levels = levels_of(request, problems[0].space)
-        recorded = manifest.read(directory).contexts if begun and directory else {}
-        told = told_problems(request, problems, described.contexts if described else recorded)
+        recorded = manifest.read(directory) if begun and directory else None
+        stated = described or recorded
+        told = told_problems(request, problems, stated.contexts if stated else {})
         made = [engine] if engine is not None else _engines(request, told, levels, chat)
         known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
@@ -300,11 +301,14 @@ def carry_out(
         all_listeners = tuple(listeners)
         if directory is not None:
             described = described or manifest.describe(request, told, engines[0].name)
-            if begun:
-                _check_same(directory, described)
+            if recorded is not None:
+                manifest.check_unchanged(directory, recorded.hashes, described.hashes)
+                manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
-            if not begun:
+            if recorded is None:
                 manifest.write(directory, described)
+            elif recorded.request.budget != request.budget:
+                manifest.write(directory, recorded.with_budget(request.budget))
             steps = replayed(directory, journal.records, live)
             all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
         return search(
@@ -380,9 +384,3 @@ def _settings(llm: LLM | None) -> LLMSettings | None:
     if llm is None or isinstance(llm, LLMSettings):
         return llm
     return LLMSettings(name=llm if isinstance(llm, str) else llm.llm)
-
-
-def _check_same(directory: Path, described: Manifest) -> None:
-    recorded = manifest.read(directory)
-    manifest.check_unchanged(directory, recorded.hashes, described.hashes)
-    manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)

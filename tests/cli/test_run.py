@@ -18,7 +18,6 @@ from tests.command import ROOT, falsifier, listen_to_interrupts
 from tests.fmu.fixtures import path as fixture
 from tests.patience import HANG, wait_until
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
-from tests.record.support import write_manifest
 
 
 def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
@@ -186,10 +185,7 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     assert "interrupted" in out
     kept = sum(r.kind == "evaluated" for r in read_journal(tmp_path / "run"))
     assert kept > 5
-    request = json.loads((tmp_path / "run" / "manifest.json").read_text())
-    request["request"]["budget"]["simulations"] = kept + 2
-    write_manifest(tmp_path / "run", request)
-    resumed = falsifier("resume", "run", cwd=tmp_path)
+    resumed = falsifier("resume", "run", "--budget", str(kept + 2), cwd=tmp_path)
     assert resumed.code == 0, resumed.err
     assert f"{kept} evaluations from the journal" in resumed.err
     assert f"after {kept + 2} simulations" in resumed.out

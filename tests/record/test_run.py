@@ -147,6 +147,18 @@ class TestResume:
         assert more.spent.simulations == 7
         whole = falsify(impossible(), "uniform", budget=7)
         assert [e.candidate.key for e in more.evaluations] == [e.candidate.key for e in whole.evaluations]
+        (again,) = resume(tmp_path)
+        assert again.spent.simulations == 7, "the new limit is that of the run"
+
+    def test_a_language_model_is_asked_only_for_what_a_larger_budget_adds(self, tmp_path: Path) -> None:
+        def chat(*values: float) -> ScriptedChat:
+            return ScriptedChat([reply(value) for value in values], llm="mine")
+
+        never = "python:tests.problems:impossible"
+        falsify(never, llm=chat(0.0, 0.1), budget=2, directory=tmp_path)
+        (more,) = resume(tmp_path, chat=chat(0.2), budget=3)
+        assert more.spent.calls == 3
+        assert [e.candidate.signals["u"].values[0] for e in more.evaluations] == [0.0, 0.1, 0.2]
 
     def test_a_number_changes_the_limit_on_simulations_alone(self, tmp_path: Path) -> None:
         limits = Budget(3, seconds=1e6)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, diagnosis_of
 from falsifier.llm.prompts.courses import (
     change_list,
     coarse_clock,
@@ -66,7 +66,7 @@ def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator
         return
     looked_at = _looked_at(view, trajectory)
     monitor = monitor_for(view)
-    diagnosis = monitor.diagnose(trajectory)
+    diagnosis = diagnosis_of(monitor, trajectory)
     clock = _clock(view)
     if evaluation.verdict is not None and evaluation.verdict.breach is not None:
         yield f"what broke: {evaluation.verdict.breach.text}"
