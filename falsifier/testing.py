@@ -22,7 +22,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.stl import Verdict, parse
+from falsifier.stl import Verdict
 
 Array = NDArray[np.float64]
 Response = Callable[[Array, dict[str, Array], dict[str, float]], Mapping[str, Array]]
@@ -94,7 +94,7 @@ def lag_problem(
     )
     return Problem(
         FunctionModel(response, ModelInfo("lag", "A first-order lag.", variables=variables)),
-        Requirement(name, parse(formula)),
+        Requirement(name, formula),
         SearchSpace(drives, tuple(parameters), STOP_TIME),
         Experiment(STOP_TIME, INTERVAL, ("x",)),
     )

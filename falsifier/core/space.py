@@ -143,7 +143,7 @@ class Dimension:
     unit: str = ""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class SearchSpace:
     """Everything that may be varied.
 
@@ -168,6 +168,11 @@ class SearchSpace:
         for name in self.names:
             if self.names.count(name) > 1:
                 raise SpecError(f"search space: {name!r} has two ranges; keep one")
+
+    def __repr__(self) -> str:
+        ranges: tuple[InputRange | ParameterRange, ...] = (*self.inputs, *self.parameters)
+        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in ranges)
+        return f"<SearchSpace: {searched}; {self.stop_time:g} s>"
 
     @property
     def names(self) -> tuple[str, ...]:

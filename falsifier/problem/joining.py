@@ -3,14 +3,19 @@
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
-from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, Variable
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_sizes, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import check_own_steps, default_interface, make_model
-from falsifier.problem.ranges import DEFAULT_POINTS, fixed_text, fixed_value, input_range, parameter_range
+from falsifier.problem.ranges import (
+    DEFAULT_POINTS,
+    search_space,
+    string_values,
+)
 from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.source import MODEL_FILES, STL_NAME
@@ -77,11 +82,10 @@ def join(
     inputs, parameters = _merged(spec, layers)
     formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
     inputs |= _with_points(inputs, changes, formulas, experiment)
-    space, fixed = _space(inputs, parameters, model.info, experiment, file)
+    space, fixed = search_space(inputs, parameters, model.info, experiment.stop_time, file)
     if searches:
         _check_searched(space, inputs, model.info, file)
     check_sizes(experiment, space, file)
-    strings = _strings(parameters, model.info, path.parent)
     known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
     section = spec.requirements[requirement]
     is_option = stl is not None or path.suffix in MODEL_FILES
@@ -89,127 +93,69 @@ def join(
     key = "--stl" if is_option else f"requirements.{requirement}.{stated_by}"
     text = expanded(spec, requirement, model.info, experiment, file) if stl is None else stl
     formula = parse_requirement(text, model.info, experiment, file=file, key=key)
+    experiment = replace(experiment, strings=string_values(parameters, model.info, path.parent))
+    recorded = [*spec.model.record, *formula.signals]
     return Joined(
         model,
         Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
         space,
-        _recording(
-            replace(experiment, strings=strings),
-            model.info,
-            [*spec.model.record, *formula.signals],
-            known,
-            file,
-        ),
+        _recording(experiment, model.info, recorded, known, file),
         fixed,
         (*model.info.notes, *_notes(grid, model)),
     )
 
 
-def join_fmu(
-    fmu: Path,
-    stl: str | Mapping[str, object],
+def join_formula(
+    model: Path | System,
+    formula: str | Mapping[str, object],
     *,
     changes: ModelChanges,
     name: str = STL_NAME,
     searches: bool = True,
 ) -> Joined:
-    """Join an FMU and a formula, or the section of a template, without a spec.
-
-    The requirement gets the given name.
+    """Join an FMU, SSP package or system with a formula, without a spec.
 
     If no input or parameter is to be searched, all inputs with a min and a max are searched, and those whose
     type states them (Booleans, enumerations). There must be one, unless the problem is made for other things
     than a search.
 
+    Args:
+        model: path of the FMU or package, or the system.
+        formula: the requirement, a formula or the section of a template.
+        changes: overrides for experiment, inputs and parameters.
+        name: name of the requirement.
+        searches: whether to refuse a model in which there is nothing to search.
+
     Raises:
         SpecError: naming what is unknown and the option that specifies it.
         ModelError: if the FMU cannot be read.
     """
-    if not fmu.is_file():
-        raise SpecError(f"{fmu}: no such file; give the path of an .fmu file")
-    if is_package(fmu):
-        _refuse_interface(changes, fmu)
-        system = replace(read_package(fmu), logging=bool(changes.logging))
-        return join_system(system, stl, path=fmu, changes=changes, name=name, searches=searches)
-    info = read_info(fmu)
-    interface = changes.interface or default_interface(info)
-    return _join_formula(
-        {"model": {"fmu": str(fmu.resolve()), "interface": interface}},
-        info,
-        stl,
-        path=fmu,
-        changes=changes,
-        name=name,
-        searches=searches,
-    )
-
-
-def _refuse_interface(changes: ModelChanges, path: Path) -> None:
-    if changes.interface == "model-exchange":
-        raise SpecError(
-            f"{path}: the components of a system have interfaces of their own; leave --interface out"
-        )
-
-
-def join_system(
-    system: System,
-    stl: str | Mapping[str, object],
-    *,
-    path: Path,
-    changes: ModelChanges,
-    name: str = STL_NAME,
-    searches: bool = True,
-) -> Joined:
-    """Join a system and a formula, without a spec; otherwise like ``join_fmu``.
-
-    Args:
-        system: the system.
-        stl: the requirement, a formula or the section of a template.
-        path: where the system comes from, for error messages.
-        changes: overrides for experiment, inputs and parameters.
-        name: name of the requirement.
-        searches: whether to refuse a system in which there is nothing to search.
-
-    Raises:
-        SpecError: naming what is unknown and the option that specifies it.
-    """
-    components = {each: {"fmu": str(part.fmu)} for each, part in system.parts.items()}
-    system = replace(system, allow=(*system.allow, *changes.allow), deny=(*system.deny, *changes.deny))
-    return _join_formula(
-        {"components": components},
-        system.info,
-        stl,
-        path=path,
-        changes=changes,
-        name=name,
-        searches=searches,
-        model=system,
-    )
-
-
-def _join_formula(
-    sections: Mapping[str, Mapping[str, object]],
-    info: ModelInfo,
-    stl: str | Mapping[str, object],
-    *,
-    path: Path,
-    changes: ModelChanges,
-    name: str,
-    searches: bool,
-    model: Model | None = None,
-) -> Joined:
-    stop_time = changes.stop_time or info.stop_time
-    if stop_time is None:
+    path = model if isinstance(model, Path) else Path(model.name)
+    if isinstance(model, Path) and not model.is_file():
+        raise SpecError(f"{path}: no such file; give the path of an .fmu file")
+    if isinstance(model, Path) and is_package(model):
+        if changes.interface == "model-exchange":
+            raise SpecError(
+                f"{path}: the components of a system have interfaces of their own; leave --interface out"
+            )
+        model = replace(read_package(model), logging=bool(changes.logging))
+    data: dict[str, Any]
+    if isinstance(model, Path):
+        info, system = read_info(model), None
+        interface = changes.interface or default_interface(info)
+        data = {"model": {"fmu": str(model.resolve()), "interface": interface}}
+    else:
+        info = model.info
+        system = replace(model, allow=(*model.allow, *changes.allow), deny=(*model.deny, *changes.deny))
+        data = {"model": {}, "components": {n: {"fmu": str(part.fmu)} for n, part in model.parts.items()}}
+    data["model"]["stop_time"] = changes.stop_time or info.stop_time
+    if data["model"]["stop_time"] is None:
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
+    data["requirements"] = {name: {"formula": formula} if isinstance(formula, str) else formula}
+    spec = parse_spec(data, file=str(path))
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
-    data = {
-        **sections,
-        "model": {**sections.get("model", {}), "stop_time": stop_time},
-        "requirements": {name: {"formula": stl} if isinstance(stl, str) else stl},
-    }
-    spec = parse_spec(data, file=str(path))
     bounded = {} if searched else _bounded_inputs(info)
     if searches and not searched and not bounded:
         inputs = [v.name for v in info.inputs]
@@ -219,7 +165,7 @@ def _join_formula(
             f"{did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})
-    return join(spec, name, path=path, changes=every, model=model, searches=searches)
+    return join(spec, name, path=path, changes=every, model=system, searches=searches)
 
 
 def _experiment(
@@ -347,52 +293,6 @@ def _with_points(
     }
 
 
-def _space(
-    inputs: Mapping[str, InputSection],
-    parameters: Mapping[str, ParameterSection],
-    info: ModelInfo,
-    experiment: Experiment,
-    file: str,
-) -> tuple[SearchSpace, dict[str, float]]:
-    searched: list[InputRange] = []
-    fixed: dict[str, float] = {}
-    for name, section in inputs.items():
-        key = f"inputs.{name}"
-        if name in info and info[name].alias_of:
-            other = info[name].alias_of
-            raise SpecError(
-                f"the {info.noun} has one input with two names: use {other!r} instead", file=file, key=key
-            )
-        _check_unconnected(name, info, file, key)
-        variable = _variable(name, info.inputs, f"the {info.noun} has no such input", file, key)
-        if section.value is not None:
-            fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
-        else:
-            searched.append(input_range(variable, section, file=file, key=key))
-    ranges: list[ParameterRange] = []
-    for name, parameter in parameters.items():
-        key = f"parameters.{name}"
-        if name in info and info[name].causality == "input":
-            raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
-        settable = [v for v in info.variables if v.settable and v.causality != "input"]
-        _check_unconnected(name, info, file, key)
-        if name in info and not info[name].settable:
-            v = info[name]
-            reason = f"it is a {v.variability} {v.causality} of the {info.noun}"
-            reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
-            raise SpecError(f"cannot be set: {reason}", file=file, key=key)
-        variable = _variable(
-            name, settable, f"the {info.noun} has no such parameter or start value", file, key
-        )
-        if variable.kind == "string" and parameter.value is not None:
-            continue
-        if parameter.range is not None:
-            ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
-        elif parameter.value is not None:
-            fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
-    return SearchSpace(tuple(searched), tuple(ranges), experiment.stop_time), fixed
-
-
 def _check_searched(
     space: SearchSpace, inputs: Mapping[str, InputSection], info: ModelInfo, file: str
 ) -> None:
@@ -405,43 +305,6 @@ def _check_searched(
         file=file,
         key="inputs",
     )
-
-
-def _check_unconnected(name: str, info: ModelInfo, file: str, key: str) -> None:
-    source = next((source for source, target in info.connections if target == name), None)
-    if source is not None:
-        raise SpecError(
-            f"this input is connected to {source}; remove this section or the connection", file=file, key=key
-        )
-
-
-def _strings(
-    parameters: Mapping[str, ParameterSection], info: ModelInfo, folder: Path
-) -> tuple[tuple[str, str], ...]:
-    """Return the values of string parameters; files are named relative to the spec's folder."""
-    return tuple(
-        (name, fixed_text(section.value, folder))
-        for name, section in parameters.items()
-        if section.value is not None and info[name].kind == "string"
-    )
-
-
-def _variable(name: str, variables: Iterable[Variable], otherwise: str, file: str, key: str) -> Variable:
-    known = {v.name: v for v in variables}
-    if name not in known:
-        raise SpecError(f"{otherwise}; {did_you_mean(name, known)}", file=file, key=key)
-    return known[name]
-
-
-def _as_input(name: str, section: ParameterSection, file: str) -> str:
-    """Say how to write as an input what was written as a parameter."""
-    text = "LOW:HIGH" if section.value is None else str(section.value)
-    if section.range is not None:
-        text = ":".join(f"{value:g}" for value in section.range)
-    option = f"--input {name}={text}"
-    if file.endswith(MODEL_FILES):
-        return f"write {option}"
-    return f"write {option}, or [inputs.{name}] in the spec"
 
 
 def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:

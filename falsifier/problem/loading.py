@@ -17,7 +17,7 @@ from falsifier.core.space import Freedom
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
-from falsifier.problem.joining import join, join_fmu
+from falsifier.problem.joining import join, join_formula
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import InputSection, ModelChanges
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
@@ -189,16 +189,14 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
     elif kind == "fmu":
         if source.stl is None and Path(source.target).is_file():
             raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
-        problem = Problem.from_parts(
-            join_fmu(
-                Path(source.target),
-                source.stl or "",
-                changes=source.changes,
-                name=source.stl_name,
-                searches=searches,
-            ),
-            source,
+        joined = join_formula(
+            Path(source.target),
+            source.stl or "",
+            changes=source.changes,
+            name=source.stl_name,
+            searches=searches,
         )
+        problem = replace(Problem.of(joined), source=source)
     else:
         problem = _of_spec(source, searches=searches)
     if kind in ("python", "fmu") and source.context:  # a problem made in Python may name its own
@@ -258,7 +256,7 @@ def _of_spec(source: ProblemSource, *, searches: bool) -> Problem:
         changes=source.changes,
         searches=searches,
     )
-    return replace(Problem.from_parts(joined, source), named_context=named_context(source, spec, path))
+    return replace(Problem.of(joined), source=source, named_context=named_context(source, spec, path))
 
 
 def _with_limits(problem: Problem, freed: Mapping[str, InputSection]) -> Problem:
@@ -303,7 +301,7 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
         raise SpecError(f"{source.target}: a problem made in Python has its own requirement; drop {_OPTION}")
     try:
         if kind == "fmu":
-            joined = join_fmu(Path(source.target), arguments, changes=source.changes, name=name)
+            joined = join_formula(Path(source.target), arguments, changes=source.changes, name=name)
         else:
             path, requirement = find_spec(source.target)
             spec = read_spec(path)

@@ -1,11 +1,11 @@
 """Problems: a model, a requirement, and what may be varied."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from hashlib import sha256
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite
@@ -38,7 +38,7 @@ class Held:
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Problem:
     """Everything that ``evaluate`` and an engine need to know; immutable and picklable.
 
@@ -77,9 +77,11 @@ class Problem:
         if self.info.variables:
             _check_variables(self)
 
-    @classmethod
+    def __repr__(self) -> str:
+        return f"<Problem {self.name} of {self.info.name}: {self.requirement.formula}, {self.space!r}>"
+
+    @staticmethod
     def from_fmu(
-        cls,
         fmu: str | Path,
         formula: str,
         *,
@@ -95,7 +97,7 @@ class Problem:
         context: Sequence[str] = (),
         allow: Sequence[str] = (),
         deny: Sequence[str] = (),
-    ) -> Self:
+    ) -> "Problem":
         """Return the problem for an FMU and a formula.
 
         Args:
@@ -124,7 +126,7 @@ class Problem:
 
         >>> Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})  # doctest: +SKIP
         """
-        from falsifier.problem.joining import join_fmu
+        from falsifier.problem.joining import join_formula
 
         changes = changes_from(
             inputs=inputs or {},
@@ -138,15 +140,14 @@ class Problem:
             allow=allow,
             deny=deny,
         )
-        joined = join_fmu(Path(fmu), formula, changes=changes, name=name)
+        joined = join_formula(Path(fmu), formula, changes=changes, name=name)
         source = ProblemSource(
             target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
         )
-        return replace(cls.from_parts(joined, source), named_context=Named.of(context))
+        return replace(Problem.of(joined), source=source, named_context=Named.of(context))
 
-    @classmethod
+    @staticmethod
     def from_system(
-        cls,
         system: System,
         formula: str,
         *,
@@ -158,7 +159,7 @@ class Problem:
         step_size: float | None = None,
         tolerance: float | None = None,
         time_limit: float | None = None,
-    ) -> Self:
+    ) -> "Problem":
         """Return the problem for a system of FMUs and a formula.
 
         Args:
@@ -182,7 +183,7 @@ class Problem:
         >>> system = System({"plant": "plant.fmu", "pi": "pi.fmu"}, {"plant.u": "pi.y"})  # doctest: +SKIP
         >>> Problem.from_system(system, "G[0,10] (plant.h >= 0)")  # doctest: +SKIP
         """
-        from falsifier.problem.joining import join_system
+        from falsifier.problem.joining import join_formula
 
         changes = changes_from(
             inputs=inputs or {},
@@ -193,21 +194,13 @@ class Problem:
             tolerance=tolerance,
             time_limit=time_limit,
         )
-        joined = join_system(system, formula, path=Path(system.name), changes=changes, name=name)
-        return cls.from_parts(joined)
+        return Problem.of(join_formula(system, formula, changes=changes, name=name))
 
-    @classmethod
-    def from_parts(cls, parts: "Joined", source: ProblemSource | None = None) -> Self:
-        """Return the problem that a spec, or an FMU and a formula, was joined to."""
-        return cls(
-            parts.model,
-            parts.requirement,
-            parts.space,
-            parts.experiment,
-            parts.parameters,
-            source,
-            parts.notes,
-        )
+    @staticmethod
+    def of(joined: "Joined") -> "Problem":
+        """Return the problem that a spec, or a model and a formula, was joined to."""
+        parts = {each.name: getattr(joined, each.name) for each in fields(joined)}
+        return Problem(**parts)
 
     @property
     def info(self) -> ModelInfo:
@@ -254,7 +247,7 @@ class Problem:
             getattr(self.model, "key", ""),
             self.name,
             str(self.requirement.formula),
-            self.space,
+            (self.space.inputs, self.space.parameters),
             self.experiment,
             sorted(self.parameters.items()),
         )
@@ -347,8 +340,8 @@ def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
     """Group problems that differ only in their requirement; within a group all record the same signals."""
     groups: dict[str, list[Problem]] = {}
     for problem in problems:
-        bare = replace(problem.experiment, outputs=())
-        key = repr((problem.model, problem.space, bare, sorted(problem.parameters.items())))
+        bare, fixed = replace(problem.experiment, outputs=()), sorted(problem.parameters.items())
+        key = repr((problem.model, problem.space.inputs, problem.space.parameters, bare, fixed))
         groups.setdefault(key, []).append(problem)
     return [_recording_alike(group) for group in groups.values()]
 

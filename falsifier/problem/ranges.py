@@ -1,16 +1,76 @@
 """Ranges and values of a spec, checked against the FMU's variables and completed from them."""
 
+from collections.abc import Iterable, Mapping
 from math import ceil, floor
 from pathlib import Path
 
-from falsifier.core.model import Variable
-from falsifier.core.space import Freedom, InputRange, ParameterRange, ValueKind
-from falsifier.errors import SpecError
-from falsifier.problem.sections import InputSection
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, ValueKind
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.problem.sections import InputSection, ParameterSection
 from falsifier.problem.shorthand import named_file
+from falsifier.problem.source import MODEL_FILES
 
 # Number of control points of an input of which nobody states it: both ends, the middle and two in between.
 DEFAULT_POINTS = 5
+
+
+def search_space(
+    inputs: Mapping[str, InputSection],
+    parameters: Mapping[str, ParameterSection],
+    info: ModelInfo,
+    stop_time: float,
+    file: str,
+) -> tuple[SearchSpace, dict[str, float]]:
+    """Return what is searched, and the values of what is fixed.
+
+    Args:
+        inputs: the inputs' sections by name, as they hold after all overrides.
+        parameters: the same of parameters and start values.
+        info: the model's variables.
+        stop_time: end of the simulation in s.
+        file: name of the spec file, for errors.
+
+    Raises:
+        SpecError: naming the file, the key and the remedy.
+    """
+    searched: list[InputRange] = []
+    fixed: dict[str, float] = {}
+    for name, section in inputs.items():
+        key = f"inputs.{name}"
+        if name in info and info[name].alias_of:
+            other = info[name].alias_of
+            raise SpecError(
+                f"the {info.noun} has one input with two names: use {other!r} instead", file=file, key=key
+            )
+        _check_unconnected(name, info, file, key)
+        variable = _variable(name, info.inputs, f"the {info.noun} has no such input", file, key)
+        if section.value is not None:
+            fixed[name] = fixed_value(variable, section.value, file=file, key=f"{key}.value")
+        else:
+            searched.append(input_range(variable, section, file=file, key=key))
+    ranges: list[ParameterRange] = []
+    for name, parameter in parameters.items():
+        key = f"parameters.{name}"
+        if name in info and info[name].causality == "input":
+            raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
+        settable = [v for v in info.variables if v.settable and v.causality != "input"]
+        _check_unconnected(name, info, file, key)
+        if name in info and not info[name].settable:
+            v = info[name]
+            reason = f"it is a {v.variability} {v.causality} of the {info.noun}"
+            reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
+            raise SpecError(f"cannot be set: {reason}", file=file, key=key)
+        variable = _variable(
+            name, settable, f"the {info.noun} has no such parameter or start value", file, key
+        )
+        if variable.kind == "string" and parameter.value is not None:
+            continue
+        if parameter.range is not None:
+            ranges.append(parameter_range(variable, parameter.range, file=file, key=f"{key}.range"))
+        elif parameter.value is not None:
+            fixed[name] = fixed_value(variable, parameter.value, file=file, key=f"{key}.value")
+    return SearchSpace(tuple(searched), tuple(ranges), stop_time), fixed
 
 
 def input_range(variable: Variable, section: InputSection, *, file: str | None, key: str) -> InputRange:
@@ -80,11 +140,6 @@ def parameter_range(
         kind=_value_kind(variable),
         items=tuple(variable.literals.items()),
     )
-
-
-def fixed_text(value: float | str, folder: Path) -> str:
-    """Return the value of a string; a file that it names relative to a folder gets its full path."""
-    return named_file(value, folder) if isinstance(value, str) else f"{value:.17g}"
 
 
 def fixed_value(variable: Variable, value: float | str, *, file: str | None, key: str) -> float:
@@ -174,3 +229,40 @@ def _value_kind(variable: Variable) -> ValueKind:
 
 def _limit(value: float | None) -> str:
     return "no limit" if value is None else f"{value:g}"
+
+
+def _check_unconnected(name: str, info: ModelInfo, file: str, key: str) -> None:
+    source = next((source for source, target in info.connections if target == name), None)
+    if source is not None:
+        raise SpecError(
+            f"this input is connected to {source}; remove this section or the connection", file=file, key=key
+        )
+
+
+def string_values(
+    parameters: Mapping[str, ParameterSection], info: ModelInfo, folder: Path
+) -> tuple[tuple[str, str], ...]:
+    """Return the values of string parameters; files are named relative to the spec's folder."""
+    return tuple(
+        (name, named_file(v, folder) if isinstance(v := section.value, str) else f"{v:.17g}")
+        for name, section in parameters.items()
+        if section.value is not None and info[name].kind == "string"
+    )
+
+
+def _variable(name: str, variables: Iterable[Variable], otherwise: str, file: str, key: str) -> Variable:
+    known = {v.name: v for v in variables}
+    if name not in known:
+        raise SpecError(f"{otherwise}; {did_you_mean(name, known)}", file=file, key=key)
+    return known[name]
+
+
+def _as_input(name: str, section: ParameterSection, file: str) -> str:
+    """Say how to write as an input what was written as a parameter."""
+    text = "LOW:HIGH" if section.value is None else str(section.value)
+    if section.range is not None:
+        text = ":".join(f"{value:g}" for value in section.range)
+    option = f"--input {name}={text}"
+    if file.endswith(MODEL_FILES):
+        return f"write {option}"
+    return f"write {option}, or [inputs.{name}] in the spec"

@@ -18,31 +18,42 @@ from falsifier.stl.renaming import renamed
 PLACEHOLDER = "LIMIT"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False, repr=False)
 class Requirement:
     """A named STL formula over the model's signals.
 
     Attributes:
         name: its name in the spec, e.g. ``AT1``.
-        formula: the parsed formula; ``str(formula)`` is its text.
+        formula: the formula, given as text or parsed; ``str(formula)`` is its text.
         description: its meaning in words.
 
     Raises:
-        SpecError: if the name is no text of one line, the description no text, or the formula not parsed.
+        SpecError: if the name is no text of one line, the description no text, or the formula no formula.
+        FormulaError: with the position, if the text of the formula cannot be parsed.
+
+    >>> Requirement("low", "G[0,10] (h >= 0)")
+    Requirement('low', 'G[0,10] (h >= 0)')
     """
 
     name: str
     formula: Formula
     description: str = ""
 
-    def __post_init__(self) -> None:
+    def __init__(self, name: str, formula: Formula | str, description: str = "") -> None:
+        parsed = parse(formula) if isinstance(formula, str) else formula
+        for attribute, value in (("name", name), ("formula", parsed), ("description", description)):
+            object.__setattr__(self, attribute, value)
         if not isinstance(self.name, str):
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
         if one_line(self.name) != self.name:  # it stands in messages, tables and titles
             raise SpecError(f"requirement {self.name!r}: {NAME_IN_LINES}")
         instance(f"requirement {self.name!r}: description", self.description, str, "text")
         if not isinstance(self.formula, Formula):
-            raise SpecError(f"requirement {self.name!r}: expected a formula; use parse({self.formula!r})")
+            raise SpecError(f"requirement {self.name!r}: expected a formula or its text, got {formula!r}")
+
+    def __repr__(self) -> str:
+        description = f", {self.description!r}" if self.description else ""
+        return f"Requirement({self.name!r}, {str(self.formula)!r}{description})"
 
 
 def parse_requirement(

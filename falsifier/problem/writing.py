@@ -322,7 +322,7 @@ def problem_of_starter(text: str, path: Path) -> Problem:
     content = tomllib.loads(text)
     requirement = content["requirements"][_STARTED]
     requirement["formula"] = requirement["formula"].removesuffix(f"{PLACEHOLDER})") + "0)"
-    return Problem.from_parts(join(parse_spec(content, file=str(path)), _STARTED, path=path))
+    return Problem.of(join(parse_spec(content, file=str(path)), _STARTED, path=path))
 
 
 def _has_placeholder(content: dict[str, Any]) -> bool:

@@ -38,6 +38,9 @@ class Formula:
     __slots__ = ()
     binding: ClassVar[int] = PREFIX
 
+    def __repr__(self) -> str:
+        return f"parse({str(self)!r})"
+
     @property
     def children(self) -> tuple["Formula", ...]:
         """Formulas directly below this one."""
@@ -81,7 +84,7 @@ class Formula:
         return max((child.horizon(step) for child in self.children), default=0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Predicate(Formula):
     """A comparison of two expressions; its robustness is the signed margin, 0 if both are equal."""
 
@@ -94,7 +97,7 @@ class Predicate(Formula):
         return f"{embraced(self.left, SUM)} {self.operator} {embraced(self.right, SUM)}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Flag(Predicate):
     """A Boolean signal as a formula: ``b`` alone means ``b >= 0.5``."""
 
@@ -107,161 +110,29 @@ class Flag(Predicate):
         return str(self.left)
 
 
-@dataclass(frozen=True, slots=True)
-class Not(Formula):
-    """Negation."""
-
+@dataclass(frozen=True, slots=True, repr=False)
+class _Unary(Formula):
     operand: Formula
 
     @property
     def children(self) -> tuple[Formula, ...]:
         """The operand."""
         return (self.operand,)
+
+
+class Not(_Unary):
+    """Negation."""
+
+    __slots__ = ()
 
     def __str__(self) -> str:
         return f"not {_prefixed(self.operand)}"
 
 
-@dataclass(frozen=True, slots=True)
-class And(Formula):
-    """Conjunction."""
-
-    left: Formula
-    right: Formula
-    binding: ClassVar[int] = CONJUNCTION
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """Left and right operand."""
-        return (self.left, self.right)
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, CONJUNCTION)} and {embraced(self.right, CONJUNCTION + 1)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Or(Formula):
-    """Disjunction."""
-
-    left: Formula
-    right: Formula
-    binding: ClassVar[int] = DISJUNCTION
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """Left and right operand."""
-        return (self.left, self.right)
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, DISJUNCTION)} or {embraced(self.right, DISJUNCTION + 1)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Implies(Formula):
-    """Implication, equivalent to ``not left or right``."""
-
-    left: Formula
-    right: Formula
-    binding: ClassVar[int] = IMPLICATION
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """Condition and consequence."""
-        return (self.left, self.right)
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, PREFIX)} -> {embraced(self.right, PREFIX)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Iff(Formula):
-    """Equivalence, the conjunction of both implications."""
-
-    left: Formula
-    right: Formula
-    binding: ClassVar[int] = EQUIVALENCE
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """Left and right operand."""
-        return (self.left, self.right)
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, PREFIX)} <-> {embraced(self.right, PREFIX)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Always(Formula):
-    """The operand holds throughout the window; without a window, to the end of the trajectory."""
-
-    operand: Formula
-    window: Window | None = None
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """The operand."""
-        return (self.operand,)
-
-    def horizon(self, step: float = 0.0) -> float:
-        """Return the end of the window plus the operand's horizon, in s."""
-        return _end(self.window) + self.operand.horizon(step)
-
-    def __str__(self) -> str:
-        return f"G{self.window or ''} {_prefixed(self.operand)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Eventually(Formula):
-    """The operand holds at some time in the window; without a window, before the trajectory ends."""
-
-    operand: Formula
-    window: Window | None = None
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """The operand."""
-        return (self.operand,)
-
-    def horizon(self, step: float = 0.0) -> float:
-        """Return the end of the window plus the operand's horizon, in s."""
-        return _end(self.window) + self.operand.horizon(step)
-
-    def __str__(self) -> str:
-        return f"F{self.window or ''} {_prefixed(self.operand)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Until(Formula):
-    """The right operand holds at some time in the window, the left one from now until then inclusive."""
-
-    left: Formula
-    right: Formula
-    window: Window | None = None
-    binding: ClassVar[int] = UNTIL
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """Left and right operand."""
-        return (self.left, self.right)
-
-    def horizon(self, step: float = 0.0) -> float:
-        """Return the end of the window plus the larger horizon of the operands, in s."""
-        return _end(self.window) + max(self.left.horizon(step), self.right.horizon(step))
-
-    def __str__(self) -> str:
-        return f"{_prefixed(self.left)} U{self.window or ''} {_prefixed(self.right)}"
-
-
-@dataclass(frozen=True, slots=True)
-class Next(Formula):
+class Next(_Unary):
     """The operand holds at the next recorded time."""
 
-    operand: Formula
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """The operand."""
-        return (self.operand,)
+    __slots__ = ()
 
     def horizon(self, step: float = 0.0) -> float:
         """Return one sampling step plus the operand's horizon, in s."""
@@ -269,6 +140,99 @@ class Next(Formula):
 
     def __str__(self) -> str:
         return f"X {_prefixed(self.operand)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class _Windowed(_Unary):
+    window: Window | None = None
+
+    def horizon(self, step: float = 0.0) -> float:
+        """Return the end of the window plus the operand's horizon, in s."""
+        return _end(self.window) + self.operand.horizon(step)
+
+
+class Always(_Windowed):
+    """The operand holds throughout the window; without a window, to the end of the trajectory."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return f"G{self.window or ''} {_prefixed(self.operand)}"
+
+
+class Eventually(_Windowed):
+    """The operand holds at some time in the window; without a window, before the trajectory ends."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return f"F{self.window or ''} {_prefixed(self.operand)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class _Binary(Formula):
+    left: Formula
+    right: Formula
+
+    @property
+    def children(self) -> tuple[Formula, ...]:
+        """Left and right operand."""
+        return (self.left, self.right)
+
+
+class And(_Binary):
+    """Conjunction."""
+
+    __slots__ = ()
+    binding: ClassVar[int] = CONJUNCTION
+
+    def __str__(self) -> str:
+        return f"{embraced(self.left, CONJUNCTION)} and {embraced(self.right, CONJUNCTION + 1)}"
+
+
+class Or(_Binary):
+    """Disjunction."""
+
+    __slots__ = ()
+    binding: ClassVar[int] = DISJUNCTION
+
+    def __str__(self) -> str:
+        return f"{embraced(self.left, DISJUNCTION)} or {embraced(self.right, DISJUNCTION + 1)}"
+
+
+class Implies(_Binary):
+    """Implication, equivalent to ``not left or right``."""
+
+    __slots__ = ()
+    binding: ClassVar[int] = IMPLICATION
+
+    def __str__(self) -> str:
+        return f"{embraced(self.left, PREFIX)} -> {embraced(self.right, PREFIX)}"
+
+
+class Iff(_Binary):
+    """Equivalence, the conjunction of both implications."""
+
+    __slots__ = ()
+    binding: ClassVar[int] = EQUIVALENCE
+
+    def __str__(self) -> str:
+        return f"{embraced(self.left, PREFIX)} <-> {embraced(self.right, PREFIX)}"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Until(_Binary):
+    """The right operand holds at some time in the window, the left one from now until then inclusive."""
+
+    window: Window | None = None
+    binding: ClassVar[int] = UNTIL
+
+    def horizon(self, step: float = 0.0) -> float:
+        """Return the end of the window plus the larger horizon of the operands, in s."""
+        return _end(self.window) + max(self.left.horizon(step), self.right.horizon(step))
+
+    def __str__(self) -> str:
+        return f"{_prefixed(self.left)} U{self.window or ''} {_prefixed(self.right)}"
 
 
 OPPOSITE: dict[Comparison, Comparison] = {

@@ -8,7 +8,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError, SpecError
-from falsifier.problem.joining import Joined, join, join_fmu
+from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
@@ -98,9 +98,9 @@ def test_signals_to_record_must_be_there() -> None:
 
 
 def test_an_fmu_alone_is_searched_over_its_bounded_inputs() -> None:
-    found = join_fmu(bundled("fmus") / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
+    found = join_formula(bundled("fmus") / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
     assert [r.name for r in found.space.inputs] == ["throttle", "brake"]
-    fixed = join_fmu(
+    fixed = join_formula(
         bundled("fmus") / "AT.fmu",
         "G[0,20] (speed <= 120)",
         changes=changes_from_options(inputs=["brake=3"], parameters=["finalDrive=3:3.5"]),
@@ -136,9 +136,9 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
 
 def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="--input"):
-        join_fmu(fixture("Ball_2"), "G[0,1] (h >= -9)", changes=changes_from_options(stop_time=1.0))
+        join_formula(fixture("Ball_2"), "G[0,1] (h >= -9)", changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
-        join_fmu(tmp_path / "gone.fmu", "G (x >= 0)", changes=changes_from_options())
+        join_formula(tmp_path / "gone.fmu", "G (x >= 0)", changes=changes_from_options())
 
 
 def test_an_fmu_for_scheduled_execution_alone_cannot_be_used() -> None:

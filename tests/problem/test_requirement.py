@@ -1,7 +1,10 @@
+import pickle
+from dataclasses import replace
+
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.errors import SpecError
+from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
@@ -30,8 +33,21 @@ def test_what_cannot_be_judged_names_file_key_and_place(text: str, named: str) -
     assert named in str(caught.value)
 
 
-def test_a_requirement_has_a_name_and_a_parsed_formula() -> None:
+def test_a_requirement_has_a_name_and_a_formula_or_its_text() -> None:
+    low = Requirement("low", "G[0,10] (x < 1)", "stays low")
+    assert low == Requirement("low", parse("G[0,10] (x < 1)"), "stays low") == pickle.loads(pickle.dumps(low))
+    assert replace(low, name="other").formula == low.formula
     with pytest.raises(SpecError, match="expected a name"):
         Requirement(None, parse("G (x < 1)"))  # type: ignore[arg-type]
-    with pytest.raises(SpecError, match=r"requirement 'low': expected a formula; use parse\('G \(x < 1\)'\)"):
-        Requirement("low", "G (x < 1)")  # type: ignore[arg-type]
+    with pytest.raises(SpecError, match="requirement 'low': expected a formula or its text, got 3"):
+        Requirement("low", 3)  # type: ignore[arg-type]
+    with pytest.raises(FormulaError, match="ends too early"):
+        Requirement("low", "G (x <")
+
+
+def test_values_are_shown_short() -> None:
+    problem = lag_problem()
+    assert repr(problem.requirement) == "Requirement('LAG', 'G[0,10] (x <= 0.9)')"
+    assert repr(problem.requirement.formula) == "parse('G[0,10] (x <= 0.9)')"
+    assert repr(problem.space) == "<SearchSpace: u in [-1, 1]; 10 s>"
+    assert repr(problem) == "<Problem LAG of lag: G[0,10] (x <= 0.9), <SearchSpace: u in [-1, 1]; 10 s>>"

@@ -41,6 +41,12 @@ _CLOSE_TOLERANCE = 0.01
 _FEWER_BREAKPOINTS = 12
 # Steps of an input at which the course of an output always has a breakpoint, so that its response is seen.
 _MOST_STEPS = 8
+_SIDES: Mapping[type[Formula], str] = {
+    And: "conjuncts",
+    Or: "alternatives",
+    Implies: "condition and consequence",
+    Iff: "sides",
+}
 # Maximum number of signals shown over time; those of the formula come first.
 _MAX_SIGNALS = 16
 
@@ -158,8 +164,7 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
             for side in sides
             if side in found
         )
-        name = {And: "conjuncts", Or: "alternatives", Implies: "condition and consequence", Iff: "sides"}
-        yield f"{name[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
+        yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
 
 
 def _sides(formula: Formula) -> list[Formula]:
