@@ -25,8 +25,8 @@ from falsifier.problem.source import Searched
 from falsifier.record.journal import MANIFEST
 from falsifier.record.sealed import read_sealed, write_sealed
 from falsifier.search.budget import Budget
+from falsifier.search.levels import levels_of
 from falsifier.search.parameterization import parameterization_note, parameterization_of
-from falsifier.search.refine import levels_of
 from falsifier.search.request import RunRequest
 
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")

@@ -28,8 +28,7 @@ from falsifier.record.records import (
     elapsed_at,
 )
 from falsifier.search.budget import Spent
-from falsifier.search.proposals import proposals
-from falsifier.search.steps import Steps
+from falsifier.search.steps import Steps, proposals
 
 
 @dataclass(slots=True)

@@ -28,10 +28,9 @@ from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.events import Listener
-from falsifier.search.levels import Level
+from falsifier.search.levels import level_starts, levels_of
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
-from falsifier.search.refine import level_starts, levels_of, make_refining
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Live, Steps
@@ -291,7 +290,7 @@ def carry_out(
         recorded = manifest.read(directory) if begun and directory else None
         stated = described or recorded
         told = told_problems(request, problems, stated.contexts if stated else {})
-        made = [engine] if engine is not None else _engines(request, told, levels, chat)
+        made = [engine] if engine is not None else make_engines(request, told, chat, levels)
         known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         for problem in problems:
@@ -323,14 +322,6 @@ def carry_out(
             listeners=all_listeners,
             prepared=perf_counter() - started,
         )
-
-
-def _engines(
-    request: RunRequest, problems: Sequence[Problem], levels: Sequence[Level], chat: Chat | None
-) -> list[Engine]:
-    if request.levels:
-        return list(make_refining(request, problems, levels, chat))
-    return make_engines(request, problems, chat)
 
 
 def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> list[Problem]:

@@ -1,11 +1,14 @@
-"""What a run may spend, and what it has spent."""
+"""What a run may spend, what it has spent, and a chat that keeps to it."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from time import monotonic
+from typing import Any
 
 from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
-from falsifier.errors import FalsifierError, SpecError
-from falsifier.llm.messages import Usage
+from falsifier.errors import ChatError, FalsifierError, SpecError
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 
 # Maximum number of simulations of a run if nothing else is said.
 DEFAULT_SIMULATIONS = 100
@@ -125,3 +128,58 @@ class Budget:
     def seconds_left(self, spent: Spent) -> float | None:
         """Seconds that the budget still allows; None without a limit."""
         return None if self.seconds is None else max(0.0, self.seconds - spent.seconds)
+
+
+# A wait for a reply may end this much before the time that it was given.
+_CLOCK_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class BoundedChat:
+    """Checks the budget before every request, whether it opens a turn, asks again or follows a tool call.
+
+    Attributes:
+        inner: chat to ask.
+        budget: limits of the run.
+        spent: returns what the run has spent so far.
+    """
+
+    inner: Chat
+    budget: Budget
+    spent: Callable[[], Spent]
+
+    @property
+    def llm(self) -> str:
+        """Name of the inner chat's LLM."""
+        return self.inner.llm
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Parameters of the inner chat."""
+        return self.inner.parameters
+
+    def complete(self, request: ChatRequest) -> ChatReply:
+        """Ask, with the seconds that are left as a deadline.
+
+        Raises:
+            LimitReached: if a limit is reached, before the request or while waiting for the reply.
+            ChatError: if no reply can be obtained.
+        """
+        self._check()
+        left = self.budget.seconds_left(self.spent())
+        if left is not None:
+            request = request.model_copy(update={"deadline": monotonic() + left})
+        try:
+            return self.inner.complete(request)
+        except ChatError as error:
+            self._check(ahead=_CLOCK_TOLERANCE, cause=error)
+            raise
+
+    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
+        """Tell the inner chat."""
+        self.inner.accepted(request, reply)
+
+    def _check(self, *, ahead: float = 0.0, cause: ChatError | None = None) -> None:
+        spent = self.spent()
+        if limit := self.budget.exceeded(replace(spent, seconds=spent.seconds + ahead)):
+            raise LimitReached(limit) from cause

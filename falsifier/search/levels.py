@@ -6,6 +6,10 @@ from math import isnan
 
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
+from falsifier.problem.refinement import level_spaces
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search.parameterization import engine_parameterization, searched_space
+from falsifier.search.request import LLMSettings, RunRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,3 +84,28 @@ def level_results(
         name = level_name(number, len(starts))
         found.append(LevelResult(name, len(own), min(judged, default=None), falsified and is_last))
     return tuple(found)
+
+
+def level_starts(
+    space: SearchSpace, engine: str | None, llm: LLMSettings | None, budget: Budget
+) -> tuple[int, ...]:
+    """Return the number of simulations before each level: all get the same share of the budget.
+
+    Without a limit on simulations, they begin as with the default budget.
+    """
+    count = len(level_spaces(space, free=engine_parameterization(engine, llm) == "free"))
+    total = budget.simulations or DEFAULT_SIMULATIONS
+    starts = (-(-total * k // count) for k in range(count))
+    return tuple(start for start in dict.fromkeys(starts) if start < total)
+
+
+def levels_of(request: RunRequest, space: SearchSpace) -> tuple[Level, ...]:
+    """Return the levels of a run; one with all that its engine can search if it does not refine."""
+    if not request.levels:
+        return (Level(0, searched_space(space, request.engine, request.llm)),)
+    spaces = level_spaces(space, free=engine_parameterization(request.engine, request.llm) == "free")
+    count = len(request.levels)
+    return tuple(
+        Level(first, each, leaves_finer=number == count < len(spaces))
+        for number, (first, each) in enumerate(zip(request.levels, spaces, strict=False), start=1)
+    )

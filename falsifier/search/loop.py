@@ -15,8 +15,7 @@ from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
-from falsifier.search.bounded import BoundedChat
-from falsifier.search.budget import Budget, LimitReached, Spent
+from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 from falsifier.search.events import (
     Asked,
     Confirmed,

@@ -7,9 +7,8 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.findings import Finding
+from falsifier.search.findings import Finding, inexpressible
 from falsifier.search.levels import Level
-from falsifier.search.parameterization import inexpressible
 from falsifier.search.vacuity import Vacuity
 
 

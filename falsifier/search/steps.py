@@ -7,14 +7,15 @@ from time import perf_counter
 from typing import Protocol
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
+from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.workers import start
 from falsifier.llm.messages import Chat
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
-from falsifier.search.proposals import proposals
 
 
 class Steps(Protocol):
@@ -92,3 +93,35 @@ class Live:
     def chat(self, inner: Chat) -> Chat:
         """Return the engine's own chat."""
         return inner
+
+
+def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate]:
+    """Ask an engine, and return its candidates as they will be simulated.
+
+    Args:
+        engine: the engine, possibly made by the user.
+        space: what may be varied.
+        wanted: number of candidates to ask for.
+
+    Raises:
+        SpecError: if the engine returns something else than a list of candidates, none, or more than it was
+            asked for.
+        CandidateError: naming the engine and the input or parameter that is unknown, missing or outside its
+            range.
+    """
+    candidates = engine.ask(wanted)
+    if not isinstance(candidates, Sequence) or not all(isinstance(c, Candidate) for c in candidates):
+        raise SpecError(
+            f"engine {engine.name!r}: ask(n) must return a list of Candidate, got {repr(candidates)[:100]}"
+        )
+    if not candidates:
+        raise SpecError(f"engine {engine.name!r} returned no candidate: ask(n) must return at least one")
+    if len(candidates) > wanted:
+        raise SpecError(
+            f"engine {engine.name!r} returned {len(candidates)} candidates: ask({wanted}) must return "
+            f"at most {wanted}"
+        )
+    try:
+        return [space.admit(candidate) for candidate in candidates]
+    except CandidateError as error:
+        raise CandidateError(f"engine {engine.name!r}: {error}") from None

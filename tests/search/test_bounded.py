@@ -3,8 +3,7 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.llm.replay import ScriptedChat
-from falsifier.search.bounded import BoundedChat
-from falsifier.search.budget import Budget, LimitReached, Spent
+from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 

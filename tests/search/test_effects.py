@@ -1,7 +1,7 @@
 from falsifier import Candidate, Signal, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
-from falsifier.search.effects import Effects
+from falsifier.search.vacuity import Effects
 from falsifier.testing import Array, lag, lag_problem
 
 

@@ -9,10 +9,10 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.search.events import Event, RunStarted
+from falsifier.search.findings import inexpressible
 from falsifier.search.levels import Level
 from falsifier.search.parameterization import (
     engine_parameterization,
-    inexpressible,
     parameterization_note,
     parameterization_of,
     searched_space,

@@ -14,8 +14,7 @@ from falsifier.record import manifest
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
-from falsifier.search.levels import level_results
-from falsifier.search.refine import level_starts
+from falsifier.search.levels import level_results, level_starts
 from falsifier.search.result import Result
 from falsifier.testing import BIAS, FREE, START, lag_problem
 from tests.problems import fast_only
