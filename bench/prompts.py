@@ -1,46 +1,62 @@
-"""Tokens of prompts by variant, system and number of samples, and the reconstruction error of courses.
+"""Tokens of prompts, how much of them providers can keep, and numbers told against trajectories.
 
     python -m bench.prompts > bench/prompts.md
 
 Samples alternate between the surrogate engine and uniform random search, seed 1. Tokens are counted with the
-vocabulary cl100k_base. A course is judged by its band: the smallest and largest value within a fiftieth of
-the simulated time around each moment, so that an oscillation need not be redrawn swing by swing. Its error is
-the root mean square difference between the bands of the signal and of the redrawn course, as a share of the
-span.
+vocabulary cl100k_base. Of each course that is told of a signal, every recorded time is compared: the line or
+envelope as it is told, digits and all, must not be further from the signal than the prompt says, where times
+are rounded as the prompt says. Values at the critical time and lists of changes are compared, too.
 """
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from falsifier.core.trajectory import is_discrete
+from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
 from falsifier.engines.preview import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, View
-from falsifier.llm.prompts.courses import column_decimals
-from falsifier.llm.prompts.numbers import plain
-from falsifier.llm.prompts.observations import course_line, drawn_course
-from falsifier.llm.prompts.shapes import Course, Points
+from falsifier.llm.prompts.courses import coarse_clock
+from falsifier.llm.prompts.observations import (
+    CLOSE_TOLERANCE,
+    close_up_times,
+    compared_columns,
+    observed,
+    told_accuracy,
+)
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 
 SYSTEMS = ("AT1", "CC4", "CCx", "NN", "F16", "SC")
+COMPARED = (*SYSTEMS, "AT51", "AT6a", "AFC27", "PulseMeter", "HeaterLimpHome", "ChargerHandshake")
 SAMPLES = (0, 1, 5, 20)
-# MP5 with the same samples before courses were told by breakpoints (21 values on a grid and 20 to 40 around
-# the critical time for up to 16 signals of each sample), counted with the same vocabulary.
-BEFORE = {
-    "AT1": (815, 1285, 3877, 8534),
-    "CC4": (1036, 2929, 10385, 25029),
-    "CCx": (1159, 1644, 13260, 35776),
-    "NN": (870, 2757, 9506, 24698),
-    "F16": (671, 2233, 8295, 20861),
-    "SC": (841, 1662, 5087, 12390),
-}
 Array = NDArray[np.float64]
+_OSCILLATION = re.compile(r"oscillates from (\S+) to (\S+) s with period .*?, between (.*?) and (.*)")
+_WITHIN = re.compile(r" \(each value within (\S+)\)$")
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """One line of a prompt on a signal over time, and how far it is off.
+
+    Attributes:
+        name: what is told.
+        stated: how far it may be off, by the prompt.
+        error: how far it is off.
+        span: the signal's span.
+    """
+
+    name: str
+    stated: float
+    error: float
+    span: float
 
 
 def samples(problem: Problem, count: int) -> list[Evaluation]:
@@ -54,95 +70,118 @@ def samples(problem: Problem, count: int) -> list[Evaluation]:
     return found
 
 
-def tokens(problem: Problem, evaluations: Sequence[Evaluation], variant: str) -> list[int]:
-    """Tokens of the prompts after each number of samples."""
-    return [
-        sum(count_tokens(m.content) for m in preview(problem, variant=variant, evaluations=evaluations[:n]))
-        for n in SAMPLES
-    ]
+def tokens(messages: Sequence[Message]) -> int:
+    """Tokens of a prompt."""
+    return sum(count_tokens(m.content) for m in messages)
 
 
-def on_grid(times: Array, column: Array) -> tuple[Array, int]:
-    """A course as it was told before: 21 values, redrawn by straight lines; and its tokens."""
-    grid = np.linspace(0.0, times[-1], 21)
-    values = column[np.searchsorted(times, grid).clip(max=len(times) - 1)]
-    text = ", ".join(plain(float(v), column_decimals(column)) for v in values)
-    return np.interp(times, grid, values), count_tokens(text)
+def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
+    """The courses that a prompt tells of one sample, in full and in short, against its trajectory."""
+    trajectory = evaluation.trajectory
+    assert trajectory is not None
+    end = int(np.searchsorted(trajectory.times, view.looked_at + trajectory.step / 2))
+    inside = Trajectory(trajectory.times[:end], {n: c[:end] for n, c in trajectory.columns.items()})
+    columns = {n: inside[n] for n in view.experiment.outputs} | compared_columns(view, inside)
+    seen = observed(view, evaluation)
+    for line in (*seen.full, *seen.short):
+        for name, column in columns.items():
+            if line.startswith(f"{name}: ") and ", then " in line:
+                yield _changes(name, line[len(name) + 2 :], inside.times, column)
+            elif line.startswith(f"{name}: ") and ":" in line[len(name) + 2 :]:
+                clock = coarse_clock(view.space.stop_time)
+                stated = told_accuracy(view, name, column)
+                yield _compared(name, line[len(name) + 2 :], inside.times, column, stated, clock)
+            if line.startswith(f"{name} around t = "):
+                part = close_up_times(view, inside.times, column, evaluation)
+                times, column = inside.times[part], column[part]
+                stated = CLOSE_TOLERANCE * float(np.ptp(column))
+                yield _compared(name, line.partition(" s: ")[2], times, column, stated, 6)
 
 
-def redrawn(times: Array, drawn: Course) -> tuple[Array, Array]:
-    """Lower and upper side of a course; the same where it is a line."""
-    low, high = np.full_like(times, np.nan), np.full_like(times, np.nan)
-    for points in drawn.lines:
-        _fill(times, points, low, high)
-    for swing in drawn.swings:
-        inside = (times >= swing.start) & (times <= swing.end)
-        for side, points in ((low, swing.lower), (high, swing.upper)):
-            side[inside] = np.interp(times[inside], *np.array(points).T)
-    known = ~np.isnan(low)
-    return np.interp(times, times[known], low[known]), np.interp(times, times[known], high[known])
+def _compared(name: str, text: str, times: Array, column: Array, stated: float, clock: int) -> Told:
+    if within := _WITHIN.search(text):
+        text, stated = text[: within.start()], max(stated, float(within[1]))
+    # As far as the time of a breakpoint is rounded, the signal may be seen a little earlier or later.
+    step = float(times[1] - times[0])
+    width = 2 * round(0.5 * 10.0**-clock / step + 0.51) + 1
+    low, high = minimum_filter1d(column, width), maximum_filter1d(column, width)
+    error = np.zeros_like(times)
+    for part in text.split("; "):
+        if swing := _OSCILLATION.match(part):
+            begin, end = float(swing[1]), float(swing[2])
+            inside = (times >= begin) & (times <= end)
+            lower, upper = (np.interp(times, *_points(side)) for side in (swing[3], swing[4]))
+            error = np.where(inside, np.maximum(error, np.maximum(lower - high, low - upper)), error)
+        else:
+            at, values = _points(part)
+            inside = (times >= at[0]) & (times <= at[-1])
+            line = np.interp(times, at, values)
+            error = np.where(inside, np.maximum(error, np.maximum(line - high, low - line)), error)
+    return Told(name, stated, float(error.max()), float(np.ptp(column)))
 
 
-def _fill(times: Array, points: Points, low: Array, high: Array) -> None:
-    inside = (times >= points[0][0]) & (times <= points[-1][0])
-    low[inside] = high[inside] = np.interp(times[inside], *np.array(points).T)
+def _changes(name: str, text: str, times: Array, column: Array) -> Told:
+    """A list of changes; values with the name of an item are compared by their numbers."""
+    first, _, rest = text.partition(", then ")
+    error, value = np.zeros_like(times), np.full_like(times, float(first.split(" ")[0]))
+    for change in rest.split(", "):
+        if "more changes" in change:  # what follows is told, what is left out is not
+            value[:] = np.nan
+            continue
+        number, _, at = change.partition(" from ")
+        value[times > float(at.removesuffix(" s")) - 0.5 * (times[1] - times[0])] = float(
+            number.split(" ")[0]
+        )
+    error = np.nan_to_num(np.abs(value - column))
+    return Told(name, 0.0, float(error.max()), float(np.ptp(column)))
 
 
-def error(times: Array, column: Array, low: Array, high: Array) -> float:
-    """Root mean square difference of the bands, as a share of the span."""
-    width = max(3, len(times) // 50)
-    sides = (minimum_filter1d(column, width) - minimum_filter1d(low, width)) ** 2
-    sides += (maximum_filter1d(column, width) - maximum_filter1d(high, width)) ** 2
-    return float(np.sqrt(np.mean(sides) / 2) / np.ptp(column))
-
-
-def courses(problem: Problem, evaluations: Sequence[Evaluation]) -> tuple[float, float, float, float]:
-    """Mean tokens and error of all real signals of all samples: on the grid, and as they are told."""
-    view = View.of(problem)
-    rows = []
-    for evaluation in evaluations:
-        trajectory = evaluation.trajectory
-        for name in problem.experiment.outputs if trajectory is not None else ():
-            assert trajectory is not None
-            times, column = trajectory.times, trajectory[name]
-            if is_discrete(column, kind=view.kind(name)) or np.ptp(column) == 0:
-                continue
-            line, cost = on_grid(times, column)
-            drawn = drawn_course(view, name, column, times)
-            rows.append(
-                (
-                    cost,
-                    error(times, column, line, line),
-                    count_tokens(course_line(view, drawn, column)),
-                    error(times, column, *redrawn(times, drawn)),
-                )
-            )
-    return tuple(np.mean(rows, axis=0))
+def _points(text: str) -> tuple[Array, Array]:
+    pairs = [pair.split(":") for pair in text.split(" ")]
+    return np.array([float(t) for t, _ in pairs]), np.array([float(v) for _, v in pairs])
 
 
 def main() -> None:
     """Print the tables."""
     print("# Prompts\n\nMade by `python -m bench.prompts`; how, is said there.\n")
     print("## Tokens by number of samples\n")
+    print("Kept: share of the question after 20 samples that is the same as in the question before.\n")
     heads = " | ".join(str(n) for n in SAMPLES)
-    print(
-        f"| system | variant | {heads} | the same in every question |\n|---|---|{'---|' * (len(SAMPLES) + 1)}"
-    )
-    found = []
-    for name in SYSTEMS:
+    print(f"| system | variant | {heads} | kept |\n|---|---|{'---|' * (len(SAMPLES) + 1)}")
+    rows = []
+    for name in COMPARED:
         problem = load_problem(name)
         evaluations = samples(problem, max(SAMPLES))
-        for variant in VARIANTS:
-            counts = tokens(problem, evaluations, variant)
-            standing = count_tokens(preview(problem, variant=variant)[0].content)
-            print(f"| {name} | {variant} | {' | '.join(map(str, counts))} | {standing} |")
-        print(f"| {name} | MP5 before | {' | '.join(map(str, BEFORE[name]))} | |", flush=True)
-        found.append((name, courses(problem, evaluations)))
+        for variant in VARIANTS if name in SYSTEMS else ():
+            asked = {
+                n: preview(problem, variant=variant, evaluations=evaluations[:n]) for n in (*SAMPLES, 19)
+            }
+            before, after = ("\0".join(m.content for m in asked[n]) for n in (19, 20))
+            same = next((i for i, (a, b) in enumerate(zip(before, after, strict=False)) if a != b), 0)
+            kept = count_tokens(after[:same]) / tokens(asked[20])
+            counts = " | ".join(str(tokens(asked[n])) for n in SAMPLES)
+            print(f"| {name} | {variant} | {counts} | {kept:.0%} |", flush=True)
+        view = View.of(problem)
+        for count in (8, 20):
+            told = [
+                one
+                for e in evaluations[:count]
+                if e.trajectory is not None and e.verdict is not None
+                for one in told_courses(view, e)
+            ]
+            rows.append((name, count, told))
         problem.model.close()
-    print("\n## Courses of single signals, mean over all real signals of 20 samples\n")
-    print("| system | tokens, 21 values | error | tokens, as told | error |\n|---|---|---|---|---|")
-    for name, (cost, wrong, new_cost, new_wrong) in found:
-        print(f"| {name} | {cost:.0f} | {100 * wrong:.1f} % | {new_cost:.0f} | {100 * new_wrong:.1f} % |")
+    print("\n## Courses told, against trajectories\n")
+    print("Beyond: lines whose error is larger than the prompt says. Coarse: lines that state an error of")
+    print("more than 5 % of the signal's span.\n")
+    print("| system | samples | lines | median error | worst error | coarse | beyond |")
+    print("|---|---|---|---|---|---|---|")
+    for name, count, told in rows:
+        shares = [100 * one.error / one.span for one in told]
+        beyond = sum(one.error > one.stated * (1 + 1e-6) for one in told)
+        coarse = sum(one.stated > 0.05 * one.span for one in told)
+        median, worst = (float(np.median(shares)), max(shares)) if shares else (0.0, 0.0)
+        print(f"| {name} | {count} | {len(told)} | {median:.1f} % | {worst:.1f} % | {coarse} | {beyond} |")
 
 
 if __name__ == "__main__":

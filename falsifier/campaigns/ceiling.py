@@ -7,7 +7,7 @@ from math import inf
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.words import counted
 from falsifier.llm.conversation import MAX_REASKS
-from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.search.request import LLMSettings
 

@@ -21,9 +21,8 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
-from falsifier.engines.adviser import Adviser
 from falsifier.engines.box import Array
-from falsifier.engines.protocol import FollowsRun
+from falsifier.engines.llm import LLMEngine
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.engines.surrogate.planning import is_seen
@@ -102,7 +101,7 @@ class Hybrid:
         problem: Problem,
         *,
         seed: int,
-        adviser: Adviser,
+        adviser: LLMEngine,
         settings: Settings | None = None,
         surrogate_settings: SurrogateSettings = ADVISED,
     ) -> None:
@@ -121,6 +120,7 @@ class Hybrid:
         self._numeric: Candidate | None = None
         self._unanswered: list[str] = []
         self._unrevised: list[str] = []
+        self._insisted: set[object] = set()
         self._points: list[Array] = []
         self._repeats: list[str] = []
 
@@ -136,8 +136,7 @@ class Hybrid:
     def begin(self, simulations: int | None) -> None:
         """Be told the maximum number of simulations, and tell the adviser."""
         self._simulations = simulations
-        if isinstance(self.adviser, FollowsRun):
-            self.adviser.begin(simulations)
+        self.adviser.begin(simulations)
 
     def timed(self, seconds: float) -> None:
         """Be told how long the last ``ask`` took, which counts if the LLM was not asked."""
@@ -145,8 +144,7 @@ class Hybrid:
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Tell the adviser that a violation does not count."""
-        if isinstance(self.adviser, FollowsRun):
-            self.adviser.doubt(confirmation)
+        self.adviser.doubt(confirmation)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates of the LLM or the surrogate, whichever has its turn.
@@ -263,18 +261,22 @@ class Hybrid:
         if unheard and predictions is not None and min(p.robustness for p in predictions) >= 0:
             heard = self._predictions_told(candidates, predictions)
             try:
-                revised = self.adviser.propose(settings.count, [*notes, *heard], dispensable=True)
+                revised = self.adviser.propose(
+                    settings.count, [*notes, *heard], predicted=candidates, dispensable=True
+                )
             except ChatError as error:  # the first answer has been paid for
                 revised = advice
                 self._unrevised.append(str(error))
             candidates = list({c.key: c for c in (*candidates, *revised.candidates)}.values())
             predictions = self._trusted_predictions(candidates)
+            self._insisted = {c.key for c in revised.kept}
         self.surrogate.suggest(candidates)
         if predictions is None:
             candidates = sorted(candidates, key=lambda c: self._repeated(c) is not None)
         else:
             order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
             candidates = [_ranked(candidates[i], predictions[i].robustness) for i in order]
+        candidates.sort(key=lambda c: c.key not in self._insisted)
         return candidates[: settings.tries]
 
     def _is_due(self, answer: _Answer) -> bool:
@@ -282,6 +284,8 @@ class Hybrid:
         if self._llm.turns == 0:
             return True
         candidate = answer.queue[0]
+        if candidate.key in self._insisted:
+            return True
         repeated = self._repeated(candidate)
         when = due(
             repeats=repeated is not None,
@@ -402,7 +406,11 @@ class Hybrid:
             f"the samples says: {self.adviser.foretold(p)}."
             for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
         ]
-        return [*lines, "None is predicted to violate the requirement: revise them, or insist with a reason."]
+        return [
+            *lines,
+            "None is predicted to violate the requirement: revise them, or insist on some as they are by "
+            'adding their numbers to your reply, such as "keep": [1], and say why.',
+        ]
 
 
 def _ranked(candidate: Candidate, prediction: float) -> Candidate:

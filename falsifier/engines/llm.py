@@ -3,13 +3,12 @@
 import logging
 import re
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import in_one_line
-from falsifier.engines.adviser import Advice
 from falsifier.engines.protocol import Engine
 from falsifier.engines.random_change import random_change
 from falsifier.engines.stand_ins import RANDOM_CHANGE, StandIns
@@ -23,14 +22,12 @@ from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Chat, ChatRequest, Exchange, ReplyKind
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
+    Questions,
     Variant,
     View,
-    build_prompt,
     choices,
-    render,
-    trimmed,
 )
-from falsifier.llm.prompts.circumstances import Circumstances
+from falsifier.llm.replies import Answer
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
@@ -46,6 +43,21 @@ _MOST_WITHOUT_ANSWER = 3
 _WORD = re.compile(r"[^\W\d]\w*")
 _RANDOM = "random changes of the best sample"
 _LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """Answer to one question of an engine that leads the search.
+
+    Attributes:
+        candidates: new ones, at most as many as requested; none if earlier ones are kept.
+        foresaw: whether the LLM requested and received predictions before it answered.
+        kept: earlier candidates on which it insists, although their predictions are poor.
+    """
+
+    candidates: list[Candidate]
+    foresaw: bool = False
+    kept: list[Candidate] = field(default_factory=list)
 
 
 class LLMEngine:
@@ -92,13 +104,17 @@ class LLMEngine:
         self._fallback = fallback
         self._handed_over = False
         self._stand_ins = StandIns()
-        self._evaluations: list[Evaluation] = []
         self._pending: list[Candidate] = []
         self._start = start
-        self._known: Circumstances | None = None
+        self._questions: Questions | None = None
+        self._untold: list[Evaluation] = []
+        self._samples: dict[Hashable, int] = {}
+        self._best: Evaluation | None = None
         self._simulations: int | None = None
         self._doubts: dict[Hashable, str] = {}
-        self._without_answer = 0
+        self._rationales: dict[Hashable, str] = {}
+        self._lessons = ""
+        self._told = self._without_answer = 0
 
     @property
     def name(self) -> str:
@@ -139,7 +155,7 @@ class LLMEngine:
                 self._stand_ins.proposed(_engine_named(self._fallback), rest)
                 return candidates + rest
             try:
-                found = self._ask_once(n - len(candidates), dispensable=self._fallback is not None)
+                found, _ = self._asked(n - len(candidates), dispensable=self._fallback is not None)
                 self._without_answer = 0
             except NoValidReplyError as error:
                 found = self._replaced(error)
@@ -164,9 +180,8 @@ class LLMEngine:
             return []
         if self._without_answer >= _MOST_WITHOUT_ANSWER:
             raise error
-        judged = [e for e in self._evaluations if e.robustness is not None]
-        best = min(judged, key=lambda e: e.robustness or 0.0).candidate if judged else None
-        seed = (self._sample, len(self._evaluations), len(self._pending))
+        best = None if self._best is None else self._best.candidate
+        seed = (self._sample, self._told, len(self._pending))
         what = "a random change of the best sample" if best else "a random sample"
         _LOG.warning("%s. Continuing with %s.", error, what)
         changed = random_change(self._view.space, best, seed=seed)
@@ -192,18 +207,31 @@ class LLMEngine:
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
+        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
     ) -> Advice:
-        """Ask one question, as ``Adviser.propose``; return at least one and at most ``count`` new candidates.
+        """Ask one question of an engine that leads the search.
+
+        Args:
+            count: maximum number of candidates.
+            notes: lines to add to the question, after problem and history.
+            what_if: permission to request predictions before answering; ignored if the LLM does not support
+                tools.
+            predicted: earlier candidates whose predictions are among the notes, and on which the LLM may
+                insist.
+            dispensable: whether the search continues without an answer. A missing answer is then recorded, so
+                that a resumed run continues in the same way.
 
         Raises:
             ChatError: if the LLM cannot be reached or gives no valid reply.
         """
         tool = None if what_if is None else self._tool(what_if)
-        found = self._ask_once(count, notes, tool, dispensable=dispensable)
+        earlier = [self._disguise.hidden_candidate(c) if self._disguise else c for c in predicted]
+        found, kept = self._asked(count, notes, tool, earlier, dispensable=dispensable)
         self._pending += found
         revealed = [self._disguise.revealed(c) for c in found] if self._disguise else found
-        return Advice(revealed, foresaw=tool is not None and tool.answered > 0)
+        foresaw = tool is not None and tool.answered > 0
+        return Advice(revealed, foresaw=foresaw, kept=[predicted[n] for n in kept])
 
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
@@ -231,12 +259,36 @@ class LLMEngine:
             self._fallback.tell(evaluations)
         told = evaluations
         if self._disguise:
-            self._circumstances()  # first: values at time 0 determine scales before trajectories do
-            self._wear(self._disguise.fitted(evaluations))
+            self._begun()  # first: values at time 0 determine scales before trajectories do
+            self._disguise = self._disguise.fitted(evaluations)
+            self._view = self._disguise.view
             told = [self._disguise.hidden(e) for e in evaluations]
-        keys = {e.candidate.key for e in told}
-        self._pending = [c for c in self._pending if c.key not in keys]
-        self._evaluations = _thinned([*self._evaluations, *told])
+        for evaluation in told:
+            self._told += 1
+            self._samples[evaluation.candidate.key] = self._told
+            best = None if self._best is None else self._best.robustness
+            if evaluation.robustness is not None and (best is None or evaluation.robustness < best):
+                self._best = replace(evaluation, trajectory=None)
+        self._pending = [c for c in self._pending if c.key not in self._samples]
+        # What is told of a sample takes longer than some simulations; it is made when a question needs it.
+        self._untold = _thinned([*self._untold, *told])
+
+    def _begun(self) -> Questions:
+        """The questions of this run; made once, because the outputs at time 0 are read for them."""
+        if self._questions is None:
+            start = self._start() if self._disguise or self._variant.has("circumstances") else {}
+            if self._disguise:
+                self._disguise = Disguise.of(self._disguise.real, start)
+                self._view, start = self._disguise.view, self._disguise.hidden_values(start)
+            self._questions = Questions(
+                self._view,
+                self._variant,
+                reply=self._reply,
+                start=start,
+                tokens=self._prompt_tokens,
+                llm=self._chat.llm,
+            )
+        return self._questions
 
     def _tool(self, what_if: WhatIf) -> PredictionTool:
         disguise = self._disguise
@@ -248,37 +300,49 @@ class LLMEngine:
             hide=disguise.hidden_verdict if disguise else _unchanged,
         )
 
-    def _ask_once(
+    def _asked(
         self,
         count: int,
         notes: Sequence[str] = (),
         tool: PredictionTool | None = None,
+        predicted: Sequence[Candidate] = (),
         *,
         dispensable: bool,
-    ) -> list[Candidate]:
-        variant, circumstances = self._variant, self._circumstances()  # scales may depend on start values
-        form = reply_form(self._view, variant, self._reply, count=count)
-        prompt = build_prompt(
-            self._view,
-            variant,
-            self._evaluations,
-            pending=self._pending,
-            notes=notes,
-            count=count,
-            reply=self._reply,
-            circumstances=circumstances,
-        )
+    ) -> tuple[list[Candidate], list[int]]:
+        """Ask one question; return new candidates, and places of earlier ones on which the LLM insists."""
+        questions = self._begun()
+        questions.view = self._view
+        for evaluation in self._untold:
+            key = evaluation.candidate.key
+            questions.tell(evaluation, doubt=self._doubts.get(key, ""), why=self._rationales.get(key, ""))
+        self._untold.clear()
+        keys = [c.key for c in predicted]
+        form = reply_form(self._view, self._variant, self._reply, count=count, keepable=len(predicted))
         request = ChatRequest(
-            messages=render(trimmed(prompt, self._prompt_tokens, self._chat.llm)),
+            messages=questions.ask(
+                count,
+                simulations=self._simulations,
+                # Of those with predictions, the notes say what is known.
+                pending=[c for c in self._pending if c.key not in keys],
+                notes=notes,
+                lessons=self._lessons,
+            ),
             reply_schema=None if form.points else form.schema(),
             tools=() if tool is None else (tool.offer,),
             sample=self._sample,
         )
+
+        def read(text: str) -> tuple[list[Candidate], list[int]]:
+            answer = form.read(text, origin=self.name)
+            new, kept = self._sorted_out(answer, keys)
+            self._lessons = answer.lessons or self._lessons
+            return new[:count], kept
+
         try:
-            return converse(
+            found, kept = converse(
                 self._chat,
                 request,
-                lambda text: self._new(form.read(text, origin=self.name))[:count],
+                read,
                 self._on_exchange,
                 respond=None if tool is None else tool.respond,
             )
@@ -288,35 +352,29 @@ class LLMEngine:
             if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
                 self._on_exchange(_unanswered(self._chat, request, error))
             raise
+        self._rationales |= {c.key: c.rationale for c in found}
+        return found, kept
 
-    def _circumstances(self) -> Circumstances:
-        if self._known is None:
-            start = self._start() if self._disguise or self._variant.has("circumstances") else {}
-            if self._disguise:
-                self._wear(Disguise.of(self._disguise.real, start))
-                start = self._disguise.hidden_values(start)
-            self._known = Circumstances(start=start)
-        return replace(self._known, simulations=self._simulations, doubts=self._doubts)
-
-    def _wear(self, disguise: Disguise) -> None:
-        self._disguise, self._view = disguise, disguise.view
-
-    def _new(self, candidates: list[Candidate]) -> list[Candidate]:
-        """Return the candidates that are neither evaluated nor pending.
+    def _sorted_out(self, answer: Answer, predicted: Sequence[Hashable]) -> tuple[list[Candidate], list[int]]:
+        """Return the new candidates of an answer, and the places of predicted ones that it keeps or repeats.
 
         Raises:
-            RejectedReplyError: if there is none.
+            RejectedReplyError: if there is none of either.
         """
+        candidates = list(answer.candidates)
         if self._disguise:
             candidates = [self._disguise.canonical(c) for c in candidates]
-        seen = {e.candidate.key: f"sample {i}" for i, e in enumerate(self._evaluations, start=1)}
+        kept = {n - 1 for n in answer.kept} | {
+            predicted.index(c.key) for c in candidates if c.key in predicted
+        }
+        seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in self._samples.items()}
         seen |= {c.key: "one that was proposed already" for c in self._pending}
         new = {c.key: c for c in candidates if c.key not in seen}
-        if not new:
+        if not new and not kept:
             # The published prompts number only the samples that they show.
             which = "an earlier sample" if self._variant.is_published else seen[candidates[0].key]
             raise RejectedReplyError(f"it repeats {which}")
-        return list(new.values())
+        return list(new.values()), sorted(kept)
 
 
 def make_llm_engine(

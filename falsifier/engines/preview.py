@@ -8,8 +8,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Message, ReplyKind, Tool
-from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, View, build_prompt, render, trimmed, variant_named
-from falsifier.llm.prompts.circumstances import Circumstances
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, View, variant_named
 from falsifier.llm.tools import MOST_CANDIDATES, what_if_tool
 from falsifier.problem.problem import Problem
 
@@ -25,6 +24,7 @@ def preview(
     reply: ReplyKind = "json",
     simulations: int | None = None,
     doubtful: Sequence[Confirmation] = (),
+    lessons: str = "",
 ) -> tuple[Message, ...]:
     """Return the messages that would be sent next, without sending them.
 
@@ -38,6 +38,7 @@ def preview(
         reply: what a reply is to consist of.
         simulations: maximum number of simulations of the run; None: no limit.
         doubtful: violations among the evaluations that do not count.
+        lessons: what the LLM wrote down in its last reply.
     """
     problem, told = told_context(problem, variant, anonymous=anonymous)
     view = told_view(View.of(problem), reply)
@@ -48,15 +49,12 @@ def preview(
         view, evaluations = disguise.view, [disguise.hidden(e) for e in evaluations]
         start = disguise.hidden_values(start)
     doubts = doubts_told(doubtful, disguise)
-    prompt = build_prompt(
-        view,
-        told,
-        evaluations,
-        count=count,
-        reply=reply,
-        circumstances=Circumstances(simulations, start, doubts),
-    )
-    return render(trimmed(prompt, prompt_tokens))
+    questions = Questions(view, told, reply=reply, start=start, tokens=prompt_tokens)
+    for evaluation in evaluations:
+        candidate = evaluation.candidate
+        why = candidate.rationale if candidate.origin.endswith(f" {told.name}") else ""
+        questions.tell(evaluation, doubt=doubts.get(candidate.key, ""), why=why)
+    return questions.ask(count, simulations=simulations, lessons=lessons)
 
 
 def preview_tool(

@@ -24,7 +24,17 @@ from falsifier.llm.litellm_adapter import (
     sent_tool,
     storable,
 )
-from falsifier.llm.messages import MODES, UNREADABLE, ChatReply, ChatRequest, Mode, Usage, below, cleaned
+from falsifier.llm.messages import (
+    MODES,
+    UNREADABLE,
+    ChatReply,
+    ChatRequest,
+    Mode,
+    Usage,
+    below,
+    cleaned,
+    without_limits,
+)
 from falsifier.llm.providers import find_key, known
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, Gate, retried
 from falsifier.llm.transport import within
@@ -70,7 +80,7 @@ class LiteLLMChat:
     options: Mapping[str, Any] = field(default_factory=dict)
     timeout: float = DEFAULT_TIMEOUT
     price: Price | None = None
-    mode: Mode = MODES[0]
+    mode: Mode = "json_schema"
     content: str = ""
     gate: Gate = field(default_factory=Gate)
     attempts: int = DEFAULT_ATTEMPTS
@@ -238,15 +248,18 @@ class LiteLLMChat:
             arguments["reasoning_effort"] = self.effort
             if provider.effort == "allowed":
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
-        if request.reply_schema is not None and mode == "json_schema":
+        if request.reply_schema is not None and mode in ("bounded_schema", "json_schema"):
+            schema = (
+                request.reply_schema if mode == "bounded_schema" else without_limits(request.reply_schema)
+            )
             arguments["response_format"] = {
                 "type": "json_schema",
-                "json_schema": {"name": "reply", "strict": True, "schema": request.reply_schema},
+                "json_schema": {"name": "reply", "strict": True, "schema": schema},
             }
         elif request.reply_schema is not None and mode == "json_object":
             arguments["response_format"] = {"type": "json_object"}
         if request.tools:
-            arguments["tools"] = [sent_tool(tool) for tool in request.tools]
+            arguments["tools"] = [without_limits(sent_tool(tool)) for tool in request.tools]
             # Given tools, litellm imports its MCP gateway, whose packages are not among litellm's own
             # requirements. It removes this argument before sending.
             arguments["_skip_mcp_handler"] = True

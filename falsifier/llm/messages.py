@@ -13,8 +13,10 @@ from falsifier.core.secrets import redact_held
 Role = Literal["system", "user", "assistant", "tool"]
 Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
-Mode = Literal["json_schema", "json_object", "prompt"]
+Mode = Literal["bounded_schema", "json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# Keywords of a schema that not every server takes; ``bounded_schema`` asks with them.
+_LIMITS = frozenset({"minItems", "maxItems", "minimum", "maximum"})
 # Finish reason of a reply that the server could not parse in the form that was asked for.
 UNREADABLE = "unreadable"
 # What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
@@ -36,15 +38,15 @@ def below(mode: Mode) -> Mode | None:
     return rest[0] if rest else None
 
 
-class _MayUseTools(_Value):
-    """Omits empty fields that concern tools: few messages use tools, and a journal contains many messages."""
+class _Sparse(_Value):
+    """Omits empty fields that few messages use: a journal contains many messages."""
 
     @model_serializer(mode="wrap")
     def _without_empty_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {k: v for k, v in handler(self).items() if v or k not in _FIELDS_OF_TOOLS}
+        return {k: v for k, v in handler(self).items() if v or k not in _SPARSE_FIELDS}
 
 
-_FIELDS_OF_TOOLS = frozenset({"tools", "tool_calls", "tool_call_id", "echo"})
+_SPARSE_FIELDS = frozenset({"tools", "tool_calls", "tool_call_id", "echo", "stable"})
 
 
 class Tool(_Value):
@@ -57,7 +59,7 @@ class Tool(_Value):
     )
 
 
-class ToolCall(_MayUseTools):
+class ToolCall(_Sparse):
     """One call of a tool, as the LLM made it."""
 
     id: str
@@ -69,11 +71,14 @@ class ToolCall(_MayUseTools):
     )
 
 
-class Message(_MayUseTools):
+class Message(_Sparse):
     """One message of a conversation."""
 
     role: Role
     content: str
+    stable: int = Field(
+        default=0, description="Characters at its beginning that the next question will begin with, too."
+    )
     tool_calls: tuple[ToolCall, ...] = Field(default=(), description="Of an assistant's message.")
     tool_call_id: str = Field(default="", description="Of a tool's message: the call that it answers.")
     echo: dict[str, Any] = Field(
@@ -117,7 +122,7 @@ class Usage(_Value):
         )
 
 
-class ChatRequest(_MayUseTools):
+class ChatRequest(_Sparse):
     """One request.
 
     Everything that influences the reply is either here or among the chat's parameters: together they are the
@@ -148,7 +153,7 @@ class ChatRequest(_MayUseTools):
         return None if self.deadline is None else max(0.0, self.deadline - monotonic())
 
 
-class ChatReply(_MayUseTools):
+class ChatReply(_Sparse):
     """One reply."""
 
     text: str
@@ -233,6 +238,15 @@ def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
             "echo": echo(reply.echo),
         }
     )
+
+
+def without_limits(schema: Any) -> Any:
+    """A schema without numbers of items and ranges of numbers, which not every server takes."""
+    if isinstance(schema, list):
+        return [without_limits(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: without_limits(part) for key, part in schema.items() if key not in _LIMITS}
 
 
 class Chat(Protocol):

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit
 
 from falsifier.core.secrets import holds_credentials
 from falsifier.errors import ChatSetupError
-from falsifier.llm.messages import MODES, Mode
+from falsifier.llm.messages import Mode
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +27,7 @@ class Provider:
             only on an explicit list.
         echo: fields of tool calls that must be sent back with them, such as signed reasoning; the provider
             rejects the conversation without them.
+        limits: whether schemas may state numbers of items and ranges of numbers.
     """
 
     keys: tuple[str, ...] = ()
@@ -37,6 +38,7 @@ class Provider:
     defaults: Mapping[str, Any] = field(default_factory=dict)
     effort: Literal["native", "allowed"] = "native"
     echo: tuple[str, ...] = ()
+    limits: bool = False
 
 
 # Ollama silently cuts off the beginning of a prompt that exceeds its context. Its default context is shorter
@@ -46,11 +48,12 @@ _OLLAMA = Provider(
     address="http://localhost:11434",
     start="ollama serve",
     defaults=MappingProxyType({"num_ctx": 32_768}),
+    limits=True,
 )
 
 PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
-        "openai": Provider(("OPENAI_API_KEY",), openai_client=True),
+        "openai": Provider(("OPENAI_API_KEY",), openai_client=True, limits=True),
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
         "anthropic": Provider(("ANTHROPIC_API_KEY",), echo=("thinking_blocks",)),
         "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY"), echo=("provider_specific_fields",)),
@@ -69,13 +72,15 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
             start="lms server start",
             openai_client=True,
             effort="allowed",
+            limits=True,
         ),
-        "hosted_vllm": Provider(start="vllm serve MODEL"),
+        "hosted_vllm": Provider(start="vllm serve MODEL", limits=True),
         "llamafile": Provider(
             local=True,
             address="http://127.0.0.1:8080/v1",
             start="MODEL.llamafile --server",
             openai_client=True,
+            limits=True,
         ),
     }
 )
@@ -167,4 +172,6 @@ def first_mode(llm: str) -> Mode:
     (ollama#11691, ollama#12470, lmstudio-bug-tracker#1555).
     """
     grammar_is_broken = provider_of(llm) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in llm
-    return "prompt" if grammar_is_broken else MODES[0]
+    if grammar_is_broken:
+        return "prompt"
+    return "bounded_schema" if known(llm).limits else "json_schema"

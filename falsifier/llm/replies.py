@@ -42,7 +42,23 @@ _MOST_CANDIDATES = 1000
 _ROUNDING = 1e-3
 # Keys of a candidate, of its parts, and of several candidates.
 _PARTS = frozenset({"signals", "parameters", "point"})
-_KEYS = _PARTS | {"candidates", "rationale", "name", "values", "value", "times", "points", "interpolation"}
+_KEYS = _PARTS | {"candidates", "rationale", "lessons", "keep"}
+_KEYS |= {"name", "values", "value", "times", "points", "interpolation"}
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a reply says.
+
+    Attributes:
+        candidates: the valid ones, in order.
+        lessons: what the LLM wrote down for its next question.
+        kept: numbers, from 1, of its earlier candidates on which it insists.
+    """
+
+    candidates: tuple[Candidate, ...]
+    lessons: str = ""
+    kept: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +72,8 @@ class ReplyForm:
         points: numbers between tags are asked for, not JSON; tools take the same numbers as JSON.
         count: number of candidates.
         reasoned: whether each candidate comes with a rationale.
+        lessons: whether the LLM may write down what it is to be told again.
+        keepable: number of earlier candidates on which it may insist.
     """
 
     space: SearchSpace
@@ -64,6 +82,8 @@ class ReplyForm:
     points: bool = False
     count: int = 1
     reasoned: bool = True
+    lessons: bool = False
+    keepable: int = 0
 
     @property
     def is_free(self) -> bool:
@@ -74,37 +94,68 @@ class ReplyForm:
         """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps.
 
         No choice between schemas either: OpenAI refuses objects under ``anyOf`` whose first keys are the
-        same. What an input cannot have is found when the reply is read.
+        same. What an input cannot have is found when the reply is read. Numbers of items and ranges are
+        stated as far as all inputs share them, and left out where a server does not take them.
         """
         parts: dict[str, Any] = {"rationale": _TEXT} if self.reasoned else {}
-        candidate = _object(**parts, **(self._named_parts() if self.named else {"point": _NUMBERS}))
-        return candidate if self.count == 1 else _object(candidates={"type": "array", "items": candidate})
+        candidate = parts | (self._named_parts() if self.named else {"point": self._point_part()})
+        whole = candidate
+        if self.count > 1:
+            whole = {"candidates": _list(_object(**candidate), 0 if self.keepable else 1, self.count)}
+        before = {"lessons": _TEXT} if self.lessons else {}
+        after = {"keep": _list({"type": "integer"}, 0, self.keepable)} if self.keepable else {}
+        return _object(**before, **whole, **after)
+
+    def _point_part(self) -> dict[str, Any]:
+        return _list({"type": "number"}, len(self.space.dimensions), len(self.space.dimensions))
 
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         if self.space.inputs:
             possible = (i for r in self.space.inputs for i in _interpolations(r)) if self.is_free else ()
-            items = _signal_part([r.name for r in self.space.inputs], tuple(dict.fromkeys(possible)))
-            parts["signals"] = {"type": "array", "items": items}
+            count = len(self.space.inputs)
+            parts["signals"] = _list(self._signal_part(tuple(dict.fromkeys(possible))), count, count)
         if self.space.parameters:
             name = {"type": "string", "enum": [p.name for p in self.space.parameters]}
-            parts["parameters"] = {"type": "array", "items": _object(name=name, value={"type": "number"})}
+            count = len(self.space.parameters)
+            value = {"type": "number", **_range(self.space.parameters)}
+            parts["parameters"] = _list(_object(name=name, value=value), count, count)
         return parts
 
-    def read(self, text: str, *, origin: str = "") -> list[Candidate]:
-        """Read the valid candidates of a reply.
+    def _signal_part(self, interpolations: tuple[str, ...]) -> dict[str, Any]:
+        """Schema of a signal with one of the names; without interpolations, its control points are fixed."""
+        inputs = self.space.inputs
+        name = {"type": "string", "enum": [r.name for r in inputs]}
+        number = {"type": "number", **_range(inputs)}
+        if interpolations:
+            values = {"type": "array", "items": number}
+            interpolation = {"type": "string", "enum": list(interpolations)}
+            return _object(name=name, interpolation=interpolation, times=_NUMBERS, values=values)
+        counts = [r.control_points for r in inputs]
+        return _object(name=name, values=_list(number, min(counts), max(counts)))
+
+    def read(self, text: str, *, origin: str = "") -> Answer:
+        """Read the valid candidates of a reply, and what it says beside them.
 
         Raises:
-            RejectedReplyError: if none is valid; states what is wrong with each.
+            RejectedReplyError: if none is valid and none is kept; states what is wrong with each.
         """
-        found = self.read_each(text, origin=origin)
+        beside = _beside(text) if self.lessons or self.keepable else {}
+        lessons = str(beside.get("lessons") or "")[:_LONGEST_RATIONALE] if self.lessons else ""
+        kept = tuple(n for n in _whole_numbers(beside.get("keep")) if 1 <= n <= self.keepable)
+        try:
+            found = self.read_each(text, origin=origin)
+        except RejectedReplyError:
+            if not kept:
+                raise
+            found = []
         candidates = [one for one in found if isinstance(one, Candidate)]
-        if not candidates:
+        if not candidates and not kept:
             numbered = len(found) > 1
             raise RejectedReplyError(
                 "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
             )
-        return candidates
+        return Answer(tuple(candidates), printable(lessons), kept)
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
         """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.
@@ -225,13 +276,15 @@ def _object(**properties: Any) -> dict[str, Any]:
     }
 
 
-def _signal_part(names: list[str], interpolations: tuple[str, ...]) -> dict[str, Any]:
-    """Schema of a signal with one of the names; without interpolations, its control points are fixed."""
-    name = {"type": "string", "enum": names}
-    if not interpolations:
-        return _object(name=name, values=_NUMBERS)
-    interpolation = {"type": "string", "enum": list(interpolations)}
-    return _object(name=name, interpolation=interpolation, times=_NUMBERS, values=_NUMBERS)
+def _list(items: dict[str, Any], least: int, most: int) -> dict[str, Any]:
+    return {"type": "array", "items": items, "minItems": least, "maxItems": most}
+
+
+def _range(ranges: Sequence[InputRange | ParameterRange]) -> dict[str, float]:
+    """The range that holds for all of them, and a rounding more."""
+    low, high = min(r.low for r in ranges), max(r.high for r in ranges)
+    slack = _ROUNDING * (high - low)
+    return {"minimum": low - slack, "maximum": high + slack}
 
 
 def _interpolations(r: InputRange) -> tuple[str, ...]:
@@ -339,6 +392,19 @@ def _candidate_objects(text: str) -> list[dict[str, Any]]:
         if candidates := _candidates_of(found):
             return candidates
     return _candidates_of(repaired(text))
+
+
+def _beside(text: str) -> dict[str, Any]:
+    """What the last JSON object of a reply says beside its candidates."""
+    text = without_thoughts(text)
+    objects = [found for found in (*json_objects(text), repaired(text)) if isinstance(found, dict)]
+    found = [_plain_keys(one) for one in objects]
+    return next((one for one in reversed(found) if {"lessons", "keep"} & one.keys()), {})
+
+
+def _whole_numbers(found: Any) -> list[int]:
+    numbers = found if isinstance(found, list) else []
+    return [int(n) for n in numbers if isinstance(n, int | float) and isfinite(n) and n == int(n)]
 
 
 def _other_keys(text: str) -> str:

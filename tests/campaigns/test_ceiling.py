@@ -4,7 +4,7 @@ import pytest
 
 from falsifier.campaigns.ceiling import Ceiling, ceiling
 from falsifier.campaigns.request import CampaignRequest, Method, cross
-from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget

@@ -12,9 +12,8 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.engines import make_engine
-from falsifier.engines.adviser import Advice
 from falsifier.engines.hybrid import Hybrid, Settings
-from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.llm import Advice, LLMEngine, make_llm_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
@@ -36,7 +35,7 @@ SETTINGS = replace(HASTY, pauses=0, bangs=1, probes=1)
 
 
 @dataclass
-class Script:
+class Script(LLMEngine):
     """Answers with constant inputs of these levels, a list an answer; an exception is raised."""
 
     answers: list[list[float] | Exception]
@@ -51,6 +50,7 @@ class Script:
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
+        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
     ) -> Advice:
         self.notes.append(tuple(notes))
@@ -296,6 +296,7 @@ class Kind(Script):
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
+        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
     ) -> Advice:
         self.notes.append(tuple(notes))

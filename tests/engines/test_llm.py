@@ -179,9 +179,9 @@ def test_several_candidates_at_a_time() -> None:
     engine = make_llm_engine(problem, chat, variant="MP4")
     candidates = engine.ask(3)
     assert [c.signals["u"].values[0] for c in candidates] == [0.1, 0.2, 0.3]
-    assert "Proposed earlier" in chat.requests[1].messages[-1].content
+    assert "Proposed and not simulated" in chat.requests[1].messages[-1].content
     engine.tell([evaluate(problem, c) for c in candidates])
-    assert "Proposed earlier" not in preview_of(chat, engine)
+    assert "Proposed and not simulated" not in preview_of(chat, engine)
 
 
 def preview_of(chat: ScriptedChat, engine: Engine) -> str:

@@ -20,8 +20,9 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.initial import start_values
 from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ChatRequest
-from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
+from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.observations import monitor_for
+from falsifier.llm.prompts.standing import standing
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -144,13 +145,13 @@ def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
 def test_outputs_stay_between_0_and_1_and_scales_do_not_change() -> None:
     problem = load_problem("CCx")
     disguise = Disguise.of(View.of(problem), start_values(problem))
-    standing = disguise.view.info.description, str(disguise.view.requirement.formula)
+    told_first = disguise.view.info.description, str(disguise.view.requirement.formula)
     first, second = (
         evaluate(problem, problem.space.decode(p)) for p in ([1.0] * 10 + [0.0] * 10, [0.0] * 20)
     )
     fitted = disguise.fitted([first])
     assert fitted.fitted([second]) == fitted
-    assert (fitted.view.info.description, str(fitted.view.requirement.formula)) == standing
+    assert (fitted.view.info.description, str(fitted.view.requirement.formula)) == told_first
     for evaluation in (first, second):
         told = fitted.hidden(evaluation).trajectory
         assert told is not None
@@ -187,11 +188,9 @@ def test_integers_become_levels() -> None:
     gear = InputRange("u", 1.0, 4.0, control_points=4, interpolation="constant", kind="integer", free=FREE)
     problem = replace(problem, space=SearchSpace((gear,), (), 10.0))
     disguise = disguised(problem)
-    (line,) = build_prompt(disguise.view, VARIANTS["MP5"], []).inputs.inputs
-    assert (line.kind, line.items) == ("levels", ("0", "0.333333", "0.666667", "1"))
-    standing = render(build_prompt(disguise.view, VARIANTS["MP5"], []))[0].content
-    assert "one of the numbers 0, 0.333333, 0.666667, 1; " in standing and "integer" not in standing
-    assert '"values": [0.0, 1.0, 0.333333]' in standing
+    told_first = standing(disguise.view, VARIANTS["MP5"])
+    assert "one of the numbers 0, 0.333333, 0.666667, 1; " in told_first and "integer" not in told_first
+    assert '"values": [0.0, 1.0, 0.333333]' in told_first
     told = Candidate({"u1": Signal.evenly([0.333333, 1, 0, 0.7], stop_time=10.0, interpolation="linear")})
     back = problem.space.admit(disguise.revealed(told))
     assert (back.signals["u"].values, back.signals["u"].interpolation) == ((2, 4, 1, 3), "constant")
@@ -236,4 +235,4 @@ def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_bac
     (changed,) = engine.ask()
     engine.tell([evaluate(problem, changed)])
     engine.ask()
-    assert "Proposed earlier" not in chat.requests[-1].messages[1].content
+    assert "Proposed and not" not in chat.requests[-1].messages[1].content

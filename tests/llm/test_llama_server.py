@@ -17,6 +17,8 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.messages import UNREADABLE, ChatRequest, Exchange, Mode, ToolCall
+from falsifier.llm.replies import ReplyForm
+from falsifier.testing import START, lag_problem
 from tests import patience
 from tests.command import falsifier
 from tests.llm.llama_server import llama_server, needs_llama_server
@@ -61,6 +63,17 @@ def test_a_schema_is_enforced(server: str, question: ChatRequest) -> None:
     assert reply.parameters["mode"] == "json_schema"
     assert list(json.loads(reply.text)) == ["sum"]
     assert reply.usage.prompt_tokens > 10 and not reply.usage.estimated
+
+
+def test_numbers_of_values_are_enforced(server: str) -> None:
+    form = ReplyForm(lag_problem(inputs=2, parameters=[START]).space, count=3, lessons=True)
+    request = PLAIN.model_copy(update={"reply_schema": form.schema()})
+    answers = chat(server, "bounded_schema", max_tokens=2000)
+    texts = [answers.send(request.model_copy(update={"sample": n})).text for n in range(3)]
+    for text in texts:
+        for one in json.loads(text)["candidates"]:
+            assert [len(s["values"]) for s in one["signals"]] == [4, 4]
+            assert len(one["parameters"]) == 1
 
 
 def test_a_json_object_is_enforced(server: str) -> None:

@@ -17,7 +17,11 @@ def test_grammars_that_break_gpt_oss_are_not_tried() -> None:
     assert first_mode("ollama_chat/gpt-oss:20b") == "prompt"
     assert first_mode("lm_studio/openai/gpt-oss-20b") == "prompt"
     assert first_mode("huggingface/openai/gpt-oss-20b") == "json_schema"
-    assert first_mode("ollama_chat/qwen3") == "json_schema"
+
+
+def test_limits_are_stated_to_servers_that_are_known_to_take_them() -> None:
+    assert first_mode("ollama_chat/qwen3") == first_mode("openai/any") == "bounded_schema"
+    assert first_mode("anthropic/claude-sonnet-4-5") == "json_schema"
 
 
 @pytest.mark.parametrize(

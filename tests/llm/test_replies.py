@@ -31,7 +31,7 @@ GOOD = {
 
 def read(reply: Any, **form: Any) -> Any:
     text = reply if isinstance(reply, str) else json.dumps(reply)
-    (candidate,) = ReplyForm(SPACE, **form).read(text, origin="me")
+    (candidate,) = ReplyForm(SPACE, **form).read(text, origin="me").candidates
     return candidate
 
 
@@ -173,18 +173,18 @@ class TestFreeParameterization:
 
 
 def strict_subset(schema: dict[str, Any]) -> None:
-    """Fail unless a strict server takes this schema."""
+    """Fail unless a strict server takes this schema, with limits or without."""
     if schema.get("type") == "object":
         assert schema["additionalProperties"] is False
         assert schema["required"] == list(schema["properties"])
         for part in schema["properties"].values():
             strict_subset(part)
     elif schema.get("type") == "array":
-        assert set(schema) == {"type", "items"}
+        assert set(schema) - {"minItems", "maxItems"} == {"type", "items"}
         strict_subset(schema["items"])
     else:  # no anyOf: OpenAI refuses objects in it that begin with the same key
         assert schema["type"] in ("string", "number")
-        assert set(schema) <= {"type", "enum"}
+        assert set(schema) - {"minimum", "maximum"} <= {"type", "enum"}
 
 
 @pytest.mark.parametrize("named", [True, False])
@@ -221,7 +221,7 @@ def test_an_interpolation_that_only_another_input_can_have_is_rejected() -> None
         for name, last in (("u", 0), ("g", 2))
     ]
     with pytest.raises(RejectedReplyError, match=r"'g'.*constant"):
-        form.read(json.dumps({"rationale": "", "signals": signals}))
+        form.read(json.dumps({"rationale": "", "signals": signals})).candidates
 
 
 def test_schema_without_inputs_or_without_parameters() -> None:
@@ -233,17 +233,19 @@ def test_schema_without_inputs_or_without_parameters() -> None:
 
 def test_several_candidates() -> None:
     other = changed(parameters=[{"name": "mass", "value": 901}])
-    found = ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [GOOD, other]}))
+    found = ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [GOOD, other]})).candidates
     assert [c.parameters["mass"] for c in found] == [1000, 901]
-    found = ReplyForm(SPACE, count=2).read("<point>0 0 0 0 0 950</point> <point>0 0 0 0 0 960</point>")
+    found = (
+        ReplyForm(SPACE, count=2).read("<point>0 0 0 0 0 950</point> <point>0 0 0 0 0 960</point>").candidates
+    )
     assert [c.parameters["mass"] for c in found] == [950, 960]
 
 
 def test_one_bad_candidate_among_several_costs_nothing_but_itself() -> None:
     bad = changed(parameters=[{"name": "mass", "value": 1}])
-    assert len(ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, GOOD]}))) == 1
+    assert len(ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, GOOD]})).candidates) == 1
     with pytest.raises(RejectedReplyError, match="'mass': 1 is outside"):
-        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, bad]}))
+        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, bad]})).candidates
 
 
 def test_a_rationale_is_something_that_a_file_can_hold() -> None:
@@ -268,7 +270,7 @@ anything = st.recursive(
 @example({"point": ["0\x1f"]}, False)
 def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
     try:
-        found = ReplyForm(SPACE, free=free).read(json.dumps(reply))
+        found = ReplyForm(SPACE, free=free).read(json.dumps(reply)).candidates
     except RejectedReplyError as rejection:
         assert str(rejection)
     else:
@@ -279,7 +281,7 @@ def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], 
 @given(st.text(alphabet='{}[]":,0123456789.-+eEx <>/pointsignalk`\n\\', max_size=60))
 def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
     try:
-        found = ReplyForm(SPACE).read(f"{text}<point>{text}</point>")
+        found = ReplyForm(SPACE).read(f"{text}<point>{text}</point>").candidates
     except RejectedReplyError as rejection:
         assert str(rejection)
     else:
@@ -297,14 +299,14 @@ def test_a_value_beyond_its_range_by_a_rounding_is_clamped_and_by_more_is_told_w
             }
         )
 
-    (near,) = form.read(text(1.001, -1.0005))
+    (near,) = form.read(text(1.001, -1.0005)).candidates
     assert near.signals["u"].values[0] == 1.0
     assert near.parameters["x0"] == -1.0
     with pytest.raises(RejectedReplyError, match=r"1\.1 is outside its range \[-1, 1\]"):
-        form.read(text(1.1, 0.0))
+        form.read(text(1.1, 0.0)).candidates
     with pytest.raises(RejectedReplyError, match=r"'x0': -2 is outside its range \[-1, 1\]"):
-        form.read(text(0.0, -2.0))
-    (point,) = ReplyForm(form.space, named=False).read('{"point": [1.001, 0, 0, -1.001, 1.0]}')
+        form.read(text(0.0, -2.0)).candidates
+    (point,) = ReplyForm(form.space, named=False).read('{"point": [1.001, 0, 0, -1.001, 1.0]}').candidates
     assert point.signals["u"].values == (1.0, 0.0, 0.0, -1.0)
 
 
@@ -312,7 +314,7 @@ def test_a_value_beyond_its_range_by_a_rounding_is_clamped_and_by_more_is_told_w
 @pytest.mark.parametrize("free", [False, True])
 def test_one_value_is_a_constant_with_or_without_times(times: str, free: bool) -> None:
     form = ReplyForm(lag_problem(free=FREE if free else None).space, free=free)
-    (found,) = form.read(f'{{"signals": [{{"name": "u", "values": [0.5]{times}}}]}}')
+    (found,) = form.read(f'{{"signals": [{{"name": "u", "values": [0.5]{times}}}]}}').candidates
     assert found.signals["u"].values == (0.5,) * 4
 
 
@@ -324,7 +326,7 @@ class TestPoints:
             "I end with <point> and </point>. <point>0 0 0 0 0 900</point> no: <point>1 2 3 4 5 950</point>"
         )
         assert read(text, named=False, points=True).parameters == {"mass": 950}
-        found = ReplyForm(SPACE, points=True, count=2).read(text)
+        found = ReplyForm(SPACE, points=True, count=2).read(text).candidates
         assert [c.parameters["mass"] for c in found] == [900, 950]
 
     def test_json_is_read_too(self) -> None:
@@ -355,7 +357,7 @@ def test_each_of_several_bad_candidates_is_told() -> None:
     with pytest.raises(
         RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
     ):
-        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": bad}))
+        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": bad})).candidates
 
 
 VALUES = '"signals": [{"name": "throttle", "values": [1, 2, 3]}, {"name": "brake", "values": [0, 5]}]'
@@ -395,7 +397,7 @@ WHOLE = f"{{{VALUES}, {MASS}}}"
     ],
 )
 def test_mistakes_that_can_be_read_in_one_way_only_cost_nothing(odd: str) -> None:
-    (candidate,) = ReplyForm(SPACE).read(odd)
+    (candidate,) = ReplyForm(SPACE).read(odd).candidates
     assert candidate.signals["throttle"].values == (1, 2, 3)
     assert candidate.signals["brake"].values == (0, 5)
     assert candidate.parameters == {"mass": 950}
@@ -412,11 +414,11 @@ def test_mistakes_that_can_be_read_in_one_way_only_cost_nothing(odd: str) -> Non
 )
 def test_what_could_mean_several_things_is_rejected(odd: str) -> None:
     with pytest.raises(RejectedReplyError):
-        ReplyForm(SPACE).read(odd)
+        ReplyForm(SPACE).read(odd).candidates
 
 
 def test_wrong_keys_are_named() -> None:
     with pytest.raises(RejectedReplyError, match=r"'inputs'.*expected.*'signals'"):
-        ReplyForm(SPACE).read('{"inputs": {"throttle": [1, 2, 3]}}')
+        ReplyForm(SPACE).read('{"inputs": {"throttle": [1, 2, 3]}}').candidates
     with pytest.raises(RejectedReplyError, match=r"values.*unknown there: 'value'"):
-        ReplyForm(SPACE).read('{"signals": [{"name": "throttle", "value": 3}]}')
+        ReplyForm(SPACE).read('{"signals": [{"name": "throttle", "value": 3}]}').candidates

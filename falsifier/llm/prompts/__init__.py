@@ -1,20 +1,7 @@
-"""Prompts: what an LLM is sent, first as typed blocks, then as text."""
+"""Prompts: what an LLM is sent; a constant part, the samples so far, and what is new."""
 
-from falsifier.llm.prompts.blocks import Prompt
-from falsifier.llm.prompts.build import build_prompt
-from falsifier.llm.prompts.render import render
-from falsifier.llm.prompts.trim import DEFAULT_PROMPT_TOKENS, trimmed
+from falsifier.llm.prompts.question import DEFAULT_PROMPT_TOKENS, Questions
 from falsifier.llm.prompts.variants import VARIANTS, Variant, variant_named
 from falsifier.llm.prompts.view import View
 
-__all__ = [
-    "DEFAULT_PROMPT_TOKENS",
-    "VARIANTS",
-    "Prompt",
-    "Variant",
-    "View",
-    "build_prompt",
-    "render",
-    "trimmed",
-    "variant_named",
-]
+__all__ = ["DEFAULT_PROMPT_TOKENS", "VARIANTS", "Questions", "Variant", "View", "variant_named"]

@@ -2,35 +2,64 @@
 
 from falsifier.core.space import InputRange
 from falsifier.core.words import listed
-from falsifier.llm.prompts.blocks import AdviceBlock
-from falsifier.llm.prompts.published import guidance
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl.formula import Always, And, Formula, Implies
 
 
-def advice(view: View, variant: Variant, *, is_flat: bool = False) -> AdviceBlock:
-    """Advice that fits what the variant shows, how the requirement is built and what is chosen.
+def advice(view: View, variant: Variant) -> tuple[str, ...]:
+    """Advice that fits what the variant shows, how the requirement is built and what is chosen."""
+    return _guidance(view, variant) if variant.is_published else tuple(_lasting(view, variant))
+
+
+def advice_on_first(view: View) -> str:
+    """Advice on a sample that nothing was simulated before."""
+    if not view.space.inputs:
+        return "The limits of the ranges are good first samples."
+    if all(_is_discrete(view, r) for r in view.space.inputs):
+        return "One value throughout, and a single switch to another value, are good first samples."
+    return (
+        "The limits of the ranges are good first samples, and so is a single switch from one limit to the "
+        "other."
+    )
+
+
+def advice_on_samples(view: View, *, is_flat: bool) -> tuple[str, ...]:
+    """Advice on how to use earlier samples.
 
     Args:
         view: the problem.
-        variant: which parts the prompt contains.
         is_flat: whether all samples have the same robustness, so that what decided it gives no direction.
     """
-    if variant.is_published:
-        return AdviceBlock(lines=guidance(view, variant))
     what = view.chosen
     deciding = (
         f"Look at the time that decided each robustness value, and change the {what} so that the signals "
         "at that time move towards violating the requirement."
     )
-    samples = [
+    return (
         f"Use the output values of the earlier samples to work out how each {what[:-1]} affects the outputs.",
         *([] if is_flat else [deciding]),
         "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
         f"strategy{_such_as(view)}.",
-    ]
-    return AdviceBlock(lines=tuple(_at_any_time(view, variant)), on_samples=tuple(samples))
+    )
+
+
+def _guidance(view: View, variant: Variant) -> tuple[str, ...]:
+    """What to consider; the same in every question, as published."""
+    what = view.chosen
+    lines = ["Consider which combinations of values had the lower robustness."]
+    if not variant.has("names"):
+        return (*lines, "Consider what each number may stand for and how it may act on the system.")
+    lines.append(
+        f"Use the meaning of the {what} and of the requirement: how each of the {what} acts on the output "
+        "signals, what the requirement demands of these, and what could break it."
+    )
+    if variant.has("values"):
+        lines.append(
+            f"Study the output values of the samples: how they follow the {what}, and whether they move "
+            "towards a violation."
+        )
+    return tuple(lines)
 
 
 def _such_as(view: View) -> str:
@@ -42,17 +71,10 @@ def _such_as(view: View) -> str:
     )
 
 
-def _at_any_time(view: View, variant: Variant) -> list[str]:
-    """Advice that needs no earlier sample."""
+def _lasting(view: View, variant: Variant) -> list[str]:
+    """Advice that needs no earlier sample and does not end with the first."""
     formula = view.requirement.formula
-    lines = ["The limits of the ranges are good first samples."]
-    if view.space.inputs:
-        lines = [
-            "The limits of the ranges are good first samples, and so is a single switch from one limit to "
-            "the other."
-        ]
-    if view.space.inputs and all(_is_discrete(view, r) for r in view.space.inputs):
-        lines = ["One value throughout, and a single switch to another value, are good first samples."]
+    lines = []
     if _is_conjunction(formula):
         lines.append(
             "The requirement is a conjunction: it is violated as soon as any one of its conjuncts is. Its "

@@ -1,6 +1,7 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
@@ -9,36 +10,41 @@ from numpy.typing import NDArray
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.evaluation.evaluate import Evaluation, diagnosis_of
 from falsifier.llm.prompts.courses import (
+    MOST_BREAKPOINTS,
+    Array,
+    Course,
     change_list,
     coarse_clock,
     column_decimals,
-    course_text,
+    course,
     dwell_list,
     longest_stretch,
+    oscillations,
 )
 from falsifier.llm.prompts.numbers import decimals_for, number, plain
-from falsifier.llm.prompts.shapes import MOST_BREAKPOINTS, Course, course, oscillations
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
 from falsifier.stl.margins import shown, signed
 
-Array = NDArray[np.float64]
-
 # Digits of robustness values: the search depends on small differences between samples.
 ROBUSTNESS_DIGITS = 5
 # Distance from a signal that its course may have, as a share of its span: of those compared, of others.
-_TOLERANCE = 0.02
-_TOLERANCE_OF_OTHERS = 0.04
+TOLERANCE = 0.02
+TOLERANCE_OF_OTHERS = 0.04
+# What is compared is told more exactly near its threshold: as a share of the distance to it, but no more
+# exactly than a share of the span.
+_OF_DISTANCE = 1 / 3
+_FINEST = 0.002
 # Oscillations with a shorter period than this share of the told time are told by their envelopes.
 _SLOWEST_OSCILLATION = 1 / 20
 # The interval around the critical time that is told more exactly: its share of the told time, its number of
 # periods if the signal oscillates, and its tolerance as a share of the span there.
 _CLOSE_SHARE = 1 / 12
 _CLOSE_PERIODS = 2.5
-_CLOSE_TOLERANCE = 0.01
+CLOSE_TOLERANCE = 0.01
 # Breakpoints of signals that the formula does not compare, and of samples that are told in short.
-_FEWER_BREAKPOINTS = 12
+_FEWER_BREAKPOINTS = 16
 # Steps of an input at which the course of an output always has a breakpoint, so that its response is seen.
 _MOST_STEPS = 8
 _SIDES: Mapping[type[Formula], str] = {
@@ -51,77 +57,71 @@ _SIDES: Mapping[type[Formula], str] = {
 _MAX_SIGNALS = 16
 
 
-def summary(evaluation: Evaluation) -> Iterator[str]:
-    """One line: when and by which predicate the robustness was decided."""
-    verdict = evaluation.verdict
-    assert verdict is not None
-    yield f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What is seen of one judged sample, in lines; more of it, less of it, and in one line."""
+
+    full: tuple[str, ...]
+    short: tuple[str, ...]
+    line: str
 
 
-def facts(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator[str]:
-    """The most important lines: what broke, what decided, robustness of the parts, stays.
+def observed(view: View, evaluation: Evaluation) -> Observed:
+    """Look at a judged sample once.
 
-    Args:
-        view: the problem.
-        evaluation: a judged sample.
-        close: whether to add all values at the critical time, and when each predicate was false.
-    """
-    trajectory = evaluation.trajectory
-    if trajectory is None:
-        yield from summary(evaluation)
-        return
-    looked_at = _looked_at(view, trajectory)
-    monitor = monitor_for(view)
-    diagnosis = diagnosis_of(monitor, trajectory)
-    clock = _clock(view)
-    if evaluation.verdict is not None and evaluation.verdict.breach is not None:
-        yield f"what broke: {evaluation.verdict.breach.text}"
-    yield f"why: {diagnosis.text}"
-    if close:
-        yield _values_there(view, trajectory, diagnosis)
-    yield from _parts(view, monitor, diagnosis, trajectory)
-    for name in view.formula_outputs:
-        times, column = looked_at.times, looked_at[name]
-        if is_discrete(column, kind=view.kind(name)):
-            label = partial(view.labelled, name)
-            yield f"{name}: {change_list(times, column, clock=clock, label=label)}"
-            if stays := dwell_list(times, column, clock=clock, label=label):
-                yield f"{name} stays: {stays}"
-    if close:
-        for predicate in view.requirement.formula.predicates:
-            yield _predicate(view, monitor, predicate, trajectory)
-
-
-def details(view: View, evaluation: Evaluation, *, close: bool = True) -> Iterator[str]:
-    """Lines on signals and terms of the formula over time.
-
-    Args:
-        view: the problem.
-        evaluation: a sample.
-        close: whether to tell all signals, and the deciding ones more exactly around the critical time;
-            otherwise only the terms that the formula compares.
+    All of it tells what broke and what decided, the parts of the formula, when each predicate was false, all
+    signals over time, and those that decided more exactly around that time. Less of it tells what decided,
+    the parts, all discrete signals, and what was compared there over time.
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
-    if verdict is None or trajectory is None:
-        return
-    trajectory = _looked_at(view, trajectory)
-    times = trajectory.times
-    steps = _input_steps(evaluation) if close else ()
-    compared = compared_columns(view, trajectory)
-    if not close:
-        compared = {name: column for name, column in compared.items() if name in _deciding(view, verdict)}
-    columns = _shown_columns(view, trajectory, compared) if close else compared
+    assert verdict is not None
+    line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
+    if trajectory is None:
+        return Observed((line,), (line,), line)
+    monitor = monitor_for(view)
+    diagnosis = diagnosis_of(monitor, trajectory)
+    reasons = [f"why: {diagnosis.text}"]
+    if verdict.breach is not None:
+        reasons.insert(0, f"what broke: {verdict.breach.text}")
+    parts = tuple(_parts(view, monitor, diagnosis, trajectory))
+    there = _values_there(view, trajectory, diagnosis)
+    predicates = (
+        _predicate(view, monitor, predicate, trajectory) for predicate in view.requirement.formula.predicates
+    )
+    inside = _looked_at(view, trajectory)
+    discrete = tuple(_discrete(view, inside))
+    close = tuple(_close_up(view, inside, evaluation))
+    return Observed(
+        (*reasons, there, *parts, *discrete, *predicates, *_continuous(view, evaluation, inside), *close),
+        (*reasons, *parts, *discrete, *_continuous(view, evaluation, inside, of=_deciding(view, verdict))),
+        line,
+    )
+
+
+def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
+    """Changes of all discrete signals, and stays of those in the formula."""
+    for name in dict.fromkeys((*view.formula_outputs, *view.experiment.outputs)):
+        if name not in inside.columns or not is_discrete(inside[name], kind=view.kind(name)):
+            continue
+        clock, label = _clock(view), partial(view.labelled, name)
+        yield f"{name}: {change_list(inside.times, inside[name], clock=clock, label=label)}"
+        stays = dwell_list(inside.times, inside[name], clock=clock, label=label)
+        if name in view.formula_outputs and stays:
+            yield f"{name} stays: {stays}"
+
+
+def _continuous(
+    view: View, evaluation: Evaluation, inside: Trajectory, *, of: set[str] | None = None
+) -> Iterator[str]:
+    """Courses of what is compared and of other signals; or of these terms only, in fewer points."""
+    compared = compared_columns(view, inside)
+    columns = _shown_columns(view, inside, compared) if of is None else compared
+    steps = _input_steps(evaluation) if of is None else ()
     for name, column in columns.items():
-        if is_discrete(column, kind=view.kind(name)):
-            if name not in view.formula_outputs:  # facts() shows those
-                label = partial(view.labelled, name)
-                yield f"{name}: {change_list(times, column, clock=_clock(view), label=label)}"
-        else:
-            most = MOST_BREAKPOINTS if close and name in compared else _FEWER_BREAKPOINTS
-            kept = steps if name in compared else ()
-            yield f"{name}: {_drawn(view, name, column, times, kept, most)}"
-    if close:
-        yield from _close_up(view, compared, times, verdict)
+        if (of is not None and name not in of) or is_discrete(column, kind=view.kind(name)):
+            continue
+        most = MOST_BREAKPOINTS if of is None and name in compared else _FEWER_BREAKPOINTS
+        yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
 
 
 def _looked_at(view: View, trajectory: Trajectory) -> Trajectory:
@@ -242,61 +242,87 @@ def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 
+def told_accuracy(view: View, name: str, column: Array) -> float:
+    """Distance from a signal, in its unit, up to which its course says nothing of being less exact."""
+    in_formula = name in view.requirement.formula.signals or name not in view.info
+    return (TOLERANCE if in_formula else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
+
+
 def drawn_course(
     view: View,
     name: str,
+    inside: Trajectory,
     column: Array,
-    times: Array,
+    *,
     steps: Sequence[float] = (),
     most: int = MOST_BREAKPOINTS,
 ) -> Course:
-    """What is told of a signal over the whole simulation."""
-    in_formula = name in view.requirement.formula.signals or name not in view.info
-    share = _TOLERANCE if in_formula else _TOLERANCE_OF_OTHERS
-    slowest = _SLOWEST_OSCILLATION * float(times[-1])
-    tolerance = share * float(np.ptp(column))
-    return course(times, column, tolerance=tolerance, slower_than=slowest, kept=steps, most=most)
+    """What is told of a signal, or of what is compared, over the time at which the requirement looks."""
+    claimed = told_accuracy(view, name, column)
+    wanted = np.full_like(inside.times, claimed)
+    for predicate in view.requirement.formula.predicates:
+        if name in (str(predicate.left), str(predicate.right)):
+            left, right = (side.evaluate(inside.columns) for side in (predicate.left, predicate.right))
+            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(np.asarray(left) - np.asarray(right)))
+    return course(
+        inside.times,
+        column,
+        tolerance=np.maximum(wanted, _FINEST * float(np.ptp(column))),
+        claimed=claimed,
+        slower_than=_SLOWEST_OSCILLATION * float(inside.times[-1]),
+        kept=steps,
+        most=most,
+    )
 
 
-def course_line(view: View, drawn: Course, column: Array) -> str:
-    """The text of such a course."""
-    decimals = decimals_for(_TOLERANCE * float(np.ptp(column)), 1)
-    return course_text(drawn, decimals=decimals, clock=coarse_clock(view.space.stop_time))
-
-
-def _drawn(view: View, name: str, column: Array, times: Array, steps: Sequence[float], most: int) -> str:
+def _drawn(
+    view: View, name: str, inside: Trajectory, column: Array, steps: Sequence[float], most: int
+) -> str:
     if np.ptp(column) == 0:
         return f"constant {plain(float(column[0]), column_decimals(column))}"
-    return course_line(view, drawn_course(view, name, column, times, steps, most), column)
+    drawn = drawn_course(view, name, inside, column, steps=steps, most=most)
+    return drawn.text(clock=coarse_clock(view.space.stop_time))
 
 
-def _close_up(view: View, compared: Mapping[str, Array], times: Array, verdict: Verdict) -> Iterator[str]:
+def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterator[str]:
     """What the deciding predicate compares, more exactly around the critical time."""
-    for name, column in compared.items():
+    verdict = evaluation.verdict
+    assert verdict is not None
+    for name, column in compared_columns(view, inside).items():
         if name not in _deciding(view, verdict) or is_discrete(column, kind=view.kind(name)):
             continue
-        reach = _CLOSE_SHARE / 2 * float(times[-1])
-        swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
-        around = [s for s in swings if s.start <= verdict.critical_time <= s.end]
-        if around:
-            reach = _CLOSE_PERIODS / 2 * around[0].period_at(verdict.critical_time)
-        inside = np.abs(times - verdict.critical_time) <= max(reach, 4 * view.experiment.output_interval)
-        part = column[inside]
+        near = close_up_times(view, inside.times, column, evaluation)
+        part = column[near]
         if np.ptp(part) == 0:
             continue
         drawn = course(
-            times[inside],
+            inside.times[near],
             part,
-            tolerance=_CLOSE_TOLERANCE * float(np.ptp(part)),
+            tolerance=_close_tolerance(view, column, part, name, verdict),
+            claimed=CLOSE_TOLERANCE * float(np.ptp(part)),
             slower_than=0.0,
             kept=(verdict.critical_time,),
         )
-        decimals = max(
-            _decimals(view, column, name, verdict.robustness),
-            decimals_for(_CLOSE_TOLERANCE * float(np.ptp(part)), 1),
-        )
-        shown = course_text(drawn, decimals=decimals, clock=_clock(view))
+        shown = drawn.text(clock=_clock(view))
         yield f"{name} around t = {plain(verdict.critical_time, _clock(view))} s: {shown}"
+
+
+def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluation) -> NDArray[np.bool_]:
+    """Which times are told more exactly: a share of them around the critical time, or a few periods."""
+    assert evaluation.verdict is not None
+    critical = evaluation.verdict.critical_time
+    reach = _CLOSE_SHARE / 2 * float(times[-1])
+    swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
+    around = [s for s in swings if s.start <= critical <= s.end]
+    if around:
+        reach = _CLOSE_PERIODS / 2 * around[0].periods[0]
+    return np.asarray(np.abs(times - critical) <= max(reach, 4 * view.experiment.output_interval))
+
+
+def _close_tolerance(view: View, column: Array, part: Array, name: str, verdict: Verdict) -> float:
+    """A share of the span there; less if the margin would not be visible."""
+    visible = 10.0 ** -_decimals(view, column, name, verdict.robustness)
+    return min(CLOSE_TOLERANCE * float(np.ptp(part)), max(visible, _FINEST * float(np.ptp(part))))
 
 
 def _input_steps(evaluation: Evaluation) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""What the published prompts tell: guidance, and of a sample what was compared, when, and what decided.
+"""What the published prompts tell of a sample: what was compared, when, and what decided.
 
 The digits are theirs too; ``design/published-prompts.md`` compares line by line.
 """
@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import decimals_for
-from falsifier.llm.prompts.observations import Array, compared_columns
+from falsifier.llm.prompts.observations import compared_columns
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 from falsifier.stl.expression import number_text
@@ -19,24 +20,6 @@ ROBUSTNESS_DECIMALS = 3
 _FEWEST_DECIMALS, _MOST_DECIMALS = 1, 3
 # Decimals of a critical time: those of the times in the formula, up to this many.
 _MOST_CLOCK_DECIMALS = 4
-
-
-def guidance(view: View, variant: Variant) -> tuple[str, ...]:
-    """What to consider; the same in every question, as published."""
-    what = view.chosen
-    lines = ["Consider which combinations of values had the lower robustness."]
-    if not variant.has("names"):
-        return (*lines, "Consider what each number may stand for and how it may act on the system.")
-    lines.append(
-        f"Use the meaning of the {what} and of the requirement: how each of the {what} acts on the output "
-        "signals, what the requirement demands of these, and what could break it."
-    )
-    if variant.has("values"):
-        lines.append(
-            f"Study the output values of the samples: how they follow the {what}, and whether they move "
-            "towards a violation."
-        )
-    return tuple(lines)
 
 
 def clock(view: View, time: float) -> str:

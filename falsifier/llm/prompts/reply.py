@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import counted
 from falsifier.llm.messages import ReplyKind
-from falsifier.llm.prompts.blocks import ReplyBlock
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 
@@ -17,7 +16,6 @@ _FREE_NOTES = (
     "there are; with constant interpolation they are pieces of equal length. One value alone is a constant.",
     'Otherwise "times" gives the time in s of each value, increasing from 0; the last value is held to the '
     "stop time.",
-    '"0 x 187" among the values of a sample stands for 187 zeros.',
 )
 # Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
 _PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
@@ -25,13 +23,35 @@ _PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
 _BEGINNINGS = (0.0, 0.24, 0.62)
 
 
-def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "json") -> ReplyBlock:
+_POINTS = (
+    "Think step by step, but write no code. End your reply with {what}: {order}; separate the numbers by "
+    "commas and put {them} between <point> and </point>."
+)
+_JSON = "Reply with one JSON object{many} in this form, with one or two sentences of rationale{own}:"
+_OWN_NUMBERS = "; the numbers below only show the form, choose your own"
+_LESSONS = "what the samples taught so far"
+_LESSONS_NOTE = (
+    '"lessons" is shown to you again in the next question, in place of the earlier one: two or three '
+    "sentences on what you know by now of the system and what remains to be tried."
+)
+
+
+def reply_text(view: View, variant: Variant, count: int, reply: ReplyKind = "json") -> str:
     """Say what form a reply has."""
     if reply == "points":
-        return ReplyBlock(order=_order(view, variant))
+        what, them = ("the new sample", "them")
+        if count > 1:
+            what, them = (f"{count} different samples", "each sample")
+        return _POINTS.format(what=what, order=_order(view, variant), them=them)
+    many = f" with {count} different candidates" if count > 1 else ""
     if variant.is_published:
         # The published prompts show no numbers before the first sample.
-        return ReplyBlock(example=_blank(view, variant, count), has_numbers=False)
+        return "\n".join((_JSON.format(many=many, own=""), _blank(view, variant, count)))
+    return "\n".join((_JSON.format(many=many, own=_OWN_NUMBERS), *_filled(view, variant, count)))
+
+
+def _filled(view: View, variant: Variant, count: int) -> list[str]:
+    """The form of a reply with numbers that no reader takes for advice, and notes on it."""
     space = view.space
     one: dict[str, object] = {"rationale": _RATIONALE}
     free = variant.has("freedom") and any(r.free for r in space.inputs)
@@ -43,13 +63,13 @@ def reply_block(view: View, variant: Variant, count: int, reply: ReplyKind = "js
             {"name": p.name, "value": _admissible(view, p, value)}
             for p, value in zip(space.parameters, values, strict=True)
         ]
-    example = json.dumps(one if count == 1 else {"candidates": [one]})
+    told = one if count == 1 else {"candidates": [one]}
+    example = json.dumps({"lessons": _LESSONS, **told} if variant.has("lessons") else told)
     several = len(space.names) > 1
     what = " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
-    return ReplyBlock(
-        example=example,
-        notes=(*([_ALL_NOTE.format(what)] if several else ()), *(_FREE_NOTES if free else ())),
-    )
+    notes = [_ALL_NOTE.format(what)] if several else []
+    notes += _FREE_NOTES if free else ()
+    return [example, *notes, *([_LESSONS_NOTE] if variant.has("lessons") else ())]
 
 
 def _order(view: View, variant: Variant) -> str:

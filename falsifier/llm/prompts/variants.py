@@ -20,7 +20,8 @@ Part = Literal[
     "reading",  # the formula in plain words, its terms as derived signals
     "freedom",  # control points and interpolation may be chosen if the problem allows it
     "observations",  # per sample: all signals over time, what decided, robustness of the parts
-    "selection",  # the best and most different samples in addition to the most recent ones
+    "history",  # all samples: what each was the first to reach, its rationale; those before it stay as told
+    "lessons",  # what the language model wrote down for itself
     "circumstances",  # the budget and what is left of it, the outputs at time 0
     "failures",  # samples that could not be simulated, with the reason
     "context",  # what named files say: thresholds beside the signals, excerpts
@@ -57,7 +58,17 @@ def _variants() -> Mapping[str, Variant]:
     mp3: frozenset[Part] = mp2 | {"values"}
     mp4: frozenset[Part] = mp3 | {"critical"}
     more: frozenset[Part] = frozenset(
-        ("advice", "system", "reading", "freedom", "observations", "selection", "circumstances", "failures")
+        (
+            "advice",
+            "system",
+            "reading",
+            "freedom",
+            "observations",
+            "history",
+            "lessons",
+            "circumstances",
+            "failures",
+        )
     )
     mp5 = (mp4 - {"values", "guidance"}) | more
     context: frozenset[Part] = frozenset({"context"})

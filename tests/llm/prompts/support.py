@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from functools import cache
+from typing import Any
 
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.prompts import View, build_prompt, render, variant_named
+from falsifier.llm.prompts import Questions, View, variant_named
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 
@@ -17,8 +18,15 @@ def transmission(name: str = "AT1") -> tuple[Problem, Evaluation]:
     return problem, evaluate(problem, problem.space.decode(FIRST))
 
 
-def told(problem: Problem, variant: str, evaluations: Sequence[Evaluation] = ()) -> tuple[str, str]:
-    prompt = build_prompt(View.of(problem), variant_named(variant), evaluations)
-    standing, changing = render(prompt)
+def told(
+    view: Problem | View, variant: str, evaluations: Sequence[Evaluation] = (), *, count: int = 1, **more: Any
+) -> tuple[str, str]:
+    """The constant part of the question after these samples, and the rest."""
+    view = View.of(view) if isinstance(view, Problem) else view
+    made = {name: more.pop(name) for name in ("reply", "start", "tokens") if name in more}
+    questions = Questions(view, variant_named(variant), **made)
+    for evaluation in evaluations:
+        questions.tell(evaluation)
+    standing, changing = questions.ask(count, **more)
     assert (standing.role, changing.role) == ("system", "user")
     return standing.content, changing.content

@@ -8,8 +8,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.prompts import VARIANTS, View, build_prompt, render
-from falsifier.llm.prompts.circumstances import Circumstances
+from falsifier.llm.prompts import View
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
@@ -93,9 +92,8 @@ def test_mp3_adds_output_values_and_mp4_what_decided() -> None:
 @pytest.mark.parametrize("variant", ["MP1", "MP2", "MP3", "MP4"])
 def test_nothing_of_the_default_variant_is_told(variant: str) -> None:
     problem, evaluation = transmission("AT6a")
-    circumstances = Circumstances(30, {"speed": (0.0, 0.0)})
-    prompt = build_prompt(View.of(problem), VARIANTS[variant], [evaluation] * 2, circumstances=circumstances)
-    text = "\n".join(m.content for m in render(prompt))
+    start = {"speed": (0.0, 0.0)}
+    text = "\n".join(told(problem, variant, [evaluation] * 2, start=start, simulations=30))
     for word in ("mph", "Car with", "50 s", "simulations", "30 ", "In words", "exactly 0", "limits", "switch",
                  "implication", "flat", "gear", "strategy", "why:", "Alternatively"):  # fmt: skip
         assert word not in text, word
@@ -157,8 +155,7 @@ def test_outputs_that_are_compared_alone_are_told_by_themselves() -> None:
 def test_scaled_signals_get_more_digits() -> None:
     problem, evaluation = transmission()
     disguise = Disguise.of(View.of(problem)).fitted([evaluation])
-    prompt = build_prompt(disguise.view, VARIANTS["MP4"], [disguise.hidden(evaluation)])
-    changing = render(prompt)[1].content
+    _, changing = told(disguise.view, "MP4", [disguise.hidden(evaluation)])
     real = told(problem, "MP4", [evaluation])[1]
     assert "robustness 0.419" in real and "robustness 0.00097" in changing
     assert re.search(r"y1: 0\.223 at 0\.0 s, 0\.\d{3} at", changing)

@@ -2,11 +2,10 @@ from dataclasses import replace
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.prompts import VARIANTS, build_prompt, render
-from falsifier.llm.prompts.circumstances import Circumstances
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
+from tests.llm.prompts.support import told as told_of
 
 
 def test_a_view_holds_everything_but_what_simulates() -> None:
@@ -51,9 +50,8 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     told = replace(
         evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
     )
-    prompt = build_prompt(view, VARIANTS["MP5"], [told], circumstances=Circumstances(start={"x": (0.0, 1.0)}))
-    standing, changing = (m.content for m in render(prompt))
-    assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle) to 1 (Run)" in standing
+    standing, changing = told_of(view, "MP5", [told], start={"x": (0.0, 0.0)})
+    assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle)" in standing
     assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing
     assert (
         "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and still held at 10 s" in changing

@@ -1,0 +1,372 @@
+"""The questions of a run: a constant part, the samples so far, and what is new.
+
+Samples are told in order, each as it was told first, so that a question begins with the one before it and
+providers can cache that. Only when the samples need too many tokens, many are shortened at once: first those
+of the least weight and the oldest, down to a share that leaves room for the next ones.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted, listed
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm.messages import Message, ReplyKind
+from falsifier.llm.prompts import choices
+from falsifier.llm.prompts.advice import advice_on_first, advice_on_samples
+from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Observed, observed
+from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, published_facts
+from falsifier.llm.prompts.reached import Progress, Reached
+from falsifier.llm.prompts.standing import standing
+from falsifier.llm.prompts.variants import Variant
+from falsifier.llm.prompts.view import View
+from falsifier.llm.usage import count_tokens
+from falsifier.stl.margins import is_on_limit, margin_words, signed
+
+# Fits LLMs with a context of 32k tokens and leaves room for reasoning.
+DEFAULT_PROMPT_TOKENS = 16_000
+# What a prompt should need; samples get at least as much as the rest, if the limit allows it.
+USUAL_PROMPT_TOKENS = 6_000
+# Share of the tokens beside the constant part that samples may have, that they have once shortened, and that
+# they may have if each is told in a line; the rest is for what is new.
+_MOST_OF_SAMPLES, _SHORTENED, _MOST_OF_LINES = 0.7, 0.45, 0.6
+# The published prompts tell so many of the latest samples.
+_PUBLISHED_SAMPLES = 10
+# Characters of a rationale that are told back.
+_LONGEST_WHY = 300
+# Samples that are named as the best ones, or the ones that got furthest.
+_NAMED = 3
+_RUN = re.compile(r'"[^" ]+ x \d+"')
+_PENDING = "Proposed and not simulated so far:"
+_RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
+
+# How much of a sample is told.
+_FULL, _SHORT, _LINE = range(3)
+
+
+@dataclass(slots=True)
+class _Sample:
+    """One sample as it is told, more or less of it.
+
+    Attributes:
+        number: its place among all samples, from 1.
+        texts: what is told of it, by depth.
+        tokens: of each of these.
+        depth: which of them is told.
+        robustness: its robustness; None: there is no verdict.
+        progress: how far its recorded signals got.
+        is_first: whether it was the first to reach something.
+    """
+
+    number: int
+    texts: tuple[str, str, str]
+    tokens: tuple[int, int, int]
+    depth: int
+    robustness: float | None
+    progress: Progress = field(default_factory=Progress)
+    is_first: bool = False
+
+
+class Questions:
+    """Makes the questions of one run from what it is told.
+
+    Args:
+        view: the problem; may be replaced by one that tells the same with other scales.
+        variant: which parts a question contains.
+        reply: what a reply is to consist of.
+        start: smallest and largest value of each output at time 0, by name, as far as known.
+        tokens: maximum number of tokens of a question.
+        llm: name of the LLM whose tokens are counted.
+    """
+
+    def __init__(
+        self,
+        view: View,
+        variant: Variant,
+        *,
+        reply: ReplyKind = "json",
+        start: Mapping[str, tuple[float, float]] | None = None,
+        tokens: int = DEFAULT_PROMPT_TOKENS,
+        llm: str = "",
+    ) -> None:
+        self.view = view
+        self._variant, self._reply, self._tokens = variant, reply, tokens
+        self._start = dict(start or {}) if variant.has("circumstances") else {}
+        self._count: Callable[[str], int] = lambda text: count_tokens(text, llm)
+        self._fixed = self._count(self._standing(1))
+        self._samples: list[_Sample] = []
+        self._told = self._omitted = 0
+        self._inputs: dict[str, int] = {}
+        self._reached = Reached(view)
+
+    def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
+        """Add a sample.
+
+        Args:
+            evaluation: what came of it.
+            doubt: why a violation does not count; empty: nothing speaks against it.
+            why: the LLM's rationale, if it was its candidate.
+        """
+        self._told += 1
+        if evaluation.verdict is None and not self._variant.has("failures"):
+            return
+        is_own = self._variant.has("history")
+        sample = self._seen(evaluation, doubt, why) if is_own else self._published(evaluation, doubt)
+        self._samples.append(sample)
+        if is_own:
+            self._shorten()
+        else:
+            del self._samples[:-_PUBLISHED_SAMPLES]
+
+    def ask(
+        self,
+        count: int = 1,
+        *,
+        simulations: int | None = None,
+        pending: Sequence[Candidate] = (),
+        notes: Sequence[str] = (),
+        lessons: str = "",
+    ) -> tuple[Message, ...]:
+        """Return the messages of the next question: the constant part, then what changes.
+
+        Args:
+            count: number of candidates wanted.
+            simulations: maximum number of simulations of the run; None: no limit, or unknown.
+            pending: candidates without an evaluation yet.
+            notes: lines about the search as a whole, from the engine that leads it.
+            lessons: what the LLM wrote down in its last reply.
+
+        Raises:
+            ChatError: if the question is too long even without samples.
+        """
+        constant = self._standing(count)
+        news = "\n\n".join(self._news(count, simulations, pending, notes, lessons))
+        aim = self._aim()
+        while True:
+            lasting = self._lasting()
+            size = self._count(constant) + self._count(lasting) + self._count(news)
+            latest = self._latest()
+            if size <= aim or not self._samples:
+                break
+            self._drop()
+        if size > self._tokens:
+            raise ChatError(
+                f"the prompt needs {size} tokens without any history, but the limit is {self._tokens}: "
+                "raise the limit (prompt_tokens), or choose a plainer prompt variant (--variant)"
+            )
+        more = (latest,) if latest and size + self._count(latest) <= aim else ()
+        changing = "\n\n".join(part for part in (lasting, *more, news) if part)
+        return (
+            Message(role="system", content=constant, stable=len(constant)),
+            Message(role="user", content=changing, stable=len(lasting)),
+        )
+
+    def _standing(self, count: int) -> str:
+        return standing(self.view, self._variant, count=count, reply=self._reply, start=self._start)
+
+    def _aim(self) -> int:
+        return min(self._tokens, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
+
+    def _lasting(self) -> str:
+        if not self._samples:
+            return ""
+        is_own = self._variant.has("history")
+        left_out = f", {len(self._samples)} of {self._told}" if self._omitted else ""
+        # The published prompts count the samples that they show, not all that there were.
+        numbered = ((s.number if is_own else n, s) for n, s in enumerate(self._samples, start=1))
+        told = (f"Sample {n}: {s.texts[s.depth]}" for n, s in numbered)
+        return "\n\n".join((f"Samples so far{left_out}, in the order in which they were simulated:", *told))
+
+    def _latest(self) -> str:
+        """All of the latest sample, if less was told of it."""
+        if not self._samples or self._samples[-1].number != self._told:
+            return ""
+        sample = self._samples[-1]
+        told = sample.texts[sample.depth].splitlines()
+        more = [line for line in sample.texts[_FULL].splitlines() if line not in told]
+        return "\n".join((f"More of sample {sample.number}:", *more)) if more else ""
+
+    def _news(
+        self,
+        count: int,
+        simulations: int | None,
+        pending: Sequence[Candidate],
+        notes: Sequence[str],
+        lessons: str,
+    ) -> Iterator[str]:
+        wanted = f"{count} different samples" if count > 1 else "sample"
+        budget = simulations if self._variant.has("circumstances") else None
+        is_own = not self._variant.is_published
+        waiting = ["; ".join(self._chosen(c)) for c in pending]
+        if not self._samples and not waiting and not notes:
+            none = "" if budget is None else "Nothing has been simulated yet; "
+            left = "" if budget is None else f"{counted(budget, 'simulation')} may be spent. "
+            first = f"{advice_on_first(self.view)} " if is_own else ""
+            yield f"{first}{none}{left}Propose the first {wanted}."
+            return
+        if is_own and self._samples:
+            yield from self._standings()
+        yield from notes
+        if lessons:
+            yield f"Your lessons so far: {lessons}"
+        if waiting:
+            yield "\n".join((_PENDING, *waiting))
+        if is_own and self._samples:
+            yield "\n".join(advice_on_samples(self.view, is_flat=self._is_flat()))
+            if _RUN.search(self._lasting()):
+                yield _RUNS
+        yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
+
+    def _standings(self) -> Iterator[str]:
+        """Which samples are the best; where the robustness says nothing, which got furthest."""
+        judged = [s for s in self._samples if s.robustness is not None]
+        if len(judged) < 2:
+            return
+        if self._is_flat():
+            yield (
+                f"The robustness is flat: it was {signed(judged[0].robustness, 3)} in all {len(judged)} "
+                "samples, so its value gives no direction. Look instead at how close a condition came to "
+                "being true, how briefly a discrete value was held, and how far a signal was from its "
+                "switching point."
+            )
+            ranked = sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
+            yield f"By what the recorded signals did, these got furthest: {self._named(ranked)}."
+            return
+        ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
+        yield f"Lowest robustness so far: {self._named(ranked)}."
+
+    def _named(self, ranked: Sequence[_Sample]) -> str:
+        return listed([f"sample {s.number}" for s in ranked[:_NAMED]])
+
+    def _is_flat(self) -> bool:
+        """Whether several samples have the same robustness, and none has another."""
+        values = [s.robustness for s in self._samples if s.robustness is not None]
+        return len(values) > 1 and len({f"{v:.9g}" for v in values}) == 1
+
+    def _left(self, budget: int | None) -> str:
+        if budget is None:
+            return ""
+        if self._told >= budget:
+            return f"{counted(self._told, 'simulation')} spent. "
+        return f"{self._told} of {counted(budget, 'simulation')} spent, {budget - self._told} left. "
+
+    def _published(self, evaluation: Evaluation, doubt: str) -> _Sample:
+        verdict = evaluation.verdict
+        assert verdict is not None
+        inputs = self._chosen(evaluation.candidate)
+        digits = ROBUSTNESS_DECIMALS + self.view.more_decimals
+        text = _text(
+            inputs,
+            f"robustness {verdict.robustness:.{digits}f}",
+            doubt,
+            *published_facts(self.view, self._variant, evaluation),
+        )
+        return _Sample(self._told, (text,) * 3, (0, 0, 0), _FULL, verdict.robustness)
+
+    def _seen(self, evaluation: Evaluation, doubt: str, why: str) -> _Sample:
+        """A sample of a variant of our own: how much of it is told depends on those before it only."""
+        candidate, verdict = evaluation.candidate, evaluation.verdict
+        inputs = self._chosen(candidate)
+        brief = inputs if why else choices.as_signals(self.view, candidate, in_brief=True)
+        notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
+        if verdict is None:
+            text = _text(inputs, _failure(evaluation), *notes)
+            return self._counted((text, text, text), _LINE, None)
+        progress = (
+            Progress() if evaluation.trajectory is None else Progress.of(self.view, evaluation.trajectory)
+        )
+        news = self._reached.news(progress)
+        found = observed(self.view, evaluation)
+        best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
+        robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
+        if is_on_limit(verdict.robustness):
+            robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
+        first = f"the first to reach: {', '.join(news)}" if news else ""
+        head = (robustness, doubt, *notes, first)
+        texts = _texts(inputs, brief, head, found)
+        is_better = best is None or verdict.robustness < best
+        depth = _FULL if is_better or news else _SHORT
+        return self._counted(texts, depth, verdict.robustness, progress, is_first=bool(news))
+
+    def _counted(
+        self,
+        texts: tuple[str, str, str],
+        depth: int,
+        robustness: float | None,
+        progress: Progress | None = None,
+        *,
+        is_first: bool = False,
+    ) -> _Sample:
+        full, short, line = map(self._count, texts)
+        return _Sample(
+            self._told, texts, (full, short, line), depth, robustness, progress or Progress(), is_first
+        )
+
+    def _alike(self, inputs: str) -> str:
+        """That a sample looks like an earlier one, if it does: numbers are rounded."""
+        earlier = self._inputs.setdefault(inputs, self._told)
+        if earlier == self._told:
+            return ""
+        return f"these inputs are rounded: they differ from those of sample {earlier} by less than is shown"
+
+    def _shorten(self) -> None:
+        """Tell less of samples if all of them together are too long."""
+        room = self._aim() - self._fixed
+        if self._size() <= _MOST_OF_SAMPLES * room:
+            return
+        for depth in (_SHORT, _LINE):
+            for sample in self._lightest_first():
+                if self._size() <= _SHORTENED * room:
+                    return
+                sample.depth = max(sample.depth, depth)
+        if self._size() > _MOST_OF_LINES * room:
+            while self._size() > _SHORTENED * room and len(self._samples) > 1:
+                self._drop()
+
+    def _drop(self) -> None:
+        self._samples.remove(self._lightest_first()[0])
+        self._omitted += 1
+
+    def _size(self) -> int:
+        return sum(s.tokens[s.depth] for s in self._samples)
+
+    def _lightest_first(self) -> list[_Sample]:
+        """The oldest ones first; at the end those that were first somewhere, and the best or furthest one."""
+        judged = [s for s in self._samples if s.robustness is not None]
+        best = min(judged, key=lambda s: (s.robustness or 0.0, s.number), default=None)
+        furthest = max(judged, key=lambda s: (self._reached.rank(s.progress), -s.number), default=None)
+        kept = furthest if self._is_flat() else best
+        return sorted(self._samples, key=lambda s: (s is kept, s.is_first, s.number))
+
+    def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
+        if not self._variant.has("names") or (self._variant.is_published and self._reply == "points"):
+            return choices.as_point(self.view, candidate)
+        if not self._variant.has("system"):
+            return choices.as_values(self.view, candidate)
+        return choices.as_signals(self.view, candidate)
+
+
+def _texts(
+    inputs: Sequence[str], brief: Sequence[str], head: Sequence[str], found: Observed
+) -> tuple[str, str, str]:
+    return (
+        _text(inputs, *head, *found.full),
+        _text(inputs, *head, *found.short),
+        _text(brief, *head, found.line),
+    )
+
+
+def _text(inputs: Sequence[str], *lines: str) -> str:
+    return "\n  ".join(("; ".join(inputs), *(line for line in lines if line)))
+
+
+def _shortened(why: str) -> str:
+    why = " ".join(why.split())
+    return why if len(why) <= _LONGEST_WHY else f"{why[:_LONGEST_WHY]} ..."
+
+
+def _failure(evaluation: Evaluation) -> str:
+    how = "timed out" if evaluation.status == "timeout" else evaluation.status
+    return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")

@@ -1,0 +1,99 @@
+"""How far the recorded signals of a sample got, which says more than a robustness that is flat."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from falsifier.core.trajectory import Trajectory, is_discrete
+from falsifier.llm.prompts.numbers import number, plain
+from falsifier.llm.prompts.view import View
+
+# A value or a change of a discrete signal: its name, the value before, the value.
+Stage = tuple[str, float | None, float]
+
+# A signal went further if it left the range seen so far by more than this share of it.
+_FURTHER = 0.1
+# Changes of a signal that chatters are not listed, nor more than so many things that are new.
+_MOST_NEW = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What the recorded signals of one sample did.
+
+    Attributes:
+        stages: values of discrete signals, and their changes.
+        ranges: smallest and largest value of the other signals, by name.
+    """
+
+    stages: frozenset[Stage] = frozenset()
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, view: View, trajectory: Trajectory) -> "Progress":
+        """Look at a trajectory up to where the requirement looks."""
+        inside = trajectory.times <= view.looked_at + trajectory.step / 2
+        stages: set[Stage] = set()
+        ranges = {}
+        for name in view.experiment.outputs:
+            if name not in trajectory.columns:
+                continue
+            column = trajectory[name][inside]
+            if is_discrete(column, kind=view.kind(name)):
+                kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))].tolist()
+                stages |= {(name, None, value) for value in kept}
+                stages |= {(name, before, value) for before, value in pairwise(kept)}
+            elif np.isfinite(column).all():
+                ranges[name] = (float(column.min()), float(column.max()))
+        return cls(frozenset(stages), ranges)
+
+
+class Reached:
+    """What the samples of a run have reached so far."""
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._stages: set[Stage] = set()
+        self._ranges: dict[str, tuple[float, float]] = {}
+        self._is_begun = False
+
+    def news(self, progress: Progress) -> tuple[str, ...]:
+        """Add a sample; return what no earlier one did, in words; of the first one nothing."""
+        found = [*self._new_stages(progress), *self._further(progress)] if self._is_begun else []
+        self._is_begun |= bool(progress.stages or progress.ranges)
+        self._stages |= progress.stages
+        for name, (low, high) in progress.ranges.items():
+            least, most = self._ranges.get(name, (low, high))
+            self._ranges[name] = (min(low, least), max(high, most))
+        return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
+
+    def rank(self, progress: Progress) -> float:
+        """How far a sample got among all so far: its stages, and the share of all ranges that it covered."""
+        shares = [
+            (high - low) / (most - least)
+            for name, (low, high) in progress.ranges.items()
+            for least, most in [self._ranges.get(name, (low, high))]
+            if most > least
+        ]
+        return len(progress.stages) + (sum(shares) / len(shares) if shares else 0.0)
+
+    def _new_stages(self, progress: Progress) -> Iterator[str]:
+        for name, before, value in sorted(
+            progress.stages - self._stages, key=lambda s: (s[0], s[1] is not None, s[1] or 0.0, s[2])
+        ):
+            text = self._value(name, value)
+            yield f"{name} {text}" if before is None else f"{name} {self._value(name, before)} -> {text}"
+
+    def _value(self, name: str, value: float) -> str:
+        return self._view.labelled(name, value, plain(value, 6))
+
+    def _further(self, progress: Progress) -> Iterator[str]:
+        for name, (low, high) in progress.ranges.items():
+            least, most = self._ranges.get(name, (low, high))
+            least_new = _FURTHER * (most - least)
+            if high > most + least_new:
+                yield f"{name} above {number(most, 4)}"
+            if low < least - least_new:
+                yield f"{name} below {number(least, 4)}"

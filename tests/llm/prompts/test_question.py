@@ -1,0 +1,205 @@
+"""What changes from question to question: samples as they were told first, and what is new."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.trajectory import Trajectory
+from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.messages import Message
+from falsifier.llm.prompts import VARIANTS, Questions, View
+from falsifier.llm.prompts.observations import monitor_for
+from falsifier.llm.usage import count_tokens
+from falsifier.problem.problem import Problem
+from falsifier.testing import FREE, START, lag_problem
+from tests.llm.prompts.support import told, transmission
+
+PROBLEM = lag_problem(free=FREE, parameters=[START])
+
+
+def sampled(problem: Problem, *points: Sequence[float]) -> list[Evaluation]:
+    return [evaluate(problem, problem.space.decode(point)) for point in points]
+
+
+def asked_each(problem: Problem, evaluations: Sequence[Evaluation], **more: object) -> list[Message]:
+    """The changing part of the question after each sample."""
+    questions = Questions(View.of(problem), VARIANTS["MP5"], **more)  # type: ignore[arg-type]
+    found = []
+    for evaluation in evaluations:
+        questions.tell(evaluation)
+        found.append(questions.ask()[1])
+    return found
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_an_empty_history_is_not_described(variant: str) -> None:
+    _, changing = told(transmission()[0], variant)
+    assert changing.endswith("Propose the first sample.") and "amples so far" not in changing
+    assert ("good first samples" in changing) == (variant in ("MP5", "MP6"))
+
+
+def test_advice_on_first_samples_leaves_after_the_first() -> None:
+    problem, evaluation = transmission()
+    texts = "\n".join(told(problem, "MP5", [evaluation]))
+    assert "first samples" not in texts and "earlier samples" in texts
+
+
+def test_a_question_begins_with_the_one_before_it() -> None:
+    rng = np.random.default_rng(1)
+    messages = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (12, 5))))
+    for before, after in pairwise(messages):
+        assert after.content.startswith(before.content[: before.stable])
+        assert 0 < before.stable < after.stable < len(after.content)
+
+
+def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
+    problem = transmission("AT51")[0]
+    rng = np.random.default_rng(2)
+    low, high = problem.space.bounds.T
+    points = low + rng.random((24, len(low))) * (high - low)
+    evaluations = sampled(problem, *points)
+    questions = Questions(View.of(problem), VARIANTS["MP5"])
+    kept, before = [], ""
+    for evaluation in evaluations:
+        questions.tell(evaluation, why="to see what it does")
+        messages = questions.ask()
+        assert sum(count_tokens(m.content) for m in messages) <= 6000
+        kept.append(messages[1].content.startswith(before))
+        before = messages[1].content[: messages[1].stable]
+    assert kept.count(False) <= len(kept) // 3
+    text = messages[1].content
+    assert all(f"Sample {n}: throttle: pchip, 7 evenly spaced values [" in text for n in range(1, 25))
+    assert "the first to reach: gear " in text
+
+
+def test_what_does_not_fit_is_left_out_and_counted() -> None:
+    rng = np.random.default_rng(3)
+    last = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (40, 5))), tokens=1900)[-1].content
+    assert " of 40, in the order in which" in last and "Sample 40: " in last
+
+
+def test_a_question_that_is_too_long_without_samples_is_an_error() -> None:
+    with pytest.raises(ChatError, match=r"needs \d+ tokens without any history, but the limit is 100"):
+        Questions(View.of(PROBLEM), VARIANTS["MP5"], tokens=100).ask()
+
+
+def test_what_decided_and_everything_there() -> None:
+    problem, evaluation = transmission()
+    _, changing = told(problem, "MP5", [evaluation])
+    for part in (
+        "robustness +0.418",
+        "was lowest at 20 s: speed = 119.581 is below 120",
+        "all signals at t = 20 s: speed = 119.581 mph, rpm = ",
+        "gear: 1, then 2 from 2.56 s, 3 from 6.16 s, 4 from 12.32 s",
+        "speed: 0:0 ",
+        "speed around t = 20 s: ",
+        "throttle: pchip, 7 evenly spaced values [100, 100, 100, 0, 0, 0, 0]",
+        "brake: constant 0",
+    ):
+        assert part in changing, part
+
+
+def test_conjuncts_and_sides_of_an_implication() -> None:
+    problem, evaluation = transmission("AT6a")
+    _, changing = told(problem, "MP5", [evaluation])
+    line = next(x for x in changing.splitlines() if "condition and consequence" in x)
+    assert "G[0,30] (rpm <= 3000) robustness -" in line
+    assert "rev/min; G[0,4] (speed <= 35) robustness -" in line
+    assert line.endswith("mph")
+
+
+def test_connectives_inside_a_chain_are_told_too_and_links_of_it_once() -> None:
+    problem = lag_problem("G[0,9] (x <= 0.9) and G[0,9] (x <= 0.8) and G[0,9] (x >= 0.1 -> u <= 0.5)")
+    _, changing = told(problem, "MP5", sampled(problem, [0.8] * 4))
+    (chain,) = (line for line in changing.splitlines() if line.startswith("  conjuncts"))
+    assert chain.count("robustness") == 3
+    assert "condition and consequence at t = 0.7 s: x >= 0.1 robustness" in changing
+
+
+def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
+    problem = transmission("AT51")[0]
+    still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
+    _, changing = told(problem, "MP5", sampled(problem, still, brisk, [0.0] * 7 + [300.0] * 3))
+    assert "The robustness is flat: it was +0.5 in all 3 samples" in changing
+    assert "these got furthest: sample 2, " in changing
+    assert "the first to reach: gear 2, gear 3, gear 4" in changing
+    assert "Look at the time that decided" not in changing
+    _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
+    assert "flat" not in other and "Lowest robustness so far: sample 2 and sample 1." in other
+
+
+def test_failed_samples_with_their_reason() -> None:
+    failed = Evaluation(PROBLEM.space.decode([1] * 5), "crashed", reason="division by zero")
+    assert "no verdict, the simulation crashed: division by zero" in told(PROBLEM, "MP5", [failed])[1]
+    assert "crashed" not in told(PROBLEM, "MP4", [failed])[1]
+
+
+def test_the_rationale_and_the_lessons_are_told_back() -> None:
+    questions = Questions(View.of(PROBLEM), VARIANTS["MP5"])
+    questions.tell(*sampled(PROBLEM, [0.5] * 5), why="a step\nup " + "and on " * 100)
+    text = questions.ask(lessons="x follows u")[1].content
+    assert "chosen because: a step up and on" in text and text.count("and on") < 50
+    assert "Your lessons so far: x follows u" in text
+
+
+def test_inputs_that_look_alike_are_said_to_be_rounded() -> None:
+    points = ([0.5] * 5, [0.5 + 1e-6, 0.5, 0.5, 0.5, 0.5])
+    _, changing = told(PROBLEM, "MP5", sampled(PROBLEM, *points))
+    assert changing.count("these inputs are rounded: they differ from those of sample 1") == 1
+
+
+def test_runs_are_explained_where_there_is_one() -> None:
+    values = [0.0] * 99 + [1.0]
+    long = Candidate({"u": Signal.evenly(values, stop_time=10.0, interpolation="constant")}, {"x0": 0.0})
+    with_runs = told(PROBLEM, "MP5", [evaluate(PROBLEM, PROBLEM.space.admit(long))])
+    assert '["0 x 99", 1]' in with_runs[1] and "stands for 187 zeros" in with_runs[1]
+    assert "stands for" not in "".join(told(PROBLEM, "MP5", sampled(PROBLEM, [0.5] * 5)))
+
+
+def test_oscillations_are_told_by_their_envelopes() -> None:
+    problem = lag_problem()
+    times = problem.experiment.times
+    candidate = problem.space.decode([0, 0, 0, 0])
+    x = 0.5 * np.sin(2 * np.pi * times / 0.8)
+    trajectory = Trajectory(times, {"x": x, "u": 0 * times})
+    verdict = monitor_for(View.of(problem)).evaluate(trajectory)
+    _, changing = told(problem, "MP5", [Evaluation(candidate, "ok", verdict, "", trajectory)])
+    assert "oscillates from 0.2 to 9.8 s with period 0.8 s, between" in changing
+
+
+def test_several_candidates_pending_ones_and_the_budget() -> None:
+    (sample,) = sampled(PROBLEM, [0.5] * 5)
+    pending = [PROBLEM.space.decode([0.25] * 5)]
+    standing, changing = told(
+        PROBLEM, "MP5", [sample], count=3, pending=pending, notes=["a note"], simulations=30
+    )
+    assert "3 different candidates" in standing and '"candidates": [{' in standing
+    assert "Proposed and not simulated so far:\nu: constant 0.25; x0 = 0.25" in changing
+    assert "a note" in changing
+    assert "1 of 30 simulations spent, 29 left. Propose the next 3 different samples" in changing
+    assert "30 simulations may be spent" in told(PROBLEM, "MP5", simulations=30)[1]
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_doubts_are_told_and_the_budget_by_own_variants_only(variant: str) -> None:
+    questions = Questions(View.of(PROBLEM), VARIANTS[variant], start={"x": (0.0, 0.0)})
+    questions.tell(*sampled(PROBLEM, [0.5] * 5), doubt="does not count")
+    text = "\n".join(m.content for m in questions.ask(simulations=30))
+    assert "does not count" in text
+    assert ("30 simulations" in text and "; at t = 0:" in text) == (variant in ("MP5", "MP6"))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_requirements_over_inputs_only_and_samples_without_trajectory(variant: str) -> None:
+    problem = lag_problem("G[0,10] (u <= 0.5)")
+    assert told(problem, variant, sampled(problem, [0, 0, 0, 0]))
+    (bare,) = sampled(lag_problem(), [0.5] * 4)
+    _, changing = told(lag_problem(), variant, [replace(bare, trajectory=None)])
+    if variant in ("MP4", "MP5"):
+        assert "decided at t = 10" in changing

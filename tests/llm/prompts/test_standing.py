@@ -1,0 +1,237 @@
+"""The constant part of a question: what each variant tells of a problem."""
+
+import json
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from falsifier.context.values import Compared, Context, Excerpt
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.errors import SpecError
+from falsifier.llm import DEFAULT_VARIANT
+from falsifier.llm.prompts import VARIANTS, View, variant_named
+from falsifier.llm.prompts.standing import formula_text
+from falsifier.llm.replies import ReplyForm
+from falsifier.problem.loading import load_problem
+from falsifier.stl import parse
+from falsifier.testing import FREE, START, lag_problem
+from tests.llm.prompts.support import told, transmission
+
+
+def standing(problem: Any, variant: str = "MP5", **more: Any) -> str:
+    return told(problem, variant, **more)[0]
+
+
+def test_variants_only_add_parts_up_to_mp4() -> None:
+    parts = [VARIANTS[f"MP{i}"].parts for i in range(1, 5)]
+    assert all(a < b for a, b in pairwise(parts))
+    assert variant_named("mp3").name == "MP3"
+    assert variant_named(None).name == DEFAULT_VARIANT
+    with pytest.raises(SpecError, match="did you mean 'MP5'"):
+        variant_named("MP55")
+
+
+def test_context_makes_mp6_the_default() -> None:
+    assert variant_named(None, has_context=True).name == "MP6"
+    assert variant_named("mp4", has_context=True).name == "MP4"
+    assert VARIANTS["MP6"].parts - VARIANTS["MP5"].parts == {"context"}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_a_violation_is_and_ranges_are_told(variant: str) -> None:
+    text = standing(transmission()[0], variant)
+    assert ("> forbids its limit" if variant in ("MP5", "MP6") else "below 0 the specification") in text
+    assert "from 0 to 325" in text
+    assert "\n\n\n" not in text, "what is not told leaves no trace"
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "Car with an engine",
+        "- speed [mph]: ",
+        "- gear, integer: ",
+        "input signal throttle [%]: ",
+        "In words: At all times from 0 to 20 s, speed is at most 120.",
+        "pchip (monotone cubic) interpolation; sampled and held every 0.05 s",
+        "at most 500, at least 0.1 s apart",
+        '"times": []',
+    ],
+)
+def test_mp5_tells_what_the_model_description_knows(part: str) -> None:
+    problem = transmission()[0]
+    assert part in standing(problem)
+    assert part not in standing(problem, "MP4")
+
+
+def test_no_freedom_is_offered_where_control_points_are_fixed() -> None:
+    text = standing(lag_problem())
+    assert "Alternatively, choose" not in text and '"times"' not in text
+
+
+@pytest.mark.parametrize(
+    ("formula", "text"),
+    [
+        ("G[0,30] (x <= 3) -> G[0,4] (u <= 1)", "(G[0,30] (x <= 3)) -> (G[0,4] (u <= 1))"),
+        ("G[0,4] (x <= 3 -> u <= 1)", "G[0,4] (x <= 3 -> u <= 1)"),
+        ("x <= 1 and u <= 2 and x >= 0 or u > 1", "(x <= 1 and u <= 2 and x >= 0) or u > 1"),
+        ("not (x <= 1) U[0,2] X (u > 1)", "(not (x <= 1)) U[0,2] (X (u > 1))"),
+        ("G F[0,1] (x <= 1 <-> u > 2)", "G F[0,1] (x <= 1 <-> u > 2)"),
+    ],
+)
+def test_formulas_show_how_far_each_operator_reaches(formula: str, text: str) -> None:
+    assert formula_text(parse(formula)) == text
+    assert parse(text) == parse(formula)
+
+
+def test_terms_are_signals_of_their_own_unless_they_are_of_inputs_alone() -> None:
+    text = standing(lag_problem("G[0,10] (abs(x - u) <= 0.9 + 0.1*u)"))
+    assert "Derived signals, reported below: abs(x - u)\n" in f"{text}\n"
+
+
+@pytest.mark.parametrize(
+    ("formula", "part"),
+    [
+        ("G[0,4] F[0,1.5] (x <= 1)", "from 0 to 10 s; the requirement looks only at 0 to 5.5 s."),
+        ("G[0,10] (x <= 1)", "from 0 to 10 s.\n"),
+        ("G (x <= 1)", "from 0 to 10 s.\n"),
+    ],
+)
+def test_the_part_of_the_simulation_that_matters_is_told(formula: str, part: str) -> None:
+    text = standing(lag_problem(formula))
+    assert f"The simulation runs {part}" in text
+    assert ("told up to 5.5 s, as the requirement looks no further" in text) == ("5.5" in part)
+
+
+def test_parameters_are_plain_numbers() -> None:
+    start = ParameterRange("x0", -0.5, 1 / 3, nominal=0.0, unit="m", description="start")
+    problem = lag_problem(parameters=(start,))
+    assert "- parameter x0 [m]: start; from -0.5 to 0.3333333333, nominally 0; one value" in standing(problem)
+    alone = standing(replace(problem, space=SearchSpace((), (START,), 10.0)))
+    assert '"signals"' not in alone and "control points" not in alone and "switch" not in alone
+    assert '"parameters": [{"name": "x0", "value": -0.74}]' in alone
+
+
+def kind_of_input(variant: str, **changes: Any) -> str:
+    problem = lag_problem(limit=2.0)
+    (u,) = problem.space.inputs
+    space = replace(problem.space, inputs=(replace(u, interpolation="constant", **changes),))
+    return standing(replace(problem, space=space), variant)
+
+
+def test_whole_numbers_are_asked_for() -> None:
+    assert "; integers from -1 to 1; " in kind_of_input("MP5", low=-1.0, high=1.0, kind="integer")
+    boolean = {"kind": "boolean", "low": 0.0, "high": 1.0}
+    assert "; Boolean, 0 (false) or 1 (true); " in kind_of_input("MP5", **boolean)
+    items = (("low", 1), ("top", 2), ("rear", 3))
+    gears = kind_of_input("MP5", kind="enumeration", low=1.0, high=2.0, items=items)
+    assert "; one of the numbers 1 = low, 2 = top; " in gears
+    assert '"values": [1.0, 2.0, 1.0, 2.0]' in gears
+
+
+@pytest.mark.parametrize("variant", ["MP2", "MP3", "MP4"])
+def test_booleans_are_told_as_such_by_published_variants_with_names(variant: str) -> None:
+    text = kind_of_input(variant, kind="boolean", low=0.0, high=1.0)
+    assert "1: u at t = 0.0 s, 0 (false) or 1 (true)" in text
+    assert "1, from 0 to 1" in kind_of_input("MP1", kind="boolean", low=0.0, high=1.0)
+
+
+def test_many_control_points_do_not_fill_the_prompt() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    many = InputRange("u", -1.0, 1.0, control_points=400, interpolation="constant")
+    text = standing(replace(problem, space=SearchSpace((many,), (), 10.0)))
+    assert "400 control points every 0.025 s from t = 0" in text
+
+
+def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None:
+    problem = lag_problem()
+    assert "; at t = 0: 0.25\n" in standing(problem, start={"x": (0.25, 0.25)})
+    depends = standing(problem, start={"x": (-0.5, 0.5)})
+    assert "at t = 0: depends on what you choose" in depends and "-0.5 to 0.5" not in depends
+    assert "; at t = 0" not in standing(problem, "MP4", start={"x": (0.25, 0.25)})
+
+
+class TestReply:
+    """The form that is asked for."""
+
+    problem = lag_problem(free=FREE, parameters=[START])
+
+    def example(self, variant: str, **more: Any) -> str:
+        return next(x for x in standing(self.problem, variant, **more).splitlines() if x.startswith("{"))
+
+    def test_published_variants_show_blanks(self) -> None:
+        assert '"point": [5 numbers]' in self.example("MP1")
+        assert '"signals": [{"name": "u", "values": [4 numbers]}]' in self.example("MP4")
+        assert self.example("MP4", count=2).startswith('{"candidates": [{"rationale"')
+
+    def test_the_example_can_be_read(self) -> None:
+        for count in (1, 3):
+            form = ReplyForm(self.problem.space, free=True, count=count, lessons=True)
+            example = self.example("MP5", count=count)
+            answer = form.read(example)
+            assert answer.candidates[0].signals["u"].times == (0.0, 2.4, 6.2)
+            assert answer.lessons
+            assert list(json.loads(example)) == list(form.schema()["properties"]), "in the same order"
+
+    def test_points_are_asked_for_in_a_stated_order(self) -> None:
+        fixed = replace(self.problem, space=self.problem.space.fixed)
+        assert "its 5 numbers in the order above" in standing(fixed, "MP2", reply="points")
+        own = standing(fixed, "MP5", reply="points")
+        assert "its 5 numbers in this order: the values of u at its 4 control points, x0" in own
+        assert "lessons" not in own
+
+
+class TestAdvice:
+    def lines(self, formula: str, *, free: bool = False) -> str:
+        return standing(lag_problem(formula, free=FREE if free else None))
+
+    @pytest.mark.parametrize(
+        ("formula", "is_one"),
+        [
+            ("G[0,9] (x <= 0.9) and G[0,9] (x >= -0.9)", True),
+            ("G[0,9] (x <= 0.9 and x >= -0.9)", True),
+            ("F[0,9] (x <= 0.9 and x >= -0.9)", False),
+            ("G[0,9] (x <= 0.9 or x >= 0.5)", False),
+        ],
+    )
+    def test_any_conjunct_is_enough_where_there_are_some(self, formula: str, *, is_one: bool) -> None:
+        assert ("any one of its conjuncts" in self.lines(formula)) is is_one
+
+    def test_on_shapes_conditions_and_units_where_they_matter(self) -> None:
+        plain = self.lines("G[0,10] (x <= 0.9)")
+        assert "pulses" in self.lines("G[0,10] (x <= 0.9)", free=True) and "pulses" not in plain
+        assert "make the condition true first" in self.lines("G[0,10] (u >= 0.5 -> x <= 0.9)")
+        assert "condition" not in plain
+        assert "in the units of their signals" in standing(load_problem("AT6a"))
+        assert "in the units of their signals" not in standing(load_problem("AT1"))
+
+    def test_inputs_that_only_jump_get_advice_on_order_and_times(self) -> None:
+        problem = lag_problem(inputs=2, free=FREE)
+        u, v = problem.space.inputs
+        mode = replace(v, low=0.0, high=1.0, kind="boolean", interpolation="constant")
+        both = told(replace(problem, space=replace(problem.space, inputs=(u, mode))), "MP5")
+        assert "slow changes" in both[0] and "v can only jump" in both[0] and "limits" in both[1]
+        only = told(replace(problem, space=replace(problem.space, inputs=(mode,))), "MP5")
+        assert "slow" not in only[0] and "One value throughout" in only[1] and "limits" not in only[1]
+
+
+def test_only_mp6_tells_context() -> None:
+    excerpt = Excerpt("/home/me/a.md", "a.md", "0" * 64, "whole", "THE TEXT")
+    compared = (Compared(("x",), "x > 3", "a:1"), Compared(("u",), "u < 1", "a:2"), Compared((), "z < 2", ""))
+    view = replace(View.of(lag_problem()), context=Context((excerpt,), compared))
+    texts = {name: standing(view, name) for name in VARIANTS}
+    assert [name for name, text in texts.items() if "THE TEXT" in text] == ["MP6"]
+    for part in (
+        "; in the files below: x > 3",
+        "; in the files below: u < 1",
+        "--- a.md (whole) ---\nTHE TEXT\n--- end of the files ---",
+        "Other comparisons with constants in them: z < 2",
+    ):
+        assert part in texts["MP6"]
+    assert standing(replace(view, context=Context()), "MP6") == texts["MP5"]
+
+
+def test_freedom_is_told_as_far_as_it_goes() -> None:
+    assert "at most 7, at least 0.5 s apart" in standing(lag_problem(free=Freedom(7, 0.5)))
