@@ -2,7 +2,6 @@
 
 import os
 import re
-import tempfile
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
@@ -97,15 +96,6 @@ def cache_directory() -> Path:
     """Return this tool's directory in the user's cache directory."""
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "falsifier"
-
-
-def own_temporary_folder(name: str) -> Path | None:
-    """Return a folder for machine code in the system's temporary folder; None if it cannot be private."""
-    try:
-        temporary = Path(tempfile.gettempdir())
-    except OSError:
-        return None
-    return private_folder(temporary / f"{name}-{operating_system.user()}")
 
 
 def private_folder(folder: Path) -> Path | None:

@@ -1,6 +1,5 @@
 import json
 import os
-import tempfile
 from pathlib import Path
 from random import Random
 
@@ -12,7 +11,7 @@ from falsifier.core.files import (
     bundled,
     check_seal,
     checksum,
-    own_temporary_folder,
+    private_folder,
     remove_partial,
     seal,
     write_whole,
@@ -88,14 +87,11 @@ def test_what_lies_inside_the_package_goes_before_what_lies_beside_it(
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="folders have no owner here")
-def test_a_temporary_folder_that_others_can_write_to_is_not_used(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    own = own_temporary_folder("falsifier-test")
+def test_a_folder_that_others_can_write_to_is_not_private(tmp_path: Path) -> None:
+    own = private_folder(tmp_path / "a" / "own")
     assert own is not None and own.stat().st_mode & 0o777 == 0o700
     own.chmod(0o777)
-    assert own_temporary_folder("falsifier-test") is None
+    assert private_folder(own) is None
 
 
 @given(st.dictionaries(st.text(), st.integers() | st.text(), min_size=1), st.sampled_from([None, 2]))

@@ -228,7 +228,7 @@ def policy_text(policy: Policy, enforced: int) -> str:
     may_not = [("change other files", _FILES), (f"read {other}known places of keys", _FILES)]
     may_not += [] if policy.programs else [(executing, _FILES | _SYSTEM_CALLS)]
     may_not += [] if policy.network else [(connecting, _SYSTEM_CALLS)]
-    may_not.append(("reach other processes", _PROCESSES))
+    may_not += [("reach other processes", _PROCESSES), ("change their settings", _SYSTEM_CALLS)]
     text = f"the FMU may {', '.join(may)}; it may not {', '.join(what for what, _ in may_not)}"
     lacking = [what for what, bits in may_not if not enforced & bits]
     if not lacking:

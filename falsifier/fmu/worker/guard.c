@@ -60,10 +60,10 @@ void tell(enum told what, const char *path)
     send(LINE, text, strlen(text) + 1, MSG_DONTWAIT);
 }
 
-static int read_exactly(void *target, size_t count)
+int read_exactly(int from, void *target, size_t count)
 {
     for (char *at = target; count;) {
-        ssize_t some = read(LINE, at, count);
+        ssize_t some = read(from, at, count);
         if (some < 0 && errno == EINTR)
             continue;
         if (some <= 0)
@@ -93,10 +93,10 @@ static const char **texts(const char *from, const char *end, char letter)
 static struct policy receive_policy(void)
 {
     uint32_t length;
-    if (!read_exactly(&length, sizeof length) || length > MOST_BYTES)
+    if (!read_exactly(LINE, &length, sizeof length) || length > MOST_BYTES)
         _exit(CANNOT_START);
     char *text = calloc(length + 1, 1);
-    if (!text || !read_exactly(text, length))
+    if (!text || !read_exactly(LINE, text, length))
         _exit(CANNOT_START);
     const char *end = text + length, **memory = texts(text, end, 'M');
     struct policy policy = {

@@ -102,16 +102,7 @@ size_t most_memory_used(void)
 
 int receive_bytes(void *target, size_t count)
 {
-    for (char *at = target; count;) {
-        ssize_t some = read(requests, at, count);
-        if (some < 0 && errno == EINTR)
-            continue;
-        if (some <= 0)
-            return 0;
-        at += some;
-        count -= (size_t)some;
-    }
-    return 1;
+    return read_exactly(requests, target, count);
 }
 
 void watch_requests(double seconds)

@@ -51,6 +51,8 @@ def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
     assert "other known places of keys" in may_not, "what may be changed may be read"
     may, may_not = policy_text(Policy(readable=(Path("/home/me/.config"),)), ALL).split("may not")
     assert "read /home/me/.config" in may and "other known places of keys" in may_not
+    _, filtered = policy_text(Policy(), ALL - 4 - 8).split("not enforce")
+    assert "change their settings" in filtered and "files" not in filtered, "no filter of system calls"
     _, nothing = policy_text(Policy(network=False), 0).split("not enforce")
     for lacking in ("files", "keys", "processes", "connections", "programs"):
         assert lacking in nothing
