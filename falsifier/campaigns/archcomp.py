@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import Run, load
-from falsifier.campaigns.suites import PROTOCOL_SIMULATIONS, bundled_target
+from falsifier.campaigns.published import PROTOCOL_SIMULATIONS, bundled_target
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal

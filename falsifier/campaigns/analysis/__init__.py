@@ -8,10 +8,10 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, read_published
-from falsifier.campaigns.analysis.runs import Run, columns, frame, histories, load, load_run
+from falsifier.campaigns.analysis.runs import Run, columns, frame, load, load_run
 from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
 from falsifier.campaigns.analysis.tables import Table, ablation_table, llms_table, main_table
+from falsifier.campaigns.published import COLUMNS, Published, Score, read_published
 
 __all__ = [
     "COLUMNS",
@@ -24,7 +24,6 @@ __all__ = [
     "columns",
     "frame",
     "group",
-    "histories",
     "llms_table",
     "load",
     "load_run",

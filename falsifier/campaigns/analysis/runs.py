@@ -202,24 +202,6 @@ def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:
     return _columns([_row(run) for run in runs])
 
 
-def histories(runs: Iterable[Run]) -> dict[str, list[Any]]:
-    """One row per evaluation: its run, its number from 1, its robustness and the smallest so far."""
-    rows = []
-    for run in runs:
-        for i, (value, best) in enumerate(zip(run.robustness, run.best_so_far, strict=True), start=1):
-            rows.append(
-                {
-                    "requirement": run.requirement,
-                    "method": run.method.label,
-                    "seed": run.seed,
-                    "simulation": i,
-                    "robustness": float(value),
-                    "best": float(best),
-                }
-            )
-    return _columns(rows)
-
-
 def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
     """One row per run, as a pandas data frame.
 

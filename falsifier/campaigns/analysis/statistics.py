@@ -14,6 +14,8 @@ from falsifier.campaigns.request import Method
 
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000
+# Fewer runs say so little that an interval would look like more.
+_FEWEST_RUNS = 5
 Interval = tuple[float, float]
 
 
@@ -30,8 +32,8 @@ class Statistics:
         mean: mean number of simulations over the falsified runs; None if there is none.
         median: median of the same.
         deviation: sample standard deviation of the same; None below two falsified runs.
-        rate_interval: 95 % Wilson interval of the share of falsified runs; None without finished runs.
-        mean_interval: 95 % percentile bootstrap interval of the mean; None below two falsified runs.
+        rate_interval: 95 % Wilson interval of the share of falsified runs; None below five finished runs.
+        mean_interval: 95 % percentile bootstrap interval of the mean; None below five falsified runs.
         best: smallest robustness of any run.
         simulation_seconds: mean time in the simulator per run.
         seconds: mean wall-clock time per run.
@@ -68,8 +70,8 @@ def statistics(runs: Iterable[Run]) -> Statistics:
         mean=float(counts.mean()) if counts.size else None,
         median=float(np.median(counts)) if counts.size else None,
         deviation=float(counts.std(ddof=1)) if counts.size > 1 else None,
-        rate_interval=wilson(len(counts), len(finished)) if finished else None,
-        mean_interval=bootstrap(counts) if counts.size > 1 else None,
+        rate_interval=wilson(len(counts), len(finished)) if len(finished) >= _FEWEST_RUNS else None,
+        mean_interval=bootstrap(counts) if counts.size >= _FEWEST_RUNS else None,
         best=min((run.verdict.robustness for run in runs if run.verdict), default=None),
         simulation_seconds=spent.simulation_seconds * share,
         seconds=spent.seconds * share,

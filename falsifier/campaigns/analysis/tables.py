@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from typing import Any
 
-from falsifier.campaigns.analysis.published_scores import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
+from falsifier.campaigns.published import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.request import Method
 from falsifier.core.literals import csv_cell, markdown_text, one_line
 from falsifier.stl.margins import shown
@@ -152,8 +152,8 @@ _NUMBERS = (
 )
 _LEGEND = (
     "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
-    "deviation. Intervals: Wilson for FR, percentile bootstrap for the mean. Seconds, tokens and cost are "
-    "means per run."
+    "deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. Seconds, "
+    "tokens and cost are means per run."
 )
 _PUBLISHED_LEGEND = (
     "Rank: position among all published tools known for the requirement, by FR, then by mean S; ties share "

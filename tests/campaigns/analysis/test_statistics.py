@@ -45,8 +45,15 @@ def test_without_a_falsified_run_there_is_no_mean(campaign: Path) -> None:
     found = statistics(run for run in load(campaign) if run.requirement == "NEVER")
     assert (found.runs, found.falsified) == (4, 0)
     assert (found.mean, found.median, found.deviation, found.mean_interval) == (None, None, None, None)
-    assert found.rate_interval is not None
-    assert found.rate_interval[0] == 0
+    assert found.rate_interval is None, "four runs are too few for an interval"
+
+
+def test_from_five_runs_on_there_are_intervals(campaign: Path) -> None:
+    runs = [run for run in load(campaign) if run.requirement == "HARD"] * 2
+    found = statistics(runs[:5])
+    assert found.rate_interval == wilson(5, 5)
+    assert found.mean_interval is not None
+    assert statistics(runs[:4]).mean_interval is None
 
 
 def test_methods_are_never_counted_together(campaign: Path) -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 
 from falsifier.campaigns.analysis import load
-from falsifier.campaigns.analysis.curves import falsification_curve, improvements, thinned
+from falsifier.views.plotting.runs import falsification_curve, improvements, thinned
 
 
 def test_curves(campaign: Path) -> None:

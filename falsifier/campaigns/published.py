@@ -1,4 +1,4 @@
-"""Published results, and the rank of our own among them."""
+"""What was published (published.toml): suites of requirements, their results, the rank of our own."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.files import bundled
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, did_you_mean
+from falsifier.problem.loading import find_spec
+from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.problem.spec import read_spec
 
 # Published means have one decimal, so means are compared with one decimal: 1.3 and 1.34 share a rank.
 _DECIMALS = 1
@@ -116,3 +119,38 @@ def _scores(column: Mapping[str, Any], runs: int) -> dict[str, Score]:
         for requirement, cell in column.items()
         if requirement != "source"
     }
+
+
+SUITES = ("arch-comp",)
+# The competition's protocol: simulations per run, and the parameterization that published results have.
+PROTOCOL_SIMULATIONS = 1500
+PROTOCOL_PARAMETERIZATION: Parameterization = "fixed"
+
+
+def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]:
+    """Requirements of a suite.
+
+    Args:
+        name: ``arch-comp``: the requirements in ``published.toml``, in that order.
+        profile: omit requirements whose spec does not offer this profile.
+
+    Raises:
+        SpecError: for an unknown name.
+    """
+    if name not in SUITES:
+        raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
+    targets = [bundled_target(requirement) for requirement in read_published().columns["best"]]
+    return tuple(ProblemSource(target=t) for t in targets if profile is None or _offers(t, profile))
+
+
+def bundled_target(requirement: str) -> str:
+    """Target of a bundled requirement including its spec, such as ``NN:NN``: ``NN`` alone is the whole spec.
+
+    Raises:
+        SpecError: if there is none of that name.
+    """
+    return f"{find_spec(requirement)[0].stem}:{requirement}"
+
+
+def _offers(target: str, profile: str) -> bool:
+    return profile in read_spec(find_spec(target)[0]).profiles

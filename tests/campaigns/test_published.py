@@ -3,9 +3,11 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.campaigns import suite
 from falsifier.campaigns.analysis import Score, read_published
-from falsifier.campaigns.analysis.published_scores import is_tied, rank
+from falsifier.campaigns.published import is_tied, rank
 from falsifier.errors import SpecError
+from falsifier.problem.loading import load_source
 
 BEST, LLM = Score(10, 10, 1.3, "FReaK"), Score(10, 10, 2.3)
 
@@ -66,3 +68,21 @@ def test_another_file_is_refused(tmp_path: Path) -> None:
     path.write_text("runs = 10\n")
     with pytest.raises(SpecError, match="not a table of published results"):
         read_published(path)
+
+
+def test_the_suite_has_the_published_requirements() -> None:
+    names = [r.target for r in suite("arch-comp")]
+    assert len(names) == 21
+    assert {"AT:AT1", "AT:AT6abc", "NN:NN", "CC:CCx", "F16:F16", "SC:SC"} < set(names)
+    assert [load_source(s).name for s in suite("arch-comp")] == [name.split(":")[1] for name in names]
+
+
+def test_instance_2_leaves_out_what_has_none() -> None:
+    names = [r.target for r in suite("arch-comp", profile="instance2")]
+    assert "F16:F16" not in names
+    assert len(names) == 20
+
+
+def test_an_unknown_suite_is_named() -> None:
+    with pytest.raises(SpecError, match="arch-comp"):
+        suite("archcomp")
