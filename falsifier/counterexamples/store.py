@@ -33,7 +33,7 @@ from falsifier.record.journal import holds_run, read_journal, recorded_evaluatio
 from falsifier.record.manifest import RequirementRecord
 from falsifier.record.records import ConfirmedRecord
 from falsifier.stl.margins import signed
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 FILE_NAME = "counterexample.json"
 # What falsifier explain has found out, beside the counterexample's file; reports repeat it.

@@ -15,7 +15,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, MonitorError, SimulationError, did_you_mean
 from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, Formula, Monitor
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 Status = Literal["ok", "failed", "crashed", "timeout"]
 

@@ -12,7 +12,7 @@ from falsifier.problem.spec import NAME_IN_LINES, Spec
 from falsifier.problem.template_arguments import TemplateError
 from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
-from falsifier.stl.renaming import renamed
+from falsifier.stl.formula import renamed
 
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
 PLACEHOLDER = "LIMIT"

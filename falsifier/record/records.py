@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
 

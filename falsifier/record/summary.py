@@ -20,7 +20,7 @@ from falsifier.record.records import (
 )
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interrupted", "failed"]
 FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")

@@ -8,9 +8,8 @@
 from falsifier.stl.breach import Breach
 from falsifier.stl.diagnosis import Diagnosis
 from falsifier.stl.formula import Formula
-from falsifier.stl.monitor import Monitor
+from falsifier.stl.monitor import Monitor, Verdict
 from falsifier.stl.parser import parse
-from falsifier.stl.verdict import Verdict
 from falsifier.stl.words import in_words
 
 __all__ = ["Breach", "Diagnosis", "Formula", "Monitor", "Verdict", "in_words", "parse"]

@@ -126,7 +126,7 @@ def find_breach(root: Part, buffer: Floats, trajectory: Trajectory) -> Breach:
         trajectory: the trajectory on which it was evaluated.
     """
     whole = _Demand(root, wanted=True)
-    return Breach(tuple(_Search(buffer, trajectory).at(whole, _Place(0))))
+    return Breach(tuple(_Search(buffer, trajectory).at(whole, _Spot(0))))
 
 
 class _Demand(NamedTuple):
@@ -202,7 +202,7 @@ class _Condition:
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _Spot:
     """Where a demand was not met.
 
     Attributes:
@@ -219,15 +219,15 @@ class _Place:
     notes: tuple[_Condition | str, ...] = ()
     sought: str = ""
 
-    def noted(self, *notes: _Condition | str) -> "_Place":
+    def noted(self, *notes: _Condition | str) -> "_Spot":
         return replace(self, notes=(*self.notes, *notes))
 
-    def moved(self, sample: int, scope: Span | None = None) -> "_Place":
+    def moved(self, sample: int, scope: Span | None = None) -> "_Spot":
         """Another sample; conditions stay at the one at which they were asked."""
-        return _Place(sample, scope, (), self.settled.notes, self.sought)
+        return _Spot(sample, scope, (), self.settled.notes, self.sought)
 
     @property
-    def settled(self) -> "_Place":
+    def settled(self) -> "_Spot":
         notes = (
             replace(n, sample=self.sample) if isinstance(n, _Condition) and n.sample is None else n
             for n in self.notes
@@ -242,99 +242,99 @@ class _Search:
     buffer: Floats
     trajectory: Trajectory
 
-    def at(self, demand: _Demand, place: _Place) -> Iterator[Shortfall]:
+    def at(self, demand: _Demand, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was not met at a sample."""
-        place = replace(place, guards=(*place.guards, demand))
-        here = (place.sample, place.sample)
-        window = demand.part.window_at(place.sample) or here
+        spot = replace(spot, guards=(*spot.guards, demand))
+        here = (spot.sample, spot.sample)
+        window = demand.part.window_at(spot.sample) or here
         operands = demand.operands
         match demand.formula:
             case Predicate():
-                yield self._compared(demand, place)
+                yield self._compared(demand, spot)
             case Not():
-                yield from self.at(operands[0], place)
+                yield from self.at(operands[0], spot)
             case Next():
-                yield from self.at(operands[0], place.moved(place.sample + 1))
+                yield from self.at(operands[0], spot.moved(spot.sample + 1))
             case Until() if demand.wanted:
-                yield from self._until(operands[0], operands[1], window, place)
+                yield from self._until(operands[0], operands[1], window, spot)
             case Until():
                 left, right = operands
                 met = self._first(right.opposite, window)
-                yield from self.at(right, place.noted(_Condition(left.opposite)).moved(met))
+                yield from self.at(right, spot.noted(_Condition(left.opposite)).moved(met))
             case Implies() if demand.wanted:  # apart from other choices, as the consequence may be negated
-                yield from self.at(operands[1], place.noted(_Condition(operands[0].opposite)))
+                yield from self.at(operands[1], spot.noted(_Condition(operands[0].opposite)))
             case Iff():
-                yield from self._unequal(demand, place)
+                yield from self._unequal(demand, spot)
             case _ if demand.is_throughout:
-                yield from self._throughout(operands[0], window, place)
+                yield from self._throughout(operands[0], window, spot)
             case _ if demand.is_sometime:
-                yield from self._never(operands[0], window, place)
+                yield from self._never(operands[0], window, spot)
             case _ if demand.is_choice:
                 # "not p or q" is read as "p -> q": what had to be false is a condition that held.
                 refused, choices = ([d for d in operands if d.wanted is w] for w in (False, True))
                 if choices:
-                    place = place.noted(*(_Condition(d.opposite) for d in refused))
+                    spot = spot.noted(*(_Condition(d.opposite) for d in refused))
                 if len(choices) != 1:  # then all conditions are told of the same sample
-                    place = place.settled
+                    spot = spot.settled
                 for choice in choices or operands:
-                    yield from self.at(choice, place)
+                    yield from self.at(choice, spot)
             case _:
-                yield from self.at(min(operands, key=lambda d: d.margins(self.buffer, here)[0]), place)
+                yield from self.at(min(operands, key=lambda d: d.margins(self.buffer, here)[0]), spot)
 
-    def _throughout(self, demand: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+    def _throughout(self, demand: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was not met at every sample of a window."""
         if isinstance(demand.formula, Not):
-            yield from self._throughout(demand.operands[0], window, place)
+            yield from self._throughout(demand.operands[0], window, spot)
         elif demand.is_throughout:
-            yield from self._throughout(demand.operands[0], _inner(demand.part, window), place)
+            yield from self._throughout(demand.operands[0], _inner(demand.part, window), spot)
         else:
             sample = window[0] + int(demand.margins(self.buffer, window).argmin())
-            yield from self.at(demand, place.moved(sample, window))
+            yield from self.at(demand, spot.moved(sample, window))
 
-    def _never(self, demand: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+    def _never(self, demand: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was met at no sample of a window."""
         if isinstance(demand.formula, Predicate):
-            yield self._compared(demand, place.settled, window)
+            yield self._compared(demand, spot.settled, window)
         elif isinstance(demand.formula, Not):
-            yield from self._never(demand.operands[0], window, place)
+            yield from self._never(demand.operands[0], window, spot)
         elif demand.is_sometime:
-            yield from self._never(demand.operands[0], _inner(demand.part, window), place)
+            yield from self._never(demand.operands[0], _inner(demand.part, window), spot)
         elif demand.is_choice:
             for choice in demand.operands:
-                yield from self._never(choice, window, place)
+                yield from self._never(choice, window, spot)
         else:
             best = window[0] + int(demand.margins(self.buffer, window).argmax())
-            if window[0] < window[1] and not place.sought:
+            if window[0] < window[1] and not spot.sought:
                 near = f"it came nearest at {seconds(self._time(best))}"
                 over = _over(*map(self._time, window))
-                place = replace(place, sought=f"{demand.text} held at no time {over}; {near}")
-            yield from self.at(demand, place.moved(best))
+                spot = replace(spot, sought=f"{demand.text} held at no time {over}; {near}")
+            yield from self.at(demand, spot.moved(best))
 
-    def _until(self, left: _Demand, right: _Demand, window: Span, place: _Place) -> Iterator[Shortfall]:
+    def _until(self, left: _Demand, right: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         if not right.met(self.buffer, window).any():
-            yield from self._never(right, window, place)
+            yield from self._never(right, window, spot)
             return
         met = self._first(right, window)
         note = f"it had to hold until {right.text}, which held at {seconds(self._time(met))}"
-        yield from self._throughout(left, (place.sample, met), place.noted(note))
+        yield from self._throughout(left, (spot.sample, met), spot.noted(note))
 
-    def _unequal(self, demand: _Demand, place: _Place) -> Iterator[Shortfall]:
+    def _unequal(self, demand: _Demand, spot: _Spot) -> Iterator[Shortfall]:
         """Why an equivalence failed, told from a side that held; if none did, from what the left one was."""
         left, right = (_Demand(child, wanted=True) for child in demand.part.children)
-        is_true = bool(left.met(self.buffer, (place.sample, place.sample))[0])
+        is_true = bool(left.met(self.buffer, (spot.sample, spot.sample))[0])
         if demand.wanted and not is_true:
             left, right = right, left
         held = is_true or demand.wanted
         yield from self.at(
             right if held is demand.wanted else right.opposite,
-            place.noted(_Condition(left if held else left.opposite)),
+            spot.noted(_Condition(left if held else left.opposite)),
         )
 
-    def _compared(self, demand: _Demand, place: _Place, window: Span | None = None) -> Shortfall:
+    def _compared(self, demand: _Demand, spot: _Spot, window: Span | None = None) -> Shortfall:
         """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
         predicate = demand.formula
         assert isinstance(predicate, Predicate)
-        first, last = window or self._stretch(place)
+        first, last = window or self._stretch(spot)
         margins = demand.margins(self.buffer, (first, last))
         sample = first + int(margins.argmax() if window else margins.argmin())
         values, units = self._signals(sample), self.trajectory.units
@@ -358,18 +358,18 @@ class _Search:
             time=self._time(sample),
             never=window is not None,
             reading=reading,
-            sought=place.sought,
-            context=tuple(self._told(note, sample) for note in place.notes),
+            sought=spot.sought,
+            context=tuple(self._told(note, sample) for note in spot.notes),
         )
 
-    def _stretch(self, place: _Place) -> Span:
+    def _stretch(self, spot: _Spot) -> Span:
         """The samples around one at which all demands down to the comparison were not met."""
-        if place.scope is None:
-            return place.sample, place.sample
-        low, high = place.scope
-        met = np.any([guard.met(self.buffer, place.scope) for guard in place.guards], axis=0)
+        if spot.scope is None:
+            return spot.sample, spot.sample
+        low, high = spot.scope
+        met = np.any([guard.met(self.buffer, spot.scope) for guard in spot.guards], axis=0)
         good = np.flatnonzero(met) + low
-        before, after = good[good < place.sample], good[good > place.sample]
+        before, after = good[good < spot.sample], good[good > spot.sample]
         return int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
 
     def _told(self, note: _Condition | str, sample: int) -> str:

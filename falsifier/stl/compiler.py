@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.errors import FormulaError
-from falsifier.stl import steps as op
+from falsifier.stl import program as op
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, number_text
 from falsifier.stl.formula import (
     Always,
@@ -84,7 +84,7 @@ class _Compiler:
     samples: int
     needs: dict[Node, tuple[int, int]] = field(default_factory=dict)
     places: dict[Node, Place] = field(default_factory=dict)
-    steps: list[op.Step] = field(default_factory=list)
+    steps: list[op.Operation] = field(default_factory=list)
     checked: dict[int, tuple[Predicate, Place]] = field(default_factory=dict)
     size: int = 0
 

@@ -4,9 +4,9 @@
 use ``formula.walk()``, ``formula.children`` and ``formula.predicates``.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, ClassVar, Literal, TypeVar
 
 from falsifier.stl.expression import SUM, Expression, Name, Number, embraced, number_text
 
@@ -14,6 +14,10 @@ Comparison = Literal["<", "<=", ">", ">=", "==", "!="]
 
 # Precedence levels, lowest first; those of expressions (expression.py) follow.
 EQUIVALENCE, IMPLICATION, DISJUNCTION, CONJUNCTION, UNTIL, PREFIX, COMPARISON = range(7)
+OPPOSITE: dict[Comparison, Comparison] = {
+    "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
+}  # fmt: skip
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,11 +239,6 @@ class Until(_Binary):
         return f"{_prefixed(self.left)} U{self.window or ''} {_prefixed(self.right)}"
 
 
-OPPOSITE: dict[Comparison, Comparison] = {
-    "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
-}  # fmt: skip
-
-
 def negated(formula: Formula) -> Formula:
     """Return what holds if a formula does not: the opposite comparison where there is one."""
     if isinstance(formula, Not):
@@ -258,3 +257,18 @@ def _prefixed(operand: Formula) -> str:
     if isinstance(operand, Predicate) and not isinstance(operand, Flag):
         return f"({operand})"
     return embraced(operand, PREFIX)
+
+
+def renamed(node: T, names: Mapping[str, str]) -> T:
+    """Return the same formula or expression with other names; names that are not listed stay."""
+    return _renamed(node, names)  # type: ignore[no-any-return]
+
+
+def _renamed(node: Any, names: Mapping[str, str]) -> Any:
+    if isinstance(node, Name):
+        return Name(names.get(node.name, node.name))
+    if isinstance(node, tuple):
+        return tuple(_renamed(part, names) for part in node)
+    if is_dataclass(node) and not isinstance(node, type):
+        return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
+    return node

@@ -20,7 +20,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import in_words
 from falsifier.stl.margins import signed
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join
 from falsifier.views.text import seconds_text

@@ -27,7 +27,7 @@ from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.stl import parse
-from falsifier.stl.renaming import renamed
+from falsifier.stl.formula import renamed
 from falsifier.testing import FREE, START, lag_problem
 
 WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|integer"

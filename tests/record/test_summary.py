@@ -9,7 +9,7 @@ from falsifier.record.records import (
 )
 from falsifier.record.summary import Summary
 from falsifier.search.budget import Spent
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 
 def status(summary: Summary) -> str:

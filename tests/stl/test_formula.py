@@ -1,11 +1,22 @@
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
 
 from falsifier.stl import parse
-from falsifier.stl.expression import Name
-from falsifier.stl.formula import Always, Formula, Predicate
+from falsifier.stl.expression import (
+    Arithmetic,
+    Call,
+    Expression,
+    Function,
+    Name,
+    Negative,
+    Number,
+    number_text,
+    unit_of,
+)
+from falsifier.stl.formula import Always, Formula, Predicate, renamed
 
 
 def test_signals_come_in_order_of_first_appearance() -> None:
@@ -53,3 +64,59 @@ def test_an_expression_outside_its_domain_is_no_number_and_no_warning() -> None:
 def test_equal_formulas_are_equal_keys() -> None:
     counts: dict[Formula, int] = {parse("x <= 3.0"): 1}
     assert counts[Predicate("<=", Name("x"), parse("x <= 3").predicates[0].right)] == 1
+
+
+def test_only_listed_names_change() -> None:
+    formula = parse("G[0,2] (a + b <= 3 and F (abs(a) > c))")
+    assert renamed(formula, {"a": "x", "d": "y"}) == parse("G[0,2] (x + b <= 3 and F (abs(x) > c))")
+
+
+def test_names_can_be_exchanged() -> None:
+    assert renamed(parse("a until b > 0"), {"a": "b", "b": "a"}) == parse("b until a > 0")
+
+
+X, Y = Name("x"), Name("wheel speed")
+COLUMNS = {"x": np.array([-4.0, 0.0, 9.0]), "wheel speed": np.array([2.0, 0.0, 3.0])}
+
+
+@pytest.mark.parametrize(
+    ("function", "values"),
+    [("abs", [4.0, 0.0, 9.0]), ("sqrt", [np.nan, 0.0, 3.0]), ("log", [np.nan, -np.inf, np.log(9.0)])],
+)
+def test_what_is_not_defined_is_no_number_and_no_warning(function: Function, values: list[float]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        np.testing.assert_array_equal(Call(function, (X,)).evaluate(COLUMNS), values)
+
+
+@pytest.mark.parametrize(
+    ("expression", "text"),
+    [
+        (Arithmetic("*", Arithmetic("+", X, Number(1)), Y), '(x + 1)*"wheel speed"'),
+        (Arithmetic("-", X, Arithmetic("-", X, X)), "x - (x - x)"),
+        (Arithmetic("-", Arithmetic("-", X, X), X), "x - x - x"),
+        (Arithmetic("^", Number(-2), X), "(-2)^x"),
+        (Arithmetic("^", X, Negative(X)), "x^-x"),
+        (Negative(Arithmetic("+", X, X)), "-(x + x)"),
+        (Call("min", (X, Number(0.5))), "min(x, 0.5)"),
+    ],
+)
+def test_parentheses_stand_where_they_are_needed_and_nowhere_else(expression: Expression, text: str) -> None:
+    assert str(expression) == text
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-7, 120.0, -0.5, 1e300])
+def test_numbers_read_back_exactly(value: float) -> None:
+    assert float(number_text(value)) == value
+    assert not number_text(value).endswith(".0")
+
+
+def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
+    units = {"x": "m", "wheel speed": "km/h", "n": "1"}
+    expressions = {
+        "m": Call("abs", (Arithmetic("-", X, Number(2.0)),)),
+        "km/h": Negative(Arithmetic("+", Number(3.0), Y)),
+        "": Arithmetic("*", X, X),
+    }
+    assert {unit: unit_of(e, units) for unit, e in expressions.items()} == {u: u for u in expressions}
+    assert unit_of(Name("n"), units) == ""

@@ -100,6 +100,19 @@ def test_values_and_critical_times(text: str, robustness: float, critical: float
     assert judge(text, trajectory(x=X, y=Y)) == (robustness, critical)
 
 
+def test_arithmetic_and_functions_are_those_of_numpy() -> None:
+    x, y = np.array(X), np.array(Y)
+    for text, value in {
+        "x + y": x + y, "x - 3*y": x - 3 * y, "2 - x": 2 - x, "y/x": y / x, "x^y": x**y, "x^2": x * x,
+        "-x + 1": 1 - x, "abs(x - y)": abs(x - y), "sqrt(x)": np.sqrt(x), "exp(x)": np.exp(x),
+        "log(y)": np.log(y), "sin(x)": np.sin(x), "cos(y)": np.cos(y),
+        "min(x, y, 3)": np.minimum(np.minimum(x, y), 3),
+        "max(x, y)": np.maximum(x, y),
+    }.items():  # fmt: skip
+        found = Monitor(parse(f"{text} >= 0.25"), 1.0, 5).course(trajectory(x=X, y=Y))
+        assert found == pytest.approx(value - 0.25), text
+
+
 def test_until_includes_the_left_operand_at_the_end() -> None:
     t = trajectory(left=[1.0, -1.0], right=[-1.0, 1.0])
     assert judge("(left >= 0) U[0,1] (right >= 0)", t) == (-1.0, 0.0)
@@ -304,6 +317,25 @@ def test_courses_agree_with_the_direct_definition(seed: int) -> None:
         assert course.tolist() == [direct.judge(part, k)[0] for k in range(len(course))], str(part)
 
 
+def test_conditions_disjuncts_and_predicates_are_watched_where_they_count() -> None:
+    monitor = Monitor(parse("G[0,2] (x >= 3 -> (y <= 1 or x <= 9))"), step=1.0, samples=4)
+    parts = [(str(w.formula), str(w.part.formula)) for w in monitor.watched]
+    assert parts == [
+        ("x >= 3 -> (y <= 1 or x <= 9)", "x >= 3"),
+        ("x >= 3", "x >= 3"),
+        ("y <= 1 or x <= 9", "y <= 1"),
+        ("y <= 1 or x <= 9", "x <= 9"),
+        ("y <= 1", "y <= 1"),
+        ("x <= 9", "x <= 9"),
+    ]
+    # The last sample is outside the window and does not count.
+    columns = {"x": np.array([0.0, 2.0, 1.0, 50.0]), "y": np.array([5.0, 0.0, 0.0, -50.0])}
+    found = monitor.extremes(Trajectory(np.arange(4.0), columns))
+    assert (found.lows[0], found.lowest[0]) == (-3.0, 0.0)
+    assert (found.highs[0], found.highest[0]) == (-1.0, 1.0)
+    assert (found.lows[2], found.highs[2]) == (-4.0, 1.0)
+
+
 def test_a_batch_is_judged_like_its_trajectories() -> None:
     rng = random.Random(5)
     for seed in range(30_000, 30_040):
@@ -337,6 +369,13 @@ def test_columns_may_be_booleans_integers_or_strided() -> None:
     assert verdict.robustness == ON_LIMIT
     assert verdict.values == {"b": 1.0, "i": 3.0, "x": 5.0}
     assert {type(v) for v in verdict.values.values()} == {float}
+
+
+@pytest.mark.parametrize(
+    ("robustness", "violated"), [(-1e-300, True), (0.0, False), (-0.0, False), (1.0, False)]
+)
+def test_only_a_negative_margin_is_a_violation(robustness: float, violated: bool) -> None:
+    assert Verdict(robustness, 0.0, "x <= 1").violated is violated
 
 
 def test_verdicts_hold_plain_numbers() -> None:

@@ -22,6 +22,7 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
+from falsifier.stl.names import name_text
 from tests.stl.randoms import random_formula
 
 A, B, C = (Flag.of(Name(n)) for n in "abc")
@@ -127,6 +128,7 @@ def test_windows_in_units(text: str, window: Window) -> None:
         ("_x$1", "_x$1"),
         (r'"say \"hi\" \\"', r'say "hi" \ '.strip()),
         ("müde", "müde"),
+        ("$internal", "$internal"),
     ],
 )
 def test_names_as_models_have_them(text: str, name: str) -> None:
@@ -236,6 +238,7 @@ MISTAKES = [
     ("[] (x <= 3)", 1, "[] is written G"),
     ("a -> <>[0,3] (x <= 3)", 6, "<> is written F"),
     ("a <= b\nand c <== d", 16, "=="),
+    ("x # 1", 3, "quotes"),
     ("(" * 500 + "b" + ")" * 500, 101, "split"),
     ("b" + " and b" * 300, 1, "split"),
 ]
@@ -256,9 +259,21 @@ def test_what_is_not_one_formula_is_an_error_that_points_there(text: str, positi
     assert caret == " " * (2 + column) + "^" or len(whole) > len(shown)
 
 
-TEMPORAL = ["G", "F", "U", "X", "[0,1]", "[0, 1", "not"]
-LOGICAL = ["and", "or", "->", "<->", "(", ")"]
-ARITHMETIC = [
+WORDS = [
+    "G",
+    "F",
+    "U",
+    "X",
+    "[0,1]",
+    "[0,",
+    "1",
+    "not",
+    "and",
+    "or",
+    "->",
+    "<->",
+    "(",
+    ")",
     "x",
     "y",
     "b",
@@ -278,7 +293,6 @@ ARITHMETIC = [
     "abs(",
     "min(",
 ]
-WORDS = TEMPORAL + LOGICAL + ARITHMETIC
 
 
 @given(st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
@@ -301,6 +315,11 @@ def test_any_characters_are_a_formula_or_an_error(text: str) -> None:
         assert "hint: " in str(error)
     else:
         assert parse(str(formula)) == formula
+
+
+@given(st.text(st.characters(exclude_characters="\n", codec="utf-8"), min_size=1, max_size=20))
+def test_any_name_is_written_so_that_it_reads_back(name: str) -> None:
+    assert parse(f"{name_text(name)} <= 3").signals == (name,)
 
 
 def test_the_deepest_formulas_print_hash_and_travel() -> None:

@@ -24,7 +24,7 @@ from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunStatus, read_summary
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 if TYPE_CHECKING:
     import pandas

@@ -7,7 +7,7 @@ from typing import Literal
 # What decides whether a system is computed at all.
 _CONTROLS = ("EnablePort", "TriggerPort", "ActionPort", "ForIterator", "WhileIterator", "ResetPort")
 # A block by its path: the names of the systems around it and its own.
-Place = tuple[str, ...]
+BlockPath = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,7 @@ class Diagram:
     is_library: bool = False
 
 
-def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[Place] | None:
+def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] | None:
     """Return the blocks on which signals depend, with the systems around them.
 
     A signal is an outport or block of its name, or where a line of its name begins. The rule follows a block
@@ -198,7 +198,7 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[Place] | Non
     queue += [place for name, place in _named_wires(diagram.root) if name in wanted]
     if not queue:
         return None
-    found: set[Place] = set()
+    found: set[BlockPath] = set()
     while queue:
         place = queue.pop()
         if place not in found:
@@ -209,9 +209,9 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[Place] | Non
     return frozenset(found | around)
 
 
-def _sources(diagram: Diagram) -> Mapping[Place, list[Place]]:
+def _sources(diagram: Diagram) -> Mapping[BlockPath, list[BlockPath]]:
     """The blocks that lead directly to each block; tags stand among them, as places of no system."""
-    sources: dict[Place, list[Place]] = {}
+    sources: dict[BlockPath, list[BlockPath]] = {}
     for path, system in diagram.root.walk():
         controls = [(*path, block.name) for block in system.blocks if path and block.type in _CONTROLS]
         for block in system.blocks:
@@ -237,11 +237,11 @@ def _sources(diagram: Diagram) -> Mapping[Place, list[Place]]:
     return sources
 
 
-def _tag(block: Block) -> Place:
+def _tag(block: Block) -> BlockPath:
     return ("", block.parameter("GotoTag") or block.parameter("DataStoreName"))
 
 
-def _named_wires(root: BlockSystem) -> Iterator[tuple[str, Place]]:
+def _named_wires(root: BlockSystem) -> Iterator[tuple[str, BlockPath]]:
     for path, system in root.walk():
         for wire in system.wires:
             if wire.name and wire.source is not None:

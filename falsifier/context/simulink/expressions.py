@@ -3,7 +3,7 @@
 import re
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram, Place
+from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram
 from falsifier.context.thresholds import Threshold, at_breakpoints, thresholds, within
 
 # Of an If block, u1 is what leads to its first port, not a signal of that name.
@@ -27,7 +27,7 @@ _FOLLOWING = frozenset(_LISTED.split())
 _MAX_BLOCKS = 20_000
 
 
-def diagram_thresholds(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[Threshold]:
+def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = None) -> Iterator[Threshold]:
     """Return the comparisons with constants, and the breakpoints of tables.
 
     Args:
@@ -46,7 +46,7 @@ def diagram_thresholds(diagram: Diagram, only: Collection[Place] | None = None) 
             yield at_breakpoints(signal, values, f"{diagram.name}/{'/'.join(path)}")
 
 
-def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iterator[tuple[str, str]]:
+def comparisons(diagram: Diagram, only: Collection[BlockPath] | None = None) -> Iterator[tuple[str, str]]:
     """Return comparisons as text with the block or chart that makes them."""
     for place, block, inputs in _reached(diagram, only):
         for text in _compared(block, inputs):
@@ -58,8 +58,8 @@ def comparisons(diagram: Diagram, only: Collection[Place] | None = None) -> Iter
 
 
 def _reached(
-    diagram: Diagram, only: Collection[Place] | None
-) -> Iterator[tuple[Place, Block, Mapping[str, str]]]:
+    diagram: Diagram, only: Collection[BlockPath] | None
+) -> Iterator[tuple[BlockPath, Block, Mapping[str, str]]]:
     """Return the blocks to look at, with their paths and what leads to each of their inputs."""
     fed = feeding(diagram)
     for path, system in diagram.root.walk():
@@ -75,7 +75,7 @@ def _chart_constants(chart: Chart) -> Mapping[str, str]:
     return {d.name: d.initial for d in chart.data if d.initial and d.scope in ("constant", "parameter")}
 
 
-def _chart_names(chart: Chart, feeding: Mapping[Place, Mapping[str, str]]) -> Mapping[str, str]:
+def _chart_names(chart: Chart, feeding: Mapping[BlockPath, Mapping[str, str]]) -> Mapping[str, str]:
     """Return what the variables of a chart stand for outside it; empty text for its own ones."""
     fed = feeding.get(tuple(chart.name.split("/")), {})
     own = {d.name: "" for d in chart.data if d.scope in ("local", "temporary")}
@@ -91,7 +91,7 @@ def _breakpoints(block: Block, inputs: Mapping[str, str]) -> Iterator[tuple[str,
             yield inputs[port], values
 
 
-def feeding(diagram: Diagram, *, named: bool = True) -> Mapping[Place, Mapping[str, str]]:
+def feeding(diagram: Diagram, *, named: bool = True) -> Mapping[BlockPath, Mapping[str, str]]:
     """Return what leads to the inports of each subsystem, by the subsystem's path and the inport's name.
 
     Args:
@@ -99,7 +99,7 @@ def feeding(diagram: Diagram, *, named: bool = True) -> Mapping[Place, Mapping[s
         named: whether to leave out blocks that only have a name of their own: the inport's says more, unless
             it is the name of another signal, one of the model's ports.
     """
-    found: dict[Place, Mapping[str, str]] = {}
+    found: dict[BlockPath, Mapping[str, str]] = {}
     ports = {*diagram.root.ports("Inport"), *diagram.root.ports("Outport")}
     for path, system in diagram.root.walk():
         leading = sources(system, found.get(path, {}))

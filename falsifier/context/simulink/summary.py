@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockSystem, Chart, Diagram, End, Place
+from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram, End
 from falsifier.core.words import counted
 
 # What leads to each port of each block: its source and the signal's name.
@@ -21,7 +21,7 @@ def names_text(diagram: Diagram) -> str:
     return "\n".join(lines)
 
 
-def structure_text(diagram: Diagram, only: Collection[Place] | None = None) -> str:
+def structure_text(diagram: Diagram, only: Collection[BlockPath] | None = None) -> str:
     """Return the structure of a diagram: what each block is, its parameters, and what leads to it.
 
     Args:
@@ -40,7 +40,7 @@ def structure_text(diagram: Diagram, only: Collection[Place] | None = None) -> s
     return "\n".join(lines)
 
 
-def _names(path: Place, system: BlockSystem) -> Iterator[str]:
+def _names(path: BlockPath, system: BlockSystem) -> Iterator[str]:
     where = f"{'/'.join(path)}: " if path else ""
     groups = {
         "inports": system.ports("Inport"),
@@ -53,7 +53,7 @@ def _names(path: Place, system: BlockSystem) -> Iterator[str]:
             yield f"{where}{title} {', '.join(names)}"
 
 
-def _structure(path: Place, system: BlockSystem, only: Collection[Place] | None) -> Iterator[str]:
+def _structure(path: BlockPath, system: BlockSystem, only: Collection[BlockPath] | None) -> Iterator[str]:
     leading = _leading(system)
     told = [b for b in system.blocks if only is None or (*path, b.name) in only]
     if path:

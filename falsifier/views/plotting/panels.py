@@ -16,7 +16,7 @@ from falsifier.stl import Formula
 from falsifier.stl.breach import compared_sides
 from falsifier.stl.expression import Expression, unit_of
 from falsifier.stl.formula import Always, Eventually, Predicate, Until
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from falsifier.search.result import Result
 from falsifier.stl import Formula
 from falsifier.stl.formula import Always, Eventually, Until
 from falsifier.stl.margins import signed
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.axes import (
     INPUT,
     LIMIT,

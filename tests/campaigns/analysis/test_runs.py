@@ -20,7 +20,7 @@ from falsifier.record.records import (
     parse_line,
 )
 from falsifier.search.request import RunRequest
-from falsifier.stl.verdict import Verdict
+from falsifier.stl.monitor import Verdict
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import easy
 
