@@ -4,7 +4,7 @@
 
     campaign.json     what was requested, with which versions and files; written once
     runs/NAME/        one run directory per run
-    stop              exists while the campaign is being stopped; contains the reason
+    stop              exists while the campaign is being stopped, also by another process; contains the reason
     lock              held while a process works on this campaign
 """
 
@@ -23,7 +23,6 @@ from falsifier.record.sealed import locked, read_sealed, write_sealed
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"
-STOP = "stop"
 _LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5

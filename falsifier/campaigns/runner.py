@@ -6,7 +6,6 @@ from pathlib import Path
 from time import perf_counter
 
 from falsifier.campaigns.directory import (
-    STOP,
     CampaignRecord,
     campaign_lock,
     campaign_mark,
@@ -26,7 +25,7 @@ from falsifier.evaluation.workers import Workers, open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import holds_run, open_journal
+from falsifier.record.journal import STOP, holds_run, open_journal
 from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read, write
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import read_summary
@@ -176,7 +175,7 @@ def _work(
 
 
 class _Watch:
-    """Observes a running campaign, informs the listeners, and stops the campaign at its limits."""
+    """Observes a running campaign, informs the listeners, and stops it at its limits or if it is asked to."""
 
     def __init__(self, directory: Path, limits: Budget | None, listeners: tuple[Listener, ...]) -> None:
         self.follower = Follower(directory)
@@ -200,6 +199,8 @@ class _Watch:
                 self.error, reached = error, str(error)
             if reached is not None:
                 self.stop(reached)
+        if not self.reason and self._stop.exists():
+            self.reason = self._stop.read_text(encoding="utf-8").strip() or "stopped by the user"
         return not self.reason
 
     def stop(self, reason: str) -> None:

@@ -16,22 +16,20 @@ from pathlib import Path
 from shutil import rmtree
 from tempfile import gettempdir
 from threading import Lock
-from time import monotonic, time
+from time import time
 from zipfile import ZipFile
 
-from falsifier.campaigns.directory import STOP, campaign_mark, run_directory
+from falsifier.campaigns.directory import campaign_mark, run_directory
 from falsifier.core import operating_system
 from falsifier.fmu import fmu_files, with_local_files
 from falsifier.problem.problem import Problem
+from falsifier.record.journal import STOP
 from falsifier.record.manifest import Manifest
-from falsifier.record.run import carry_out
-from falsifier.search.events import Evaluated, Event
+from falsifier.record.run import StopFile, carry_out
 from falsifier.search.request import RunRequest
 
 # Time in s to wait for a run's lock: the workers of a killed campaign take a moment to end.
 _PATIENCE = 10.0
-# Minimum time in s between two checks for the stop file.
-_STOP_PERIOD = 0.2
 
 # Time in s for which a run that was sent back is kept.
 _KEPT_SECONDS = 86400.0
@@ -102,7 +100,7 @@ def run_task(task: RunTask, files: Mapping[str, bytes]) -> Done | Missing:
             [problem],
             directory,
             described=task.manifest,
-            listeners=[_StopWatch(campaign / STOP)],
+            listeners=[StopFile(campaign / STOP)],
             resume=True,
             patience=_PATIENCE,
         )
@@ -146,20 +144,6 @@ def _sweep(store: Path) -> None:
             written = max(path.stat().st_mtime for path in (directory, *directory.rglob("*")))
             if time() - written > _KEPT_SECONDS:
                 rmtree(directory, ignore_errors=True)
-
-
-class _StopWatch:
-    """Listener that interrupts a run once the campaign's stop file exists; the run can be resumed."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._looked = monotonic()
-
-    def __call__(self, event: Event) -> None:
-        if isinstance(event, Evaluated) and monotonic() - self._looked > _STOP_PERIOD:
-            self._looked = monotonic()
-            if self._path.exists():
-                raise KeyboardInterrupt
 
 
 def _with_local_fmus(problem: Problem, files: Mapping[str, bytes]) -> Problem | Missing:

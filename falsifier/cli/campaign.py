@@ -4,6 +4,7 @@ import shlex
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime
 from itertools import product
@@ -211,11 +212,21 @@ def bench(
 @click.command()
 @directory_argument
 @click.option("--once", is_flag=True, help="Print the current progress and exit.")
-def watch(*, directory: Path, once: bool) -> None:
+@click.option("--page", is_flag=True, help="Serve a page that shows it, on this machine only, until Ctrl-C.")
+@click.option("--allow-stop", is_flag=True, help="With --page: a button that stops the run, as Ctrl-C does.")
+def watch(*, directory: Path, once: bool, page: bool, allow_stop: bool) -> None:
     """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
-    This writes nothing to DIRECTORY.
+    This writes nothing to DIRECTORY, except if somebody presses the button of --allow-stop. The page of
+    --page can also be opened after the end.
     """
+    if page:
+        if once:
+            raise click.UsageError("--once and --page cannot be combined")
+        _serve(directory, allow_stop=allow_stop)
+        return
+    if allow_stop:
+        raise click.UsageError("--allow-stop requires --page")
     follower = Follower(directory)
     working = follower.is_worked_on
     if not once:
@@ -231,6 +242,16 @@ def watch(*, directory: Path, once: bool) -> None:
     say(overall_line(progress, None, stopped=not working))
     if not working and progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
+
+
+def _serve(directory: Path, *, allow_stop: bool) -> None:
+    """Serve the page until the user ends it."""
+    import asyncio
+
+    from falsifier.views.report.watch import serve
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop))
 
 
 def resume_campaign(

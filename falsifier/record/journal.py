@@ -6,6 +6,7 @@
     journal.jsonl            what happened, one JSON object per line, append-only
     trajectories/N-SUM.npz   outputs and inputs of evaluation N; Keep decides which ones are kept
     lock                     held while a process writes here
+    stop                     whoever writes it asks that process to stop, as Ctrl-C does
 
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
@@ -51,6 +52,7 @@ MANIFEST = "manifest.json"
 JOURNAL = "journal.jsonl"
 TRAJECTORIES = "trajectories"
 LOCK = "lock"
+STOP = "stop"
 
 # Maximum time in s that lines may stay in the operating system's cache before they are forced to disk;
 # replies of a language model cost money and are forced to disk at once.

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from time import perf_counter
+from time import monotonic, perf_counter
 from typing import overload
 
 from falsifier.core.arguments import instance, whole
@@ -23,11 +23,11 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_lines, holds_run, open_journal
+from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal
 from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
-from falsifier.search.events import Listener
+from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.levels import level_starts, levels_of
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
@@ -37,6 +37,9 @@ from falsifier.search.steps import Live, Steps
 
 Falsifiable = Problem | ProblemSource | str
 LLM = LLMSettings | Chat | str
+
+# Minimum time in s between two looks for a stop file.
+_STOP_PERIOD = 0.2
 
 
 @overload
@@ -243,6 +246,25 @@ def resume(
     return results
 
 
+class StopFile:
+    """Listener that interrupts a run, as Ctrl-C does, once a file exists; the run can be resumed.
+
+    Args:
+        path: the file, which any process may write.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._looked = monotonic()
+
+    def __call__(self, event: Event) -> None:
+        """Look for the file after a simulation, but not at each of very quick ones."""
+        if isinstance(event, Evaluated) and monotonic() - self._looked > _STOP_PERIOD:
+            self._looked = monotonic()
+            if self._path.exists():
+                raise KeyboardInterrupt
+
+
 def carry_out(
     request: RunRequest,
     problems: Sequence[Problem],
@@ -309,7 +331,10 @@ def carry_out(
             elif recorded.request.budget != request.budget:
                 manifest.write(directory, recorded.with_budget(request.budget))
             steps = replayed(directory, journal.records, live)
-            all_listeners = (journal, *all_listeners)  # recorded even if another listener raises
+            stop = directory / STOP
+            stop.unlink(missing_ok=True)  # of an earlier process
+            # What happens is recorded first, even if another listener raises.
+            all_listeners = (journal, StopFile(stop), *all_listeners)
         return search(
             problems,
             engines,

@@ -71,7 +71,7 @@ def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
     heading = f"{asked} {first}, {tokens} tokens, {one.question_seconds:.3g} s: {came}"
     shown = []
     for exchange in one.exchanges:
-        shown.append(_exchange(exchange, before))
+        shown.append(exchange_html(exchange, before))
         before = exchange.messages
     proposals = [el("li", el("b", f"Sample {o.index + 1}: "), _proposal(o)) for o in one.samples]
     return el("details", el("summary", heading), el("ul", *proposals), *shown, class_="exchange")
@@ -84,7 +84,7 @@ def _proposal(sample: Sample) -> Html:
     return join(f"{candidate.origin}: {in_one_line(candidate)}. ", el("b", came), why)
 
 
-def _exchange(exchange: Exchange, before: tuple[Message, ...]) -> Html:
+def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
     """One question and its reply; messages that the question before had are not repeated."""
     known = 0
     while known < min(len(before), len(exchange.messages)) and before[known] == exchange.messages[known]:

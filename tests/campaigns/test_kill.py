@@ -12,8 +12,8 @@ from typing import IO
 import pytest
 
 from falsifier.campaigns import Follower, is_worked_on, resume_campaign, run_campaign
-from falsifier.campaigns.directory import STOP
-from falsifier.campaigns.worker import _STOP_PERIOD
+from falsifier.record.journal import STOP
+from falsifier.record.run import _STOP_PERIOD
 from tests.campaigns.processes import WANTED
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.command import listen_to_interrupts

@@ -8,7 +8,7 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.analysis.runs import Run, columns, frame, load, load_run
+from falsifier.campaigns.analysis.runs import Run, columns, frame, load, load_run, run_of
 from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
 from falsifier.campaigns.analysis.tables import Table, ablation_table, llms_table, main_table
 from falsifier.campaigns.published import COLUMNS, Published, Score, read_published
@@ -29,5 +29,6 @@ __all__ = [
     "load_run",
     "main_table",
     "read_published",
+    "run_of",
     "statistics",
 ]

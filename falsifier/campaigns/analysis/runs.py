@@ -21,7 +21,7 @@ from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
-from falsifier.record.summary import RunStatus, read_summary
+from falsifier.record.summary import RunStatus, Summary, read_summary
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding
 from falsifier.stl.monitor import Verdict
@@ -175,7 +175,18 @@ def _told_apart(runs: list[Run]) -> list[Run]:
 
 
 def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
-    summary = read_summary(directory, manifest.requirement.name)
+    return run_of(directory, manifest, read_summary(directory, manifest.requirement.name), shared=shared)
+
+
+def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: bool) -> Run:
+    """Return a run whose journal has been read.
+
+    Args:
+        directory: run directory.
+        manifest: its manifest, reduced to one requirement.
+        summary: numbers of that requirement in its journal.
+        shared: whether several requirements share the search.
+    """
     method = replace(method_of(manifest.request), parameterization=manifest.parameterization, together=shared)
     return Run(
         directory=directory,

@@ -329,11 +329,23 @@ def advice(shown: Shown) -> str:
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     runs = [run for members in by_method.values() for run in members]
+    shown = [_shown(run) for run in [run for run in runs if run.falsified] or _best(runs)]
+    return section_of(name, by_method, shown)
+
+
+def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
+    """Return what is said of a requirement.
+
+    Args:
+        name: name of the requirement.
+        by_method: its runs by method.
+        shown: their counterexamples or, if there are none, the best simulation.
+    """
+    runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     heading = requirement.formula if runs[0].is_ad_hoc else name
     if heading != name and name != requirement.name:
         heading = f"{name}: {heading}"
-    shown = [_shown(run) for run in [run for run in runs if run.falsified] or _best(runs)]
     return Section(
         name,
         heading,
@@ -352,11 +364,22 @@ def _best(runs: Iterable[Run]) -> list[Run]:
 def _shown(run: Run) -> Shown:
     if (shrunk := _shrunk(run)) is not None:
         return _drawn(run, *shrunk, is_shrunk=True)
-    index = run.counterexample if run.counterexample is not None else run.best
+    index = shown_index(run)
     assert index is not None
-    candidate = recorded_candidates(read_journal(run.directory))[index]
-    trajectory = recorded_trajectory(run.directory, run.trajectories.get(index))
-    is_lost = trajectory is None and index in run.trajectories
+    return shown_of(run, recorded_candidates(read_journal(run.directory))[index])
+
+
+def shown_index(run: Run) -> int | None:
+    """Return the index of the counterexample, otherwise of the best evaluation; None if there is none."""
+    return run.best if run.counterexample is None else run.counterexample
+
+
+def shown_of(run: Run, candidate: Candidate) -> Shown:
+    """Return a run's counterexample or best simulation, given its candidate."""
+    index = shown_index(run)
+    name = None if index is None else run.trajectories.get(index)
+    trajectory = recorded_trajectory(run.directory, name)
+    is_lost = trajectory is None and name is not None
     return _drawn(run, candidate, trajectory, run.verdict, run.reason, is_lost=is_lost)
 
 

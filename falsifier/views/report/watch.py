@@ -1,0 +1,300 @@
+"""A page that follows a run or campaign while it goes on, or shows it after its end; from the journals alone.
+
+::
+
+    asyncio.run(serve(Path("runs/nightly"), announce=print))
+
+The page is served on this machine only. It asks for its content again and again; each answer reads on in the
+journals for a moment only, so that the page of a long run opens at once and completes itself.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from hashlib import sha256
+from importlib.resources import files
+from pathlib import Path
+from secrets import compare_digest, token_urlsafe
+from time import monotonic
+from typing import TYPE_CHECKING, Any
+
+from falsifier.analyses.coverage import coverage_of
+from falsifier.campaigns.analysis import Run, run_of
+from falsifier.campaigns.directory import is_campaign, is_worked_on, run_directories
+from falsifier.campaigns.progress import Follower, RunProgress
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
+from falsifier.llm.messages import Exchange
+from falsifier.record import manifest as manifests
+from falsifier.record.journal import STOP, JournalReader
+from falsifier.record.manifest import Manifest
+from falsifier.record.records import AskedRecord, ExchangeRecord
+from falsifier.record.summary import Summary
+from falsifier.stl.margins import signed
+from falsifier.views.campaign_progress import overall_line
+from falsifier.views.exchanges import exchange_html
+from falsifier.views.html import Html, el, join, table
+from falsifier.views.report.content import section_of, shown_index, shown_of
+from falsifier.views.report.page import card_html, document, drawn, facts_html
+from falsifier.views.text import Fact, llm_use, seconds_text
+
+if TYPE_CHECKING:
+    from aiohttp.web import Application, Request, Response, StreamResponse
+
+# Time in s that one answer may spend on reading: a journal of 100,000 evaluations takes some ten.
+_READING = 0.7
+# Maximum number of candidates kept of a run, evenly spaced, to show what was tried.
+_MOST_KEPT = 300
+# Maximum number of rows of a campaign's table; running ones first.
+_MOST_RUNS = 200
+
+
+@dataclass(slots=True)
+class _Watched:
+    """One run directory, and what was read of it so far."""
+
+    directory: Path
+    described: Manifest
+    reader: JournalReader = field(init=False)
+    summaries: dict[str, Summary] = field(init=False)
+    candidates: dict[int, dict[str, Any]] = field(init=False)
+    exchange: Exchange | None = None
+    is_behind: bool = False
+    _every: int = 1
+
+    def __post_init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        self.reader = JournalReader(self.directory)
+        self.summaries = {name: Summary(name) for name in self.described.names}
+        self.candidates = {}
+
+    def read(self, until: float) -> None:
+        """Read on until there is nothing new, or the clock (in s) says that it is enough."""
+        if self.reader.shrank:
+            self._begin()
+        self.is_behind = False
+        for record in self.reader.new():
+            for summary in self.summaries.values():
+                summary.add(record)
+            if isinstance(record, AskedRecord):
+                self.candidates |= dict(enumerate(record.candidates, start=record.first))
+                self._thin()
+            elif isinstance(record, ExchangeRecord):
+                self.exchange = Exchange.model_validate(record.exchange)
+            if monotonic() > until:
+                self.is_behind = True
+                return
+
+    def _thin(self) -> None:
+        """Keep the candidates that are still to be simulated or to be shown, and of the others every n-th."""
+        if len(self.candidates) <= 2 * _MOST_KEPT:
+            return
+        self._every *= 2
+        needed = {
+            s.counterexample if s.counterexample is not None else s.best for s in self.summaries.values()
+        }
+        first = max(self.candidates) - _MOST_KEPT // 2
+        self.candidates = {
+            index: candidate
+            for index, candidate in self.candidates.items()
+            if index % self._every == 0 or index in needed or index > first
+        }
+
+    def runs(self) -> Iterator[Run]:
+        """Yield its runs, one per requirement."""
+        shared = self.described.shared
+        for name, summary in self.summaries.items():
+            yield run_of(self.directory, self.described.of(name), summary, shared=shared)
+
+
+class Watch:
+    """What the page of a directory shows; each look reads on.
+
+    Args:
+        directory: a run, a campaign, or a folder of runs.
+        token: what a stop must name; empty: the page has no button for it.
+
+    Raises:
+        JournalError: if the directory is none of these, or a file in it is invalid.
+    """
+
+    def __init__(self, directory: Path, token: str = "") -> None:
+        self.directory = directory
+        self.token = token
+        self._watched: dict[Path, _Watched] = {}
+        run_directories(directory)  # raises if there is nothing to watch
+        self._follower = Follower(directory) if is_campaign(directory) else None
+
+    def look(self, chosen: str = "") -> tuple[str, bool]:
+        """Return the content of the page, and whether more is to be read.
+
+        Args:
+            chosen: name of the folder of a run; without one, the first that is running.
+        """
+        places = {place.name: place for place in run_directories(self.directory)}
+        parts, rows = [], list[RunProgress]()
+        if self._follower is not None:
+            rows = list(self._follower.look().runs)
+            working = is_worked_on(self.directory)
+            parts.append(
+                el("p", overall_line(self._follower.look(), None, stopped=not working), class_="result")
+            )
+        if chosen not in places:
+            running = [run.name for run in rows if run.status == "running" and run.name in places]
+            chosen = next(iter([*running, *places]), "")
+        if len(places) > 1 or rows:
+            parts.append(_choice(places, rows, chosen))
+        behind = False
+        if chosen:
+            place = places[chosen]
+            if place not in self._watched:
+                self._watched = {place: _Watched(place, manifests.read(place))}  # one at a time is in memory
+            watched = self._watched[place]
+            watched.read(monotonic() + _READING)
+            behind = watched.is_behind
+            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.runs())]
+        return join(*parts), behind
+
+    def stop(self) -> None:
+        """Ask the process that works here to stop as after Ctrl-C: it looks for this file."""
+        (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
+
+    def _state(self, watched: _Watched) -> Html:
+        working = is_worked_on(self.directory) or is_worked_on(watched.directory)
+        text = (
+            "reading the journal" if watched.is_behind else "running" if working else "no process works here"
+        )
+        button = (
+            el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
+        )
+        return el("p", f"{watched.directory.name}: {text}. ", button, class_="result", id="state")
+
+
+def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
+    """The runs to choose from; of a campaign with what came of them so far."""
+    if not rows:
+        links = [el("li", el("a", name, href=f"?run={name}")) for name in places]
+        return el("nav", el("ul", *links), aria_label="Runs")
+    order = sorted(rows, key=lambda run: (run.status != "running", run.finished))
+    cells = [
+        (
+            el("a", run.requirement, href=f"?run={run.name}") if run.name in places else run.requirement,
+            f"{run.method.label}, seed {run.seed}",
+            f"{run.status}{' (shown below)' if run.name == chosen else ''}",
+            run.spent.simulations_text,
+            "" if run.best is None else signed(run.best, 4),
+        )
+        for run in order[:_MOST_RUNS]
+    ]
+    header = ("requirement", "run", "status", "simulations", "best robustness")
+    return el(
+        "details",
+        el("summary", f"All {counted(len(rows), 'run')}"),
+        table(header, cells, label="Runs"),
+        open="",
+    )
+
+
+def _run_html(run: Run, watched: _Watched) -> Html:
+    """One requirement of a run: the card of the report, then how the search goes."""
+    from falsifier.views.plotting import plot_coverage, plot_history
+
+    index = shown_index(run)
+    best = watched.candidates.get(-1 if index is None else index)
+    shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
+    tried = [
+        (Candidate.from_json(candidate), None)
+        for i, candidate in sorted(watched.candidates.items())
+        if i < len(run.robustness)
+    ]
+    history = drawn(partial(plot_history, run), "Robustness over simulations")
+    covered = drawn(lambda: plot_coverage(coverage_of(watched.described, tried)), "What was tried")
+    facts: list[Fact] = [("time", seconds_text(run.spent))]
+    facts += [("language model", llm_use(run.spent))] if run.spent.calls else []
+    of = "" if len(tried) == len(run.robustness) else f" ({len(tried)} of {len(run.robustness)} simulations)"
+    asked = watched.exchange
+    more = [
+        join(el("h3", "Robustness over simulations"), history),
+        join(el("h3", f"What was tried{of}"), covered) if tried else Html(""),
+        join(el("h3", "What it costs"), facts_html(facts)),
+        join(el("h3", "The last question to the language model, and its answer"), exchange_html(asked))
+        if asked
+        else Html(""),
+    ]
+    return card_html(section_of(run.requirement, {run.method.label: [run]}, shown), more=more)
+
+
+def page(title: str) -> str:
+    """Return the page, whose script fetches its content."""
+    script = files("falsifier.views.report").joinpath("watch.js").read_text(encoding="utf-8")
+    header = el("header", el("h1", title))
+    return document(f"falsifier: {title}", header, el("main", "Reading ...", id="live"), script=script)
+
+
+def application(watch: Watch) -> "Application":
+    """Return the pages as an application of aiohttp."""
+    from aiohttp import web
+
+    name = watch.directory.resolve().name
+    lock = asyncio.Lock()
+
+    @web.middleware
+    async def from_here(request: "Request", handler: Callable[["Request"], Any]) -> "StreamResponse":
+        # Another page in the same browser may reach this port under a name of its own.
+        if request.host.partition(":")[0] not in ("127.0.0.1", "localhost"):
+            raise web.HTTPForbidden(text="this page is served to 127.0.0.1 only")
+        answer: StreamResponse = await handler(request)
+        return answer
+
+    async def whole(_: "Request") -> "Response":
+        return web.Response(text=page(name), content_type="text/html")
+
+    async def live(request: "Request") -> "StreamResponse":
+        async with lock:  # figures are drawn one at a time, beside the loop that answers
+            text, behind = await asyncio.to_thread(watch.look, request.query.get("run", ""))
+        tag = sha256(text.encode()).hexdigest()
+        headers = {"ETag": tag, "Cache-Control": "no-store"} | ({"X-Unread": "1"} if behind else {})
+        if request.headers.get("If-None-Match") == tag:
+            return web.Response(status=304, headers=headers)
+        return web.Response(text=text, content_type="text/html", headers=headers)
+
+    async def stop(request: "Request") -> "Response":
+        if not watch.token or not compare_digest(request.headers.get("X-Token", ""), watch.token):
+            raise web.HTTPForbidden(text="stopping was not allowed: falsifier watch --page --allow-stop")
+        watch.stop()
+        return web.Response(text="stopping")
+
+    made = web.Application(middlewares=[from_here])
+    made.router.add_get("/", whole)
+    made.router.add_get("/live", live)
+    made.router.add_post("/stop", stop)
+    return made
+
+
+async def serve(directory: Path, *, announce: Callable[[str], None], allow_stop: bool = False) -> None:
+    """Serve the page of a directory on 127.0.0.1 until this is cancelled.
+
+    Args:
+        directory: a run, a campaign, or a folder of runs.
+        announce: called with the page's address, which has a free port.
+        allow_stop: whether the page has a button that stops the run or campaign.
+
+    Raises:
+        JournalError: if the directory is none of these, or a file in it is invalid.
+    """
+    from aiohttp import web
+
+    runner = web.AppRunner(
+        application(Watch(directory, token_urlsafe() if allow_stop else "")), access_log=None
+    )
+    await runner.setup()
+    try:
+        site = web.TCPSite(runner, "127.0.0.1", 0)
+        await site.start()
+        announce(f"http://127.0.0.1:{runner.addresses[0][1]}/")
+        await asyncio.Event().wait()
+    finally:
+        await runner.cleanup()
