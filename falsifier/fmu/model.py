@@ -171,7 +171,7 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 @lru_cache(maxsize=64)
 def _order(model: FmuModel) -> FmuOrder:
     description = describe(model.path, model.sha256)
-    return FmuOrder(
+    return FmuOrder.of(
         model.path,
         model.sha256,
         description,

@@ -3,7 +3,7 @@
 from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Request, Where
 from falsifier.fmu.process.folders import WorkFolder
-from falsifier.fmu.process.order import FmuOrder, is_held, library_of, value_checks
+from falsifier.fmu.process.order import FmuOrder, Order, is_held, library_of, value_checks
 from falsifier.fmu.process.patience import watching
 from falsifier.fmu.process.plan import Plan, Task, make_plan, make_task, room_for, run_task, solver_tolerance
 from falsifier.fmu.process.policy import Policy, resolved
@@ -14,6 +14,7 @@ from falsifier.fmu.process.shared import Room
 __all__ = [
     "REGISTRY",
     "FmuOrder",
+    "Order",
     "Plan",
     "Policy",
     "Reply",

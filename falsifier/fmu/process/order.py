@@ -1,10 +1,10 @@
 """What a worker is to simulate: one FMU here, or a system of several elsewhere."""
 
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,116 +19,96 @@ from falsifier.fmu.process.plan import Plan, solver_tolerance
 from falsifier.fmu.process.policy import Policy
 from falsifier.fmu.process.shared import Room
 
+_DEFAULT = Policy()
 
-class Order(Protocol):
-    """What a new worker needs to know, and how its replies are to be understood."""
 
-    @property
-    def name(self) -> str:
-        """Name of the model, for errors."""
-        ...
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Order(ABC):
+    """What a new worker needs to know, and how its replies are to be understood.
 
-    @property
-    def path(self) -> Path:
-        """The file, for errors; the name of a system."""
-        ...
+    Attributes:
+        name: name of the model, for errors.
+        path: the file, for errors; the name of a system.
+        key: what tells models apart that cannot share a process.
+        archives: FMUs to unpack and their hashes, by the folder that each is unpacked to; "" for the top.
+        kind: the request with what ``load`` returns.
+        logging: whether to ask the FMUs for messages.
+        through_wine: whether to simulate the library for Windows.
+        policy: what the FMUs may do.
+    """
 
-    @property
-    def key(self) -> Hashable:
-        """What tells models apart that cannot share a process."""
-        ...
+    name: str
+    path: Path
+    key: Hashable
+    archives: Mapping[str, tuple[Path, str]]
+    kind: Request
+    logging: bool
+    policy: Policy
+    through_wine: bool = False
 
-    @property
-    def archives(self) -> Mapping[str, tuple[Path, str]]:
-        """FMUs to unpack and their hashes, by the folder that each is unpacked to; "" for the top."""
-        ...
-
-    @property
-    def through_wine(self) -> bool:
-        """Whether to simulate the library for Windows."""
-        ...
-
-    @property
-    def policy(self) -> Policy:
-        """What the FMUs may do."""
-        ...
-
-    @property
-    def logging(self) -> bool:
-        """Whether to ask the FMU for messages."""
-        ...
-
-    @property
-    def kind(self) -> Request:
-        """The request with what ``load`` returns."""
-        ...
-
+    @abstractmethod
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """Return the request to load what was unpacked to a folder.
 
         Raises:
             ModelError: if there is no library for this machine.
         """
-        ...
 
+    @abstractmethod
     def prepare(self, plan: Plan) -> bytes:
         """Return the request to prepare for a plan's simulations."""
-        ...
 
+    @abstractmethod
     def checks(self, plan: Plan) -> Callable[[Room], None]:
         """Return what raises a SimulationError if a value in a room does not fit its variable's type."""
-        ...
 
     def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
         """Return the error for the reply to a simulation that failed; see ``outcome.failure``."""
-        ...
+        return outcome.failure(self.name, plan, reply, refusals, log)
 
     def component(self, position: int) -> str:
         """Return the name of the component at a position that a worker tells; empty for a single FMU."""
-        ...
+        del position
+        return ""
 
 
-@dataclass(frozen=True, slots=True)
-class FmuOrder:
-    """One FMU to simulate; see Order.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FmuOrder(Order):
+    """One FMU to simulate.
 
     Attributes:
-        path: path of the FMU.
-        sha256: hash of the file when the model was loaded.
         description: its description.
         interface: interface to simulate with.
-        logging: whether to ask it for messages.
-        through_wine: whether to simulate the library for Windows.
-        policy: what it may do.
     """
 
-    path: Path
-    sha256: str
     description: Description
     interface: Interface
-    logging: bool = False
-    through_wine: bool = False
-    policy: Policy = field(default_factory=Policy)
 
-    @property
-    def name(self) -> str:
-        """See Order."""
-        return self.description.info.name
-
-    @property
-    def key(self) -> Hashable:
-        """See Order."""
-        return self.sha256, self.interface, self.logging, self.through_wine, self.policy
-
-    @property
-    def archives(self) -> Mapping[str, tuple[Path, str]]:
-        """See Order."""
-        return {"": (self.path, self.sha256)}
-
-    @property
-    def kind(self) -> Request:
-        """See Order."""
-        return Request.LOAD
+    @classmethod
+    def of(
+        cls,
+        path: Path,
+        sha256: str,
+        description: Description,
+        interface: Interface,
+        *,
+        logging: bool = False,
+        through_wine: bool = False,
+        policy: Policy = _DEFAULT,
+    ) -> "FmuOrder":
+        """Return the order for an FMU whose file had this hash when the model was loaded."""
+        return cls(
+            name=description.info.name,
+            path=path,
+            key=(sha256, interface, logging, through_wine, policy),
+            archives={"": (path, sha256)},
+            kind=Request.LOAD,
+            logging=logging,
+            policy=policy,
+            through_wine=through_wine,
+            description=description,
+            interface=interface,
+        )
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
@@ -160,15 +140,6 @@ class FmuOrder:
         """See Order."""
         rows = [list(zip(names, range(len(names)), strict=True)) for names in (plan.parameters, plan.inputs)]
         return value_checks(plan, [(self.description, rows[0], rows[1])])
-
-    def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
-        """See Order."""
-        return outcome.failure(self.name, plan, reply, refusals, log)
-
-    def component(self, position: int) -> str:
-        """See Order."""
-        del position
-        return ""
 
     def _rows(self, plan: Plan) -> tuple[list[int], list[int]]:
         """Return the rows of the inputs that may change only at events, and those of the others."""

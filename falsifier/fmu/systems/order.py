@@ -3,12 +3,13 @@
 ``falsifier/fmu/worker/system_request.c`` is the other side. Components come in the order in which they step.
 """
 
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from falsifier.errors import FalsifierError, SimulationError
 from falsifier.fmu.process import (
+    Order,
     Plan,
     Policy,
     Reply,
@@ -28,51 +29,29 @@ from falsifier.fmu.systems.network import SYSTEM, Member, Network, Place
 Row = tuple[str, int]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class SystemOrder:
-    """A system to simulate; see Order.
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SystemOrder(Order):
+    """A system to simulate.
 
     Attributes:
         network: the system.
-        system: hash of everything that determines its trajectories.
-        logging: whether to ask the FMUs for messages.
-        policy: what they may do.
     """
 
     network: Network
-    system: str
-    logging: bool = False
-    policy: Policy = field(default_factory=Policy)
 
-    @property
-    def name(self) -> str:
-        """See Order."""
-        return self.network.name
-
-    @property
-    def path(self) -> Path:
-        """See Order."""
-        return Path(self.network.name)
-
-    @property
-    def key(self) -> Hashable:
-        """See Order."""
-        return self.system, self.logging, self.policy
-
-    @property
-    def archives(self) -> Mapping[str, tuple[Path, str]]:
-        """See Order."""
-        return {m.folder: (m.path, m.sha256) for m in self.network.members}
-
-    @property
-    def through_wine(self) -> bool:
-        """See Order."""
-        return False
-
-    @property
-    def kind(self) -> Request:
-        """See Order."""
-        return Request.LOAD_SYSTEM
+    @classmethod
+    def of(cls, network: Network, system: str, *, logging: bool, policy: Policy) -> "SystemOrder":
+        """Return the order for a system; its hash stands for all that determines its trajectories."""
+        return cls(
+            name=network.name,
+            path=Path(network.name),
+            key=(system, logging, policy),
+            archives={m.folder: (m.path, m.sha256) for m in network.members},
+            kind=Request.LOAD_SYSTEM,
+            logging=logging,
+            policy=policy,
+            network=network,
+        )
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""

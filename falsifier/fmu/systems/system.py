@@ -216,7 +216,7 @@ def _key(system: System) -> str:
 @lru_cache(maxsize=64)
 def _order(system: System) -> SystemOrder:
     policy = Policy.of(system.allow, system.deny)
-    return SystemOrder(system.network, system.key, logging=system.logging, policy=policy)
+    return SystemOrder.of(system.network, system.key, logging=system.logging, policy=policy)
 
 
 @lru_cache(maxsize=32)

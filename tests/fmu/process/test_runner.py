@@ -186,7 +186,7 @@ except KeyboardInterrupt:
 
 def orders(number: int) -> list[FmuOrder]:
     description = read_description(fixtures.path("Lag_2"))
-    return [FmuOrder(Path("Lag"), f"{k:064d}", description, "co-simulation") for k in range(number)]
+    return [FmuOrder.of(Path("Lag"), f"{k:064d}", description, "co-simulation") for k in range(number)]
 
 
 @pytest.fixture

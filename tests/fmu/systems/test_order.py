@@ -5,13 +5,13 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Coupling
-from falsifier.fmu.process import Reply, Where
+from falsifier.fmu.process import Policy, Reply, Where
 from falsifier.fmu.process.plan import make_plan
 from falsifier.fmu.systems.order import SystemOrder
 from tests.fmu.small_systems import LOOP, system
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
-ORDER = SystemOrder(MODEL.network, MODEL.key)
+ORDER = SystemOrder.of(MODEL.network, MODEL.key, logging=False, policy=Policy())
 STRINGS = (("table.fileName", "a.txt"),)
 PLAN = make_plan(
     MODEL.network.description, Experiment(1.0, 0.1, ("plant.y",), strings=STRINGS), (), (), pieces=1
