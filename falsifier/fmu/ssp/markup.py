@@ -4,14 +4,16 @@ FMPy's reader is not used: it resolves entities, ignores transformations of conn
 another namespace), default experiments and inline mappings, and reads packages only, not ``.ssd`` files.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite
+from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
 from falsifier.fmu.description import Unit, read_units, read_xml
 
+T = TypeVar("T")
 _NAMESPACE = "{http://ssp-standard.org/SSP"
 _VALUE_TAGS = ("Boolean", "String", "Enumeration", "Real", "Integer", "Float64", "Float32", *(
     f"{u}Int{b}" for u in ("", "U") for b in (8, 16, 32, 64)
@@ -107,59 +109,46 @@ def parse_structure(text: bytes, shown: str) -> Structure:
     Raises:
         SpecError: naming the file and what is wrong.
     """
-    root = _root(text, "SystemStructureDescription", shown)
-    version = root.get("version", "")
-    if version[:1] not in ("1", "2"):
-        raise SpecError(f"{shown}: SSP version {version!r}; export it as SSP 1.0 or 2.0")
-    try:
-        system = root.find("{*}System")
-        if system is None:
-            raise ValueError("it has no System")
-        experiment = root.find("{*}DefaultExperiment")
-        times = experiment if experiment is not None else Element("none")
-        return Structure(
-            _part(system),
-            read_units(root, tag="{*}Units/{*}Unit"),
-            _time(times.get("startTime")),
-            _time(times.get("stopTime")),
-        )
-    except (KeyError, ValueError) as error:
-        raise SpecError(f"{shown}: {_said(error)}") from None
+    return _parsed(text, shown, "SystemStructureDescription", _structure)
 
 
 def parse_values(text: bytes, shown: str) -> tuple[Value, ...]:
-    """Return the content of an ``.ssv`` file.
-
-    Raises:
-        SpecError: naming the file and what is wrong.
-    """
-    try:
-        return tuple(_values(_root(text, "ParameterSet", shown)))
-    except (KeyError, ValueError) as error:
-        raise SpecError(f"{shown}: {_said(error)}") from None
+    """Return the content of an ``.ssv`` file; errors as for ``parse_structure``."""
+    return _parsed(text, shown, "ParameterSet", lambda root: tuple(_values(root)))
 
 
 def parse_mappings(text: bytes, shown: str) -> tuple[Mapping, ...]:
-    """Return the content of an ``.ssm`` file.
-
-    Raises:
-        SpecError: naming the file and what is wrong.
-    """
-    try:
-        return tuple(_mappings(_root(text, "ParameterMapping", shown)))
-    except (KeyError, ValueError) as error:
-        raise SpecError(f"{shown}: {_said(error)}") from None
+    """Return the content of an ``.ssm`` file; errors as for ``parse_structure``."""
+    return _parsed(text, shown, "ParameterMapping", lambda root: tuple(_mappings(root)))
 
 
-def _said(error: Exception) -> str:
-    return f"the attribute {error} is missing" if isinstance(error, KeyError) else str(error)
-
-
-def _root(text: bytes, expected: str, shown: str) -> Element:
+def _parsed(text: bytes, shown: str, expected: str, read: Callable[[Element], T]) -> T:
     root = read_xml(text, shown, SpecError)
     if not root.tag.startswith(_NAMESPACE) or root.tag.rpartition("}")[2] != expected:
         raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
-    return root
+    try:
+        return read(root)
+    except KeyError as error:
+        raise SpecError(f"{shown}: the attribute {error} is missing") from None
+    except ValueError as error:
+        raise SpecError(f"{shown}: {error}") from None
+
+
+def _structure(root: Element) -> Structure:
+    version = root.get("version", "")
+    if version[:1] not in ("1", "2"):
+        raise ValueError(f"SSP version {version!r}; export it as SSP 1.0 or 2.0")
+    system = root.find("{*}System")
+    if system is None:
+        raise ValueError("it has no System")
+    experiment = root.find("{*}DefaultExperiment")
+    times = experiment if experiment is not None else Element("none")
+    return Structure(
+        _part(system),
+        read_units(root, tag="{*}Units/{*}Unit"),
+        _time(times.get("startTime")),
+        _time(times.get("stopTime")),
+    )
 
 
 def _part(element: Element) -> Part:
