@@ -98,7 +98,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         what = _KINDS.get(path.suffix.lower(), "FMU")
         raise ModelError(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
     with archive:
-        _check(path, archive.infolist())
+        for fault in _faults(archive.infolist()):
+            raise ModelError(f"{path}: {fault}")
         yield archive
 
 
@@ -185,76 +186,64 @@ def library_file(fmi_version: str, identifier: str, platform: str = "") -> PureP
     return PurePosixPath("binaries", binary_folder(fmi_version, platform), identifier + suffix)
 
 
-def _check(path: Path, entries: list[zipfile.ZipInfo]) -> None:
+def _faults(entries: list[zipfile.ZipInfo]) -> Iterator[str]:
+    """Yield why an archive with these entries is not opened."""
     if len(entries) > _MAX_FILES:
-        raise ModelError(
-            f"{path}: rejected because it contains {len(entries)} files; at most {_MAX_FILES} are allowed"
-        )
+        yield f"rejected because it contains {len(entries)} files; at most {_MAX_FILES} are allowed"
     total = sum(entry.file_size for entry in entries)
     if total > _MAX_BYTES:
-        raise ModelError(
-            f"{path}: rejected because it would unpack to {total / 2**30:.1f} GiB; at most "
+        yield (
+            f"rejected because it would unpack to {total / 2**30:.1f} GiB; at most "
             f"{_MAX_BYTES >> 30} GiB are allowed"
         )
     # Some tools list folders several times, which does no harm.
     files = Counter(entry.filename for entry in entries if not entry.is_dir())
-    for name, count in files.items():
-        if count > 1:
-            raise ModelError(f"{path}: rejected because it contains {name!r} {count} times")
+    yield from (f"rejected because it contains {name!r} {n} times" for name, n in files.items() if n > 1)
     for entry in entries:
-        _check_name(path, entry)
-        _check_entry(path, entry)
+        yield from _faults_of_name(entry)
+        yield from _faults_of_content(entry)
     folders = {str(folder) for entry in entries for folder in PurePosixPath(entry.filename).parents}
     folders |= {entry.filename.rstrip("/") for entry in entries if entry.is_dir()}
     for name in sorted(folders & files.keys()):
-        raise ModelError(f"{path}: rejected because its entry {name!r} is both a file and a folder")
+        yield f"rejected because its entry {name!r} is both a file and a folder"
 
 
-def _check_name(path: Path, entry: zipfile.ZipInfo) -> None:
+def _faults_of_name(entry: zipfile.ZipInfo) -> Iterator[str]:
     # zipfile truncates names at NUL and converts backslashes on Windows only: check the name as it was
     # written.
     written = entry.orig_filename.replace("\\", "/")
-    if (
-        written.startswith("/")
-        or ":" in written.split("/")[0]
-        or ".." in written.split("/")
-        or "\0" in written
-    ):
-        raise ModelError(
-            f"{path}: rejected because its entry {entry.orig_filename!r} would be written outside the folder "
-            "that it is unpacked to"
+    parts = written.split("/")
+    if written.startswith("/") or ":" in parts[0] or ".." in parts or "\0" in written:
+        yield (
+            f"rejected because its entry {entry.orig_filename!r} would be written outside the folder that it "
+            "is unpacked to"
         )
     if any(ord(character) < 32 or ord(character) == 127 for character in written):
-        raise ModelError(
-            f"{path}: rejected because its entry {written!r} has a control character in its name"
-        )
-    longest = max(len(part.encode("utf-8", "replace")) for part in written.split("/"))
+        yield f"rejected because its entry {written!r} has a control character in its name"
+    longest = max(len(part.encode("utf-8", "replace")) for part in parts)
     if longest > _MAX_NAME_BYTES or len(written.encode("utf-8", "replace")) > _MAX_PATH_BYTES:
-        raise ModelError(
-            f"{path}: rejected because its entry {written[:60]!r}... has too long a name for file "
-            f"systems (at most {_MAX_NAME_BYTES} bytes per name, {_MAX_PATH_BYTES} per path)"
+        yield (
+            f"rejected because its entry {written[:60]!r}... has too long a name for file systems (at most "
+            f"{_MAX_NAME_BYTES} bytes per name, {_MAX_PATH_BYTES} per path)"
         )
 
 
-def _check_entry(path: Path, entry: zipfile.ZipInfo) -> None:
-    mode = entry.external_attr >> 16
+def _faults_of_content(entry: zipfile.ZipInfo) -> Iterator[str]:
+    name, mode, packed = entry.filename, entry.external_attr >> 16, entry.compress_size
     kind = _FORBIDDEN_KINDS.get(stat.S_IFMT(mode))
     if kind is not None:
-        raise ModelError(f"{path}: rejected because its entry {entry.filename!r} is a {kind}")
+        yield f"rejected because its entry {name!r} is a {kind}"
     if mode & (stat.S_ISUID | stat.S_ISGID):
-        raise ModelError(
-            f"{path}: rejected because its entry {entry.filename!r} asks for its owner's rights (setuid)"
-        )
+        yield f"rejected because its entry {name!r} asks for its owner's rights (setuid)"
     if entry.flag_bits & 0x1:
-        raise ModelError(f"{path}: its entry {entry.filename!r} is encrypted; save it without a password")
-    dense = entry.file_size > _MAX_COMPRESSION * max(entry.compress_size, 1)
-    if dense and entry.file_size > _DENSE_FROM_BYTES:
-        raise ModelError(
-            f"{path}: rejected because its entry {entry.filename!r} grows from {entry.compress_size} to "
-            f"{entry.file_size} bytes, like a zip bomb"
+        yield f"its entry {name!r} is encrypted; save it without a password"
+    if entry.file_size > max(_MAX_COMPRESSION * max(packed, 1), _DENSE_FROM_BYTES):
+        yield (
+            f"rejected because its entry {name!r} grows from {packed} to {entry.file_size} bytes, like a zip "
+            "bomb"
         )
-    if entry.compress_size > _MAX_EXPANSION * entry.file_size + _MAX_OVERHEAD:
-        raise ModelError(
-            f"{path}: rejected because its entry {entry.filename!r} declares {entry.file_size} bytes, but "
-            f"{entry.compress_size} are stored; export the model again"
+    if packed > _MAX_EXPANSION * entry.file_size + _MAX_OVERHEAD:
+        yield (
+            f"rejected because its entry {name!r} declares {entry.file_size} bytes, but {packed} are stored; "
+            "export the model again"
         )
