@@ -1,4 +1,8 @@
-"""The command-line reference, made from the commands themselves: ``<!-- commands -->`` on a page."""
+"""The command-line reference, made from the commands themselves.
+
+``<!-- command list -->`` on a page becomes a list of all commands and one of all options,
+``<!-- commands -->`` a section per command.
+"""
 
 from collections.abc import Iterator
 from inspect import cleandoc
@@ -7,37 +11,79 @@ from typing import Any
 import click
 
 from falsifier.cli import cli
+from falsifier.cli.options import OPTION_GROUPS, option_groups
 
-_MARK = "<!-- commands -->"
+_LIST, _MARK = "<!-- command list -->", "<!-- commands -->"
 _UNWRAPPED = "\b\n"
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Replace the mark of a page by all commands."""
+    """Replace the marks of a page by all commands."""
     if _MARK not in markdown:
         return markdown
-    root = click.Context(cli, info_name="falsifier")
-    return markdown.replace(_MARK, "\n\n".join(_described(root)))
+    contexts = list(_commands(click.Context(cli, info_name="falsifier")))
+    sections = "\n\n".join(part for context in contexts for part in _described(context))
+    return markdown.replace(_LIST, _listed(contexts)).replace(_MARK, sections)
 
 
-def _described(context: click.Context) -> Iterator[str]:
-    """Parts of the page, one command after the other; groups are described by their commands."""
+def _commands(context: click.Context) -> Iterator[click.Context]:
+    """Contexts of all commands below one, those of groups after another."""
     group = context.command
     assert isinstance(group, click.Group)
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         assert command is not None, f"{name} is listed and cannot be had"
         below = click.Context(command, info_name=name, parent=context)
-        if isinstance(command, click.Group):
-            yield from _described(below)
-            continue
-        yield f"## {below.command_path.removeprefix('falsifier ')}"
-        yield f"```\n{below.command_path} {' '.join(command.collect_usage_pieces(below))}\n```"
-        yield from _paragraphs(command.help or "")
-        options = [p for p in command.params if isinstance(p, click.Option)]
-        records = [record for p in options if (record := p.get_help_record(below))]
-        rows = [f"| `{names}` | {_cell(text)} |" for names, text in records]
-        yield "\n".join(["| option | meaning |", "| --- | --- |", *rows]) if rows else "No options."
+        yield from _commands(below) if isinstance(command, click.Group) else (below,)
+
+
+def _name(context: click.Context) -> str:
+    return context.command_path.removeprefix("falsifier ")
+
+
+def _listed(contexts: list[click.Context]) -> str:
+    """A table of the commands, and one of the options by heading."""
+    rows = [
+        f"| [`{_name(c)}`](#{_name(c).replace(' ', '-')}) | {c.command.get_short_help_str(200)} |"
+        for c in contexts
+    ]
+    users: dict[str, list[str]] = {}
+    for context in contexts:
+        for parameter in context.command.params:
+            if isinstance(parameter, click.Option):
+                users.setdefault(parameter.opts[-1], []).append(_name(context))
+    grouped = {name for names in OPTION_GROUPS.values() for name in names}
+    own = sorted(users.keys() - grouped)
+    headings = {**OPTION_GROUPS, "Of single commands": own}
+    options = [
+        f"| {heading} | {', '.join(f'`{name}`' for name in names if name in users)} |"
+        for heading, names in headings.items()
+    ]
+    return "\n".join(
+        [
+            "| command | does |",
+            "| --- | --- |",
+            *rows,
+            "",
+            f"{len(users)} options; each means the same in every command that has it.",
+            "",
+            "| heading | options |",
+            "| --- | --- |",
+            *options,
+        ]
+    )
+
+
+def _described(context: click.Context) -> Iterator[str]:
+    """Parts of the page about one command."""
+    command = context.command
+    yield f"## {_name(context)}"
+    yield f"```\n{context.command_path} {' '.join(command.collect_usage_pieces(context))}\n```"
+    yield from _paragraphs(command.help or "")
+    for heading, records in option_groups(command, context):
+        rows = [f"| `{names}` | {_cell(text)} |" for names, text in records if "--help" not in names]
+        if rows:
+            yield "\n".join([f"| {heading.lower()} | meaning |", "| --- | --- |", *rows])
 
 
 def _paragraphs(text: str) -> Iterator[str]:

@@ -34,12 +34,15 @@ class Ceiling:
         if self.limit < inf:
             return f"{asked}; the cost is limited to {self.limit:.4g} US dollars"
         if self.cost is None:
-            return f"{asked}; the price is unknown (--price), so the cost is too: --total-tokens limits it"
+            return (
+                f"{asked}; the price is unknown (--llm-option price=SENT:RECEIVED), so the cost is too: "
+                "--total tokens=N limits it"
+            )
         if not self.cost:
             return f"{asked}, free of charge"
         return (
             f"{asked}, which cost about {self.cost:.4g} US dollars to send with the longest prompts; replies "
-            "cost extra, and --total-cost limits all of it"
+            "cost extra, and --total cost=N limits all of it"
         )
 
 

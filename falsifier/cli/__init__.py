@@ -126,7 +126,7 @@ _HELP = """Find inputs that make an FMU violate a requirement.
 \b
 falsifier run AT1                                      a bundled problem
 falsifier run my.toml:REQ --budget 300                 a requirement of your own
-falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --input u=-1:1:5
+falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --search u=-1:1:5
 
 Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or spec, 3 simulator, language model or machine
 failed, 130 interrupted.

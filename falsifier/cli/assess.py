@@ -9,13 +9,18 @@ import click
 
 from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
+    Parameterized,
     budget_option,
+    command,
     json_option,
     out_option,
     problem_options,
     problem_source,
     quiet_option,
+    requirement_option,
+    requirement_options,
     seed_option,
+    stl_option,
 )
 from falsifier.cli.output import conclude
 from falsifier.cli.streams import INTERRUPTED
@@ -37,13 +42,10 @@ _ASSESS_BUDGET = 300
 _SAID_EVERY = 100
 
 
-@click.command()
-@problem_options
+@command()
+@requirement_options
 @budget_option(_ASSESS_BUDGET)
-@click.option(
-    "--confidence", type=float, default=0.95, show_default=True, help="Confidence of bound and interval."
-)
-@click.option("--requirement", metavar="NAME", help="Which one, if a run searched several requirements.")
+@requirement_option
 @seed_option()
 @quiet_option
 @out_option("Directory for assurance.json.", metavar="DIR")
@@ -51,7 +53,6 @@ _SAID_EVERY = 100
 def assess(
     *,
     budget: int,
-    confidence: float,
     requirement: str | None,
     seed: int,
     quiet: bool,
@@ -81,7 +82,6 @@ def assess(
             problem,
             budget=budget,
             seed=seed,
-            confidence=confidence,
             searched=searched,
             progress=said,
         )
@@ -98,11 +98,9 @@ def assess(
     conclude(content if as_json else "\n".join(map(one_line, lines)), code)
 
 
-@click.command()
+@command()
 @problem_options
-@click.option(
-    "--vary", required=True, metavar="FORMULA", help="Formula with {limit} in place of a threshold."
-)
+@stl_option("Formula with {limit} in place of a threshold.")
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
 @budget_option(note=" of all searches together")
@@ -111,7 +109,7 @@ def assess(
 @json_option
 def margin(
     *,
-    vary: str,
+    stl: str | None,
     between: str,
     engine: str,
     budget: int,
@@ -132,26 +130,24 @@ def margin(
     from falsifier.analyses.margin import margin as find_margin
 
     low, high = _between(between)
-    if options["stl"] is not None:
-        raise click.UsageError("--stl: --vary states the formula; drop --stl")
+    if stl is None or PLACE not in stl:
+        raise click.UsageError(f"--stl: expected a formula with {PLACE} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
-    if Target.parse(options["target"]).kind != "python":
-        options["stl"] = vary.replace(PLACE, f"{low:.12g}")
+    made_here = Target.parse(options["target"]).kind != "python"
+    requirement = {"stl": stl.replace(PLACE, f"{low:.12g}") if made_here else None, "template": None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:
             found = "falsified" if falsified else "not falsified"
             warn(f"{threshold:.6g}: {found} ({count} of at most {budget} simulations used)")
 
-    problem = load_source(problem_source(options))
+    problem = load_source(problem_source(options | requirement))
     try:
-        found = find_margin(
-            problem, vary, (low, high), engine=engine, budget=budget, seed=seed, searched=said
-        )
+        found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
     finally:
         problem.model.close()
-    content = {"vary": vary, "between": [low, high], **asdict(found)}
-    text = json.dumps(content, indent=2) if as_json else one_line(f"{vary}: {found.text}")
+    content = {"stl": stl, "between": [low, high], **asdict(found)}
+    text = json.dumps(content, indent=2) if as_json else one_line(f"{stl}: {found.text}")
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
@@ -168,7 +164,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         if requirement is not None:
             raise click.UsageError("--requirement chooses from a run directory; TARGET is none")
         return load_source(problem_source(options)), []
-    unset = {"target": None, "parameterization": DEFAULT_PARAMETERIZATION}
+    unset = {"target": None, "parameterized": Parameterized(kind=DEFAULT_PARAMETERIZATION)}
     changed = [
         name for name, value in options.items() if name != "target" and value and value != unset.get(name)
     ]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import datetime
 from itertools import product
 from pathlib import Path
-from typing import Any, NoReturn, get_args
+from typing import Any, NoReturn
 
 import click
 
@@ -35,14 +35,16 @@ from falsifier.cli.llm_options import (
     asking_options,
     check_context,
     context_option,
-    effort_option,
     llm_option,
+    name_and_effort,
     refuse_limits_without_llm,
     variant_option,
 )
 from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
+    Parameterized,
     budget_option,
+    command,
     directory_argument,
     engine_option,
     executor_option,
@@ -53,17 +55,15 @@ from falsifier.cli.options import (
     parameterization_option,
     policy_changes,
     policy_options,
-    profile_option,
     quiet_option,
     seed_option,
-    total_options,
+    total_option,
 )
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
-from falsifier.llm.messages import Effort
 from falsifier.problem.loading import sources_of
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 from falsifier.search.make_engines import price_of
 from falsifier.search.request import LLMSettings
@@ -86,20 +86,15 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 """
 
 
-@click.command(help=_BENCH_HELP)
+@command(help=_BENCH_HELP)
 @click.argument("targets", nargs=-1)
 @click.option("--suite", "suite_name", type=click.Choice(SUITES), help="Published list of requirements.")
-@click.option(
-    "--instance",
-    type=click.Choice(["1", "2"]),
-    help="Parameterization of the suite, as the category numbers it.",
-)
-@profile_option
 @policy_options
-@parameterization_option(multiple=True, suite=PROTOCOL_PARAMETERIZATION)
+@parameterization_option(
+    multiple=True, default=f"{DEFAULT_PARAMETERIZATION}; with --suite {PROTOCOL_PARAMETERIZATION}"
+)
 @engine_option(multiple=True)
 @llm_option(multiple=True)
-@effort_option
 @variant_option(multiple=True)
 @asking_options
 @context_option
@@ -116,14 +111,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     note=" per run",
 )
 @limit_options(note=" per run")
-@total_options
-@click.option(
-    "--calls",
-    type=click.IntRange(1),
-    default=8,
-    show_default=True,
-    help="Maximum number of concurrent runs that use a language model.",
-)
+@total_option
 @jobs_option("runs")
 @executor_option
 @click.option(
@@ -137,12 +125,9 @@ def bench(
     *,
     targets: tuple[str, ...],
     suite_name: str | None,
-    instance: str | None,
-    profile: str | None,
-    parameterization: tuple[str, ...],
+    parameterizations: tuple[Parameterized, ...],
     engines: tuple[str, ...],
     llms: tuple[str, ...],
-    effort: str | None,
     variants: tuple[str, ...],
     context: tuple[str, ...],
     runs: int,
@@ -151,11 +136,7 @@ def bench(
     seconds: float | None,
     max_tokens: int | None,
     max_cost: float | None,
-    total_budget: int | None,
-    total_seconds: float | None,
-    total_tokens: int | None,
-    total_cost: float | None,
-    calls: int,
+    totals: Budget | None,
     jobs: int,
     executor: str | None,
     table: str,
@@ -165,10 +146,9 @@ def bench(
     as_json: bool,
     **options: Any,
 ) -> None:
-    if instance is not None:
-        if suite_name is None or profile is not None:
-            raise click.UsageError("--instance requires --suite and cannot be combined with --profile")
-        profile = "instance2" if instance == "2" else None
+    profile, kinds = _kinds(
+        parameterizations, PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION
+    )
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
@@ -177,13 +157,10 @@ def bench(
     problems = [source.model_copy(update={"changes": rights}) for source in _with_context(problems, context)]
     if not llms:
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
-    if not parameterization:
-        parameterization = (PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION,)
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     how = LLMSettings(name="", **asking(options, named=bool(llms)))
-    methods = _methods(engines, llms, effort, variants, parameterization, profile or "", how)
-    limits = (total_budget, total_seconds, total_tokens, total_cost)
+    methods = _methods(engines, llms, variants, kinds, profile or "", how)
     request = CampaignRequest(
         runs=cross(
             problems,
@@ -192,8 +169,7 @@ def bench(
             budget=Budget(usual if budget is None else budget, seconds, max_tokens, max_cost),
             asking=how,
         ),
-        limits=Budget(*limits) if any(x is not None for x in limits) else None,
-        calls=calls,
+        limits=totals,
         suite=suite_name,
     )
     check_request(request, executor=executor)
@@ -209,7 +185,7 @@ def bench(
     finish(directory, outcome, table=table, as_json=as_json)
 
 
-@click.command()
+@command()
 @directory_argument
 @click.option("--once", is_flag=True, help="Print the current progress and exit.")
 @click.option("--page", is_flag=True, help="Serve a page that shows it, on this machine only, until Ctrl-C.")
@@ -304,24 +280,40 @@ def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSour
     ]
 
 
+def _kinds(
+    given: Sequence[Parameterized], default: Parameterization
+) -> tuple[str | None, tuple[Parameterization, ...]]:
+    """Return the profile of all runs, and their parameterizations.
+
+    Raises:
+        click.UsageError: if there are several profiles, or pieces of a stated length.
+    """
+    profiles = {chosen.profile for chosen in given}
+    if len(profiles) > 1:
+        raise click.UsageError("--parameterization: one profile for all runs of a campaign")
+    if any(chosen.shortest_piece is not None for chosen in given):
+        raise click.UsageError("--parameterization free:SECONDS: applies to single runs only; write free")
+    kinds = tuple(dict.fromkeys(chosen.kind or default for chosen in given))
+    return next(iter(profiles), None), kinds or (default,)
+
+
 def _methods(
     engines: tuple[str, ...],
     llms: tuple[str, ...],
-    effort: str | None,
     variants: tuple[str, ...],
-    parameterizations: tuple[str, ...],
+    parameterizations: tuple[Parameterization, ...],
     profile: str,
     how: LLMSettings,
 ) -> list[Method]:
     """Engines alone, or engines x LLMs x variants if an LLM is named; each with all parameterizations."""
-    if not llms and (variants or effort):
-        raise click.UsageError("--variant and --effort require --llm NAME")
-    named = [_llm(llm, effort) for llm in llms] or [("", "")]
+    if not llms and variants:
+        raise click.UsageError("--variant requires --llm NAME")
+    named = [name_and_effort(llm) for llm in llms] or [("", None)]
     methods = [
         Method(
             engine=engine,
             llm=llm,
-            effort=level,
+            effort=level or "",
             variant=variant,
             parameterization=parameterization,
             profile=profile,
@@ -334,9 +326,3 @@ def _methods(
         )
     ]
     return list(dict.fromkeys(map(as_searched, methods)))
-
-
-def _llm(text: str, effort: str | None) -> tuple[str, str]:
-    """Split ``NAME[@EFFORT]`` into name and effort; any other text after an @ belongs to the name."""
-    name, _, level = text.rpartition("@")
-    return (name, level) if name and level in get_args(Effort) else (text, effort or "")

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
-from falsifier.cli.llm_options import api_base_option, effort_option, llm_option
-from falsifier.cli.options import budget_option, interface_option, json_option, out_option, run_argument
+from falsifier.cli.llm_options import api_base_option, llm_option, name_and_effort
+from falsifier.cli.options import (
+    budget_option,
+    command,
+    interface_option,
+    json_option,
+    out_option,
+    requirement_option,
+    run_argument,
+)
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
@@ -39,7 +47,7 @@ _SHRINK_BUDGET = 500
 _MAP_SAMPLES, _MAP_POINTS = 256, 441
 
 
-@click.command()
+@command()
 @run_argument
 @click.option("--shrink", "shrunk", is_flag=True, help="Write the simplest one near it that still violates.")
 @click.option("--map", "mapped", is_flag=True, help="Change all inputs at random; draw where it violates.")
@@ -54,9 +62,8 @@ _MAP_SAMPLES, _MAP_POINTS = 256, 441
     "counterexample's, a tenth more than a nearest miss's.",
 )
 @llm_option()
-@effort_option
 @api_base_option
-@click.option("--requirement", metavar="NAME", help="Which one, if RUN searched several requirements.")
+@requirement_option
 @out_option(
     "File to write; default: shrunk.json, of a nearest miss shrunk.csv; with --map robustness-map.png."
 )
@@ -69,7 +76,6 @@ def explain(
     budget: int | None,
     at_most: float | None,
     llm: str | None,
-    effort: str | None,
     api_base: str | None,
     requirement: str | None,
     out: Path | None,
@@ -89,20 +95,20 @@ def explain(
         mapped=mapped,
         other={"--budget": budget, "--out": out},
         simpler={"--at-most": at_most},
-        words={"--llm": llm, "--effort": effort, "--api-base": api_base},
+        words={"--llm": llm, "--api-base": api_base},
     )
-    if llm is None and (effort is not None or api_base is not None):
-        raise click.UsageError("--effort and --api-base require --llm NAME")
+    if llm is None and api_base is not None:
+        raise click.UsageError("--api-base requires --llm NAME")
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
         _shrink(case, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
     elif mapped:
         _map(case, run, budget=budget or _MAP_SAMPLES + _MAP_POINTS, out=out, as_json=as_json)
     else:
-        _explain(case, run, llm=llm, effort=effort, api_base=api_base, as_json=as_json)
+        _explain(case, run, llm=llm, api_base=api_base, as_json=as_json)
 
 
-@click.command()
+@command()
 @run_argument
 @interface_option("FMI interface through which it is simulated; default: that of the run.")
 @json_option
@@ -127,7 +133,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool) -> None:
     conclude(text, 1 if replayed.status == "violates" else 0)
 
 
-@click.command()
+@command()
 @run_argument
 @out_option("Directory to write; default: export in RUN's directory.", metavar="DIR")
 @click.option(
@@ -244,9 +250,7 @@ def _shrunk_line(problem: Problem, shrunk: "Shrunk", budget: int) -> str:
     return f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}"
 
 
-def _explain(
-    case: Case, run: Path, *, llm: str | None, effort: str | None, api_base: str | None, as_json: bool
-) -> None:
+def _explain(case: Case, run: Path, *, llm: str | None, api_base: str | None, as_json: bool) -> None:
     """Print what broke, and what resetting each input alone comes to."""
     from falsifier.counterexamples.explain import explain, narrate
 
@@ -254,7 +258,8 @@ def _explain(
     if llm is not None:
         from falsifier.llm.connect import connect
 
-        chat = connect(llm, effort=effort, api_base=api_base)
+        name, effort = name_and_effort(llm)
+        chat = connect(name, effort=effort, api_base=api_base)
     picture = None
     with _loaded(case) as problem:
         evaluation = case.simulated(problem)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.options import (
+    command,
     json_option,
     out_option,
     policy_changes,
@@ -40,7 +41,7 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
 _PICTURES = (".svg", ".png", ".pdf")
 
 
-@click.command()
+@command()
 @click.argument("fmu", metavar="FILE", type=click.Path(path_type=Path))
 @click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
@@ -139,19 +140,18 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
     return names_text(diagram) if names else simulink_text(diagram)
 
 
-@click.command()
+@command()
 @click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
-@click.option("--force", is_flag=True, help="Replace an existing file.")
-def init(*, fmus: tuple[Path, ...], out: Path | None, force: bool) -> None:
+def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     """Write a starter spec: fill in ranges and the requirement.
 
     FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
     spec.
     """
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
-    if path.exists() and not force:
-        raise SpecError(f"{path} already exists: choose another --out, or add --force to replace it")
+    if path.exists():
+        raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)
     problem_of_starter(text, path)
     path.write_text(text, encoding="utf-8")

@@ -11,19 +11,20 @@ from falsifier.cli.llm_options import (
     anonymous_option,
     api_base_option,
     context_option,
-    effort_option,
-    reply_option,
+    llm_option_option,
+    name_and_effort,
+    read_llm_options,
     variant_option,
 )
 from falsifier.cli.options import (
+    command,
     json_option,
-    problem_options,
     problem_source,
+    requirement_options,
 )
 from falsifier.cli.output import say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
-from falsifier.llm.messages import ReplyKind
 from falsifier.problem.loading import load_source
 
 if TYPE_CHECKING:
@@ -31,11 +32,11 @@ if TYPE_CHECKING:
     from falsifier.problem.problem import Problem
 
 
-@click.command()
-@problem_options
+@command()
+@requirement_options
 @variant_option()
 @anonymous_option
-@reply_option
+@llm_option_option
 @context_option
 @click.option(
     "--after",
@@ -44,12 +45,12 @@ if TYPE_CHECKING:
     metavar="RUN",
     help="Run whose samples the prompt contains, whichever engine made them; default: none.",
 )
-@click.option("--samples", type=click.IntRange(min=0), help="With --after: use only its first samples.")
 @click.option(
     "--at",
     type=click.IntRange(min=1),
     metavar="N",
-    help="TARGET is a run directory: print what was sent when sample N was asked for, and the reply.",
+    help="The question for sample N: with --after, after the N-1 samples before it; if TARGET is a run "
+    "directory, the one that was sent, with its reply.",
 )
 @click.option(  # only these two engines write prompts
     "--engine",
@@ -63,9 +64,8 @@ def prompt(
     *,
     variant: str | None,
     anonymous: bool,
-    reply: ReplyKind | None,
+    llm_options: tuple[str, ...],
     directory: Path | None,
-    samples: int | None,
     at: int | None,
     engine: str,
     as_json: bool,
@@ -80,17 +80,16 @@ def prompt(
     from falsifier.record.journal import read_journal, recorded_evaluations
     from falsifier.record.questions import doubtful_confirmations
 
-    if at is not None:
+    if at is not None and directory is None:
         say(_sent(Path(options["target"]), at, as_json=as_json))
         return
-    if samples is not None and directory is None:
-        raise click.UsageError("--samples requires --after RUN")
+    reply = read_llm_options(llm_options).get("reply", "json")
     problem = load_source(problem_source(options))
     if directory:
         _check_same(directory, problem)
     records = read_journal(directory) if directory else []
     evaluations = recorded_evaluations(directory, records) if directory else {}
-    told = list(evaluations.values())[:samples]
+    told = list(evaluations.values())[: None if at is None else at - 1]
     limit = _limit(directory)
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else settings.opening
@@ -100,14 +99,14 @@ def prompt(
         evaluations=told,
         count=count,
         anonymous=anonymous,
-        reply=reply or "json",
+        reply=reply,
         simulations=limit,
         doubtful=doubtful_confirmations(problem, records, evaluations),
     )
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
         tool = preview_tool(
-            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=reply or "json"
+            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=reply
         )
         tools = (tool,)
     say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
@@ -193,18 +192,19 @@ def _size(messages: Sequence["Message"]) -> str:
     )
 
 
-@click.command()
+@command()
 @click.argument("name")
 @api_base_option
-@effort_option
-def check(*, name: str, api_base: str | None, effort: str | None) -> None:
+def check(*, name: str, api_base: str | None) -> None:
     """Check name and key of a language model with one short request.
 
-    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini. The output includes the price.
+    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. The output includes the
+    price.
     """
     from falsifier.llm.connect import check_llm
 
-    found = check_llm(name, api_base=api_base, effort=effort)
+    model, effort = name_and_effort(name)
+    found = check_llm(model, api_base=api_base, effort=effort)
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
     say(

@@ -1,6 +1,6 @@
 """Options of the command line about language models: which one, how to ask it, and what they make."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -10,6 +10,7 @@ from falsifier.cli.options import Decorator, Function, add, repeatable
 from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
+from falsifier.errors import did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.llm.messages import Effort, ReplyKind
 
@@ -21,13 +22,16 @@ _PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and recei
 
 
 def llm_option(*, multiple: bool = False) -> Decorator:
-    text = "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b, or a model file (.gguf)."
     return click.option(
         "--llm",
         "llms" if multiple else "llm",
         multiple=multiple,
-        metavar="NAME[@EFFORT]" if multiple else "NAME",
-        help=f"{text} @EFFORT overrides --effort. Repeatable." if multiple else text,
+        metavar="NAME[@EFFORT]",
+        help=repeatable(
+            "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b, or a model file (.gguf); "
+            f"@EFFORT is how much it reasons: {', '.join(get_args(Effort))}.",
+            multiple=multiple,
+        ),
     )
 
 
@@ -40,12 +44,6 @@ def context_option(command: Function) -> Function:
         help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
         "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
         "checked:FILE: a line of this file looks like a key and is none. Repeatable.",
-    )(command)
-
-
-def effort_option(command: Function) -> Function:
-    return click.option(
-        "--effort", type=click.Choice(get_args(Effort)), help="Reasoning effort of the language model."
     )(command)
 
 
@@ -70,40 +68,21 @@ def anonymous_option(command: Function) -> Function:
     return click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")(command)
 
 
-def reply_option(command: Function) -> Function:
+def llm_option_option(command: Function) -> Function:
     return click.option(
-        "--reply",
-        type=click.Choice(get_args(ReplyKind)),
-        help="What a reply consists of: a JSON object, or numbers between <point> and </point> as in the "
-        "published prompts, which leaves control points as the spec has them; default: json.",
+        "--llm-option",
+        "llm_options",
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="How it is asked: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
+        "tokens, cache=no, reply=points in place of json; all other names go to the provider unchanged, e.g. "
+        "max_tokens=4000. Repeatable.",
     )(command)
 
 
 def connection_options(command: Function) -> Function:
     """Add how to reach a language model, and what it costs."""
-    return add(
-        command,
-        api_base_option,
-        click.option(
-            "--llm-option",
-            "llm_options",
-            multiple=True,
-            metavar="NAME=VALUE",
-            help="Option passed to the provider unchanged, e.g. max_tokens=4000. Repeatable.",
-        ),
-        click.option(
-            "--price",
-            metavar="SENT:RECEIVED",
-            help="US dollars per million tokens sent and received, if the price is not known.",
-        ),
-        click.option(
-            "--timeout",
-            type=click.FloatRange(min=0, min_open=True),
-            metavar="SECONDS",
-            help="Maximum time to wait for a reply of the language model; default: 600.",
-        ),
-        click.option("--no-cache", is_flag=True, help="Ignore cached replies."),
-    )
+    return add(command, api_base_option, llm_option_option)
 
 
 def asking_options(command: Function) -> Function:
@@ -112,34 +91,46 @@ def asking_options(command: Function) -> Function:
         command,
         connection_options,
         anonymous_option,
-        reply_option,
         click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
     )
 
 
 def llm_options(command: Function) -> Function:
     """Add which language model to ask, and how."""
-    return add(command, llm_option(), effort_option, variant_option(), asking_options)
+    return add(command, llm_option(), variant_option(), asking_options)
+
+
+def name_and_effort(text: str) -> tuple[str, str | None]:
+    """Split ``NAME[@EFFORT]``; any other text after an @ belongs to the name.
+
+    >>> name_and_effort("openai/gpt-5-mini@low"), name_and_effort("vertex_ai/model@001")
+    (('openai/gpt-5-mini', 'low'), ('vertex_ai/model@001', None))
+    """
+    name, _, level = text.rpartition("@")
+    return (name, level) if name and level in get_args(Effort) else (text, None)
 
 
 def connection_settings(options: dict[str, Any]) -> "LLMSettings | None":
-    """Take the values of llm, effort and connection_options out of a command's keyword arguments."""
-    unused = {"variant": None, "fallback": None, "anonymous": False, "reply": None}
-    options.update(unused)
+    """Take the values of llm and connection_options out of a command's keyword arguments."""
+    options.update({"variant": None, "fallback": None, "anonymous": False})
     return llm_settings(options)
 
 
 def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
-    """Take the values of llm_options out of a command's keyword arguments; None if no LLM is named."""
-    name = options.pop("llm")
-    asked = {key: options.pop(key) for key in ("effort", "variant")}
-    asked |= asking(options, named=name is not None)
-    if name is None:
-        _refuse_without_llm(asked)
+    """Take the values of llm_options out of a command's keyword arguments; None if no model is named.
+
+    Raises:
+        click.UsageError: if a value is invalid, or one is given although no language model is named.
+    """
+    given, variant = options.pop("llm"), options.pop("variant")
+    asked = asking(options, named=given is not None)
+    if given is None:
+        _refuse_without_llm({"variant": variant})
         return None
     from falsifier.search.request import LLMSettings
 
-    return LLMSettings(name=name, **asked)
+    name, effort = name_and_effort(given)
+    return LLMSettings(name=name, effort=effort, variant=variant, **asked)
 
 
 def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
@@ -148,16 +139,30 @@ def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
     Raises:
         click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
-    given = {key: options.pop(key) for key in ("api_base", "timeout", "fallback", "anonymous", "reply")}
-    if given["timeout"] is not None and not isfinite(given["timeout"]):
-        raise click.UsageError(f"--timeout {given['timeout']}: expected a number of seconds")
-    price, pairs = options.pop("price"), options.pop("llm_options")
-    cache = not options.pop("no_cache")
+    given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
+    pairs = options.pop("llm_options")
     if not named:
-        _refuse_without_llm(given | {"price": price, "llm_option": pairs})
-    if given["reply"] is None:
-        del given["reply"]
-    return given | {"price": _price(price), "options": dict(map(_llm_option, pairs)), "cache": cache}
+        _refuse_without_llm(given | {"llm_option": pairs})
+    return given | read_llm_options(pairs)
+
+
+def read_llm_options(pairs: Sequence[str]) -> dict[str, Any]:
+    """Return the values of ``--llm-option`` as fields of LLMSettings.
+
+    Raises:
+        click.UsageError: if one is invalid.
+    """
+    fields: dict[str, Any] = {}
+    passed: dict[str, str | float] = {}
+    for text in pairs:
+        name, equals, value = text.partition("=")
+        if not equals or not name:
+            raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+        if name in _FIELDS:
+            fields[name] = _FIELDS[name](text, value)
+        else:
+            passed[name] = _passed(name, value)
+    return fields | {"options": passed}
 
 
 def refuse_limits_without_llm(*, max_tokens: int | None, max_cost: float | None) -> None:
@@ -188,7 +193,7 @@ def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
 
 
 def _refuse_without_llm(given: dict[str, Any]) -> None:
-    stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value and key != "cache"]
+    stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value]
     if stray:
         raise click.UsageError(
             f"{', '.join(stray)}: applies to language models only; add --llm NAME, or drop "
@@ -196,22 +201,50 @@ def _refuse_without_llm(given: dict[str, Any]) -> None:
         )
 
 
-def _price(text: str | None) -> tuple[float, float] | None:
-    if text is None:
-        return None
+def _price(text: str, value: str) -> tuple[float, float]:
     try:
-        sent, received = (float(part) for part in text.split(":"))
+        sent, received = (float(part) for part in value.split(":"))
     except ValueError:
-        raise click.UsageError(f"--price {text}: {_PRICE}") from None
+        raise click.UsageError(f"--llm-option {text}: {_PRICE}") from None
     if not all(isfinite(price) and price >= 0 for price in (sent, received)):
-        raise click.UsageError(f"--price {text}: prices must be finite and not negative; {_PRICE}")
+        raise click.UsageError(f"--llm-option {text}: prices must be finite and not negative; {_PRICE}")
     return sent, received
 
 
-def _llm_option(text: str) -> tuple[str, str | float]:
-    name, equals, value = text.partition("=")
-    if not equals or not name:
-        raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+def _timeout(text: str, value: str) -> float:
+    try:
+        seconds = float(value)
+    except ValueError:
+        seconds = 0.0
+    if not isfinite(seconds) or seconds <= 0:
+        raise click.UsageError(f"--llm-option {text}: expected a number of seconds above 0")
+    return seconds
+
+
+def _cache(text: str, value: str) -> bool:
+    if value not in ("yes", "no"):
+        raise click.UsageError(f"--llm-option {text}: expected yes, or no to ask again what was answered")
+    return value == "yes"
+
+
+def _reply(text: str, value: str) -> str:
+    if value not in get_args(ReplyKind):
+        kinds = did_you_mean(value, get_args(ReplyKind))
+        raise click.UsageError(f"--llm-option {text}: unknown kind of reply; {kinds}")
+    return value
+
+
+# Names of --llm-option that the provider does not see: fields of LLMSettings.
+_FIELDS: dict[str, Callable[[str, str], Any]] = {
+    "price": _price,
+    "timeout": _timeout,
+    "cache": _cache,
+    "reply": _reply,
+}
+
+
+def _passed(name: str, value: str) -> str | float:
+    """Return the value of an option for the provider, as a number if it is one."""
     if is_secret_option(name):  # options are written to the run's manifest
         raise click.UsageError(
             f"--llm-option {name}: keys are read from the environment only; set the provider's variable"
@@ -224,6 +257,6 @@ def _llm_option(text: str) -> tuple[str, str | float]:
     try:
         number = int(value) if value.isdigit() else float(value)
     except ValueError:
-        return name, value
+        return value
     is_text = isinstance(number, float) and not isfinite(number)  # a JSON file has no such numbers
-    return name, value if is_text else number
+    return value if is_text else number

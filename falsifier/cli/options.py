@@ -1,19 +1,20 @@
-"""Options of the command line, each defined once: the same name and help in every command that has it.
+"""Options of the command line, each defined once: the same name and meaning in every command that has it.
 
 Functions that end in ``_options`` add a group of options to a command. Where commands need different defaults
 or add a remark, a function makes the option.
 """
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
+from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.search.budget import DEFAULT_SIMULATIONS
+from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
 
 if TYPE_CHECKING:
     from falsifier.problem.sections import ModelChanges
@@ -21,6 +22,52 @@ if TYPE_CHECKING:
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
+
+# Headings of --help, for commands with many options; what is in none of them belongs to the command itself.
+OPTION_GROUPS = {
+    "What is searched": (
+        *("--stl", "--template", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
+        *("--output-interval", "--time-limit", "--allow", "--deny"),
+    ),
+    "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs", "--executor"),
+    "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),
+    "Language model": (
+        *("--llm", "--variant", "--context", "--anonymous", "--fallback", "--api-base", "--llm-option"),
+        "--yes",
+    ),
+    "Output": ("--out", "--table", "--fmu-log", "--quiet", "--json", "--help"),
+}
+# From this number of options on, --help has headings.
+_MANY = 12
+
+
+class Command(click.Command):
+    """A command whose help lists many options in groups."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options below their headings."""
+        for heading, rows in option_groups(self, ctx):
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+
+def option_groups(command: click.Command, ctx: click.Context) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return the headings of a command's options, each with the names and meanings below it."""
+    options = [p for p in command.get_params(ctx) if isinstance(p, click.Option)]
+    rows = {p.opts[-1]: record for p in options if (record := p.get_help_record(ctx))}
+    if len(rows) < _MANY:
+        return [("Options", list(rows.values()))]
+    grouped = {name for names in OPTION_GROUPS.values() for name in names}
+    own = [row for name, row in rows.items() if name not in grouped]
+    groups = {"Options": own} | {
+        heading: [row for name, row in rows.items() if name in names]
+        for heading, names in OPTION_GROUPS.items()
+    }
+    return [(heading, group) for heading, group in groups.items() if group]
+
+
+# Makes a command of a function.
+command = partial(click.command, cls=Command)
 
 
 def add(command: Function, *decorators: Decorator) -> Function:
@@ -30,29 +77,82 @@ def add(command: Function, *decorators: Decorator) -> Function:
     return command
 
 
-def profile_option(command: Function) -> Function:
-    return click.option(
-        "--profile", metavar="NAME", help="Named parameterization that the spec offers, e.g. instance2."
-    )(command)
-
-
 # What a search does unless it is told otherwise: the same for one run and for each run of a campaign.
 DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
 
 
-def parameterization_option(*, multiple: bool = False, suite: "Parameterization" = "fixed") -> Decorator:
-    default = DEFAULT_PARAMETERIZATION
+class Parameterized(NamedTuple):
+    """Value of ``--parameterization``.
+
+    Attributes:
+        profile: name of a profile of the spec.
+        kind: free or fixed; None if it is not stated.
+        shortest_piece: minimum time in s between two control points of every input.
+    """
+
+    profile: str | None = None
+    kind: "Parameterization | None" = None
+    shortest_piece: float | None = None
+
+
+def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PARAMETERIZATION) -> Decorator:
     return click.option(
         "--parameterization",
-        type=click.Choice(["free", "fixed"]),
+        "parameterizations" if multiple else "parameterized",
         multiple=multiple,
-        default=() if multiple else default,
-        show_default=f"{default}; with --suite {suite}" if multiple else True,
+        metavar="[PROFILE,]free[:SECONDS]|fixed",
+        callback=_parameterized,
+        default=None if multiple else default,
+        show_default=default if multiple else True,
         help=repeatable(
-            "free: engines may choose control points within the spec's limits; fixed: the spec's own.",
+            "free: engines may choose control points within the spec's limits, with SECONDS of every input "
+            "and in pieces of at least this; fixed: the spec's own. PROFILE: one of the spec.",
             multiple=multiple,
         ),
     )
+
+
+def _parameterized(
+    _context: click.Context, _option: click.Parameter, given: str | tuple[str, ...]
+) -> Parameterized | tuple[Parameterized, ...]:
+    return parameterized(given) if isinstance(given, str) else tuple(map(parameterized, given))
+
+
+def parameterized(text: str) -> Parameterized:
+    """Return what a value of ``--parameterization`` says.
+
+    Raises:
+        click.UsageError: if it says something twice, or a time is no number.
+
+    >>> parameterized("instance2,fixed")
+    Parameterized(profile='instance2', kind='fixed', shortest_piece=None)
+    """
+    found = Parameterized()
+    for word in text.split(","):
+        said = word.removeprefix("free:")
+        is_kind = said != word or word in ("free", "fixed")
+        if not word or (found.kind if is_kind else found.profile):
+            raise click.UsageError(
+                f"--parameterization {text}: expected free, free:SECONDS or fixed, after the name of a "
+                "profile and a comma if the spec has one, for example instance2,fixed"
+            )
+        if said != word:
+            found = found._replace(kind="free", shortest_piece=_seconds(text, said))
+        elif is_kind:
+            found = found._replace(kind="free" if word == "free" else "fixed")
+        else:
+            found = found._replace(profile=word)
+    return found
+
+
+def _seconds(text: str, seconds: str) -> float:
+    try:
+        value = float(seconds)
+    except ValueError:
+        value = float("nan")
+    if not isfinite(value) or value <= 0:
+        raise click.UsageError(f"--parameterization {text}: expected a time in s, for example free:0.5")
+    return value
 
 
 def template_option(command: Function) -> Function:
@@ -92,45 +192,51 @@ def policy_changes(options: dict[str, Any]) -> "ModelChanges":
     return changes_from_options(allow=options.pop("allow"), deny=options.pop("deny"))
 
 
+def interface_option(text: str) -> Decorator:
+    return click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]), help=text)
+
+
+def stl_option(text: str = "Formula to use instead of the spec's requirement.") -> Decorator:
+    return click.option(
+        "--stl",
+        multiple=True,  # so that a second one is an error and does not silently replace the first
+        callback=_only_one,
+        metavar="FORMULA",
+        help=text,
+    )
+
+
+def target_argument(command: Function) -> Function:
+    def complete(_context: click.Context, _argument: click.Parameter, incomplete: str) -> list[Any]:
+        from click.shell_completion import CompletionItem
+
+        return [CompletionItem(incomplete, type="file")]
+
+    return click.argument("target", shell_complete=complete)(command)
+
+
 def problem_options(command: Function) -> Function:
-    """Add the target and everything that changes a problem."""
+    """Add the target and everything that changes a problem, except its requirement."""
     return add(
         command,
-        click.argument("target"),
+        target_argument,
         click.option(
-            "--stl",
-            multiple=True,  # so that a second one is an error and does not silently replace the first
-            callback=_only_one,
-            metavar="FORMULA",
-            help="Formula to use instead of the spec's requirement.",
-        ),
-        template_option,
-        profile_option,
-        parameterization_option(),
-        click.option(
-            "--free",
-            "shortest_piece",
-            type=float,
-            metavar="SECONDS",
-            help="Free parameterization of every input, with pieces at least this long; default: the spec's "
-            "limits, or some derived from the formula's windows.",
-        ),
-        interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
-        click.option(
-            "--input",
-            "inputs",
-            multiple=True,
-            metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
-            help="Input signal to search. NAME alone: with the spec's range, or between the FMU's min and "
-            "max. NAME=VALUE: keep it constant. Repeatable.",
-        ),
-        click.option(
-            "--param",
-            "parameters",
+            "--set",
+            "values",
             multiple=True,
             metavar="NAME=VALUE",
-            help="Parameter, start value or string to set. NAME=LOW:HIGH: search it. Repeatable.",
+            help="Keep an input constant, or set a parameter, start value or string. Repeatable.",
         ),
+        click.option(
+            "--search",
+            "ranges",
+            multiple=True,
+            metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
+            help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or "
+            "between the FMU's min and max. Repeatable.",
+        ),
+        parameterization_option(),
+        interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
         click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
         click.option(
             "--output-interval",
@@ -149,30 +255,48 @@ def problem_options(command: Function) -> Function:
     )
 
 
+def requirement_options(command: Function) -> Function:
+    """Add problem_options and the requirement."""
+    return add(command, stl_option(), template_option, problem_options)
+
+
 def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
     if len(formulas) > 1:
         raise click.UsageError(
             f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
-            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml --all"
+            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml"
         )
     return formulas[0] if formulas else None
 
 
 def problem_source(options: dict[str, Any]) -> "ProblemSource":
-    """Take the values of problem_options out of a command's keyword arguments."""
+    """Take the values of requirement_options out of a command's keyword arguments.
+
+    Raises:
+        click.UsageError: if two options state the requirement, or a profile is chosen from an FMU.
+    """
     from falsifier.problem.shorthand import changes_from_options
     from falsifier.problem.source import ProblemSource
 
     varied = (
-        *("inputs", "parameters", "stop_time", "output_interval", "time_limit", "interface"),
+        *("values", "ranges", "stop_time", "output_interval", "time_limit", "interface"),
         *("allow", "deny"),
     )
     changes = changes_from_options(**{name: options.pop(name) for name in varied})
-    context = options.pop("context", ())
-    stated = {
-        name: options.pop(name) for name in ("target", "stl", "profile", "parameterization", "shortest_piece")
-    }
-    source = ProblemSource(**stated, changes=changes, context=context)
+    chosen: Parameterized = options.pop("parameterized")
+    source = ProblemSource(
+        target=options.pop("target"),
+        stl=options.pop("stl"),
+        profile=chosen.profile,
+        parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
+        shortest_piece=chosen.shortest_piece,
+        changes=changes,
+        context=options.pop("context", ()),
+    )
+    if chosen.profile is not None and source.parts.kind == "fmu":
+        raise click.UsageError(
+            f"--parameterization {chosen.profile}: only specs have profiles; expected free or fixed"
+        )
     template = options.pop("template")
     if template is not None and source.stl is not None:
         raise click.UsageError("--stl and --template both state the requirement; drop one of them")
@@ -227,23 +351,39 @@ def limit_options(*, note: str = "") -> Decorator:
     )
 
 
-def total_options(command: Function) -> Function:
+# Limits of a campaign, each with the type of its number.
+_TOTALS: dict[str, Callable[[str], float]] = {
+    "simulations": int,
+    "seconds": float,
+    "tokens": int,
+    "cost": float,
+}
+
+
+def total_option(command: Function) -> Function:
     """Add the limits of a campaign."""
-    return add(
-        command,
-        click.option("--total-budget", type=int, help="Maximum number of simulations of all runs together."),
-        click.option(
-            "--total-seconds", type=float, help="Maximum wall-clock time in seconds, counted from this start."
-        ),
-        click.option(
-            "--total-tokens", type=int, help="Maximum number of language-model tokens of all runs together."
-        ),
-        click.option(
-            "--total-cost",
-            type=float,
-            help="Maximum cost of the language models in US dollars of all runs together.",
-        ),
-    )
+    return click.option(
+        "--total",
+        "totals",
+        multiple=True,
+        metavar="|".join(f"{name}=N" for name in _TOTALS),
+        callback=lambda _context, _option, given: _total(given),
+        help="Limit of all runs of a campaign together: simulations, seconds from this start, tokens, US "
+        "dollars. Repeatable.",
+    )(command)
+
+
+def _total(given: Iterable[str]) -> Budget | None:
+    limits: dict[str, float] = {}
+    for text in given:
+        name, _, number = text.partition("=")
+        try:
+            limits[name] = _TOTALS[name](number)
+        except (KeyError, ValueError):
+            raise click.UsageError(
+                f"--total {text}: expected {', '.join(f'{name}=N' for name in _TOTALS)}, for example cost=5"
+            ) from None
+    return Budget(**limits) if limits else None  # type: ignore[arg-type]
 
 
 def seed_option(text: str = "Random seed.") -> Decorator:
@@ -264,20 +404,24 @@ def executor_option(command: Function) -> Function:
     return click.option(
         "--executor",
         metavar="dask:tcp://HOST:PORT",
-        help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice the "
-        "--total-... limits only between runs.",
+        help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice --total "
+        "only between runs.",
     )(command)
 
 
-def start_from_option(command: Function) -> Function:
+def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
     return click.option(
-        "--start-from",
+        "--inputs",
+        "known",
         type=click.Path(path_type=Path),
-        multiple=True,
+        multiple=multiple,
         metavar="u.csv|counterexample.json|RUN",
-        help="Known inputs to simulate first: a CSV file, a counterexample, or the best sample of a run. "
-        "They count in the budget, and the engine learns from them. Repeatable.",
-    )(command)
+        help=repeatable(
+            f"{text}: of a CSV file (time in s, then a column for each input), a counterexample, or the best "
+            "sample of a run.",
+            multiple=multiple,
+        ),
+    )
 
 
 def run_argument(command: Function) -> Function:
@@ -288,12 +432,14 @@ def directory_argument(command: Function) -> Function:
     return click.argument("directory", type=click.Path(path_type=Path))(command)
 
 
+def requirement_option(command: Function) -> Function:
+    return click.option(
+        "--requirement", metavar="NAME", help="Which one, if a run searched several requirements."
+    )(command)
+
+
 def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
     return click.option("-o", "--out", type=click.Path(path_type=Path), metavar=metavar, help=text)
-
-
-def interface_option(text: str) -> Decorator:
-    return click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]), help=text)
 
 
 def json_option(command: Function) -> Function:

@@ -8,7 +8,7 @@ import click
 from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.archcomp import export
 from falsifier.cli.files import check_out, draw
-from falsifier.cli.options import directory_argument, json_option, out_option
+from falsifier.cli.options import command, directory_argument, json_option, out_option
 from falsifier.cli.output import say
 from falsifier.record import manifest
 from falsifier.views.coverage_text import coverage_json, coverage_text
@@ -16,7 +16,7 @@ from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
 
 
-@click.command()
+@command()
 @directory_argument
 @out_option("Report to write; default: report.html in DIRECTORY.")
 @click.option("--markdown", is_flag=True, help="Markdown instead of HTML; printed on stdout without --out.")
@@ -47,7 +47,7 @@ def report(
     warn(f"{path} written")
 
 
-@click.command()
+@command()
 @directory_argument
 @out_option("Picture to write; default: coverage.png in DIRECTORY.")
 @json_option

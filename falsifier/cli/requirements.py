@@ -12,14 +12,17 @@ from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli.llm_options import (
     connection_options,
     connection_settings,
-    effort_option,
     llm_option,
 )
 from falsifier.cli.options import (
+    DEFAULT_PARAMETERIZATION,
+    Parameterized,
     budget_option,
+    command,
     json_option,
     out_option,
-    profile_option,
+    parameterization_option,
+    target_argument,
     template_option,
     with_template,
 )
@@ -38,13 +41,15 @@ if TYPE_CHECKING:
     from falsifier.analyses.formalize import Formalized
 
 
-@click.command()
-@click.argument("target")
-@profile_option
+@command()
+@target_argument
+@parameterization_option()
 @template_option
 @budget_option(0, note=" that measure whether inputs move a requirement; 0: what the FMU declares counts")
 @json_option
-def check(*, target: str, profile: str | None, template: str | None, budget: int, as_json: bool) -> None:
+def check(
+    *, target: str, parameterized: Parameterized, template: str | None, budget: int, as_json: bool
+) -> None:
     """Check a spec file, and find requirements that say nothing.
 
     First keys, signals, ranges and formulas. Then what cannot fail or hold, what nothing moves, windows and
@@ -53,7 +58,7 @@ def check(*, target: str, profile: str | None, template: str | None, budget: int
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = with_template(ProblemSource(target=target, profile=profile), template)
+    source = with_template(_source(target, parameterized), template)
     findings = lint(source, simulations=budget)
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0
@@ -80,17 +85,25 @@ def _problem_line(problem: Problem) -> str:
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
 
 
+def _source(target: str, chosen: Parameterized) -> ProblemSource:
+    return ProblemSource(
+        target=target,
+        profile=chosen.profile,
+        parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
+        shortest_piece=chosen.shortest_piece,
+    )
+
+
 def _lines(finding: LintFinding) -> list[str]:
     head = f"{finding.requirement}: {finding.kind}: {one_line(finding.text)}"
     place = [f"  in      {finding.place}"] if finding.place else []
     return [head, *place, f"  to do   {finding.advice}"]
 
 
-@click.command()
+@command()
 @click.argument("target", metavar="MODEL")
 @click.argument("sentence")
 @llm_option()
-@effort_option
 @connection_options
 @click.option(
     "--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec, without asking."

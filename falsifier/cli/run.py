@@ -16,24 +16,26 @@ from falsifier.cli.llm_options import (
     refuse_limits_without_llm,
 )
 from falsifier.cli.options import (
+    Command,
     budget_option,
+    command,
     directory_argument,
     engine_option,
     executor_option,
+    inputs_option,
     jobs_option,
     json_option,
     limit_options,
     out_option,
-    problem_options,
     problem_source,
     quiet_option,
+    requirement_options,
     seed_option,
-    start_from_option,
-    total_options,
+    total_option,
 )
 from falsifier.cli.output import conclude
-from falsifier.core.files import bundled, file_name
-from falsifier.errors import FalsifierError, JournalError, SpecError
+from falsifier.core.files import file_name
+from falsifier.errors import FalsifierError, JournalError
 from falsifier.search.budget import Budget
 from falsifier.views.terminal import warn
 
@@ -47,7 +49,7 @@ if TYPE_CHECKING:  # imported where used, so that --help prints at once
 _EXIT_CODES = {"interrupted": 130, "failed": 3, "falsified": 1, "not falsified": 0}
 
 
-class _OneTarget(click.Command):
+class _OneTarget(Command):
     """A command that says what to use instead if it is given several targets."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -58,13 +60,13 @@ class _OneTarget(click.Command):
                 raise
             raise click.UsageError(
                 f"{error.message}; one run searches one target: for several, falsifier bench TARGET "
-                "TARGET ..., and for all requirements of one spec in one search, falsifier run SPEC --all",
+                "TARGET ..., and for all requirements of one spec in one search, falsifier run SPEC",
                 ctx,
             ) from None
 
 
 @click.command(cls=_OneTarget)
-@problem_options
+@requirement_options
 @engine_option()
 @llm_options
 @context_option
@@ -72,8 +74,7 @@ class _OneTarget(click.Command):
 @limit_options()
 @seed_option()
 @jobs_option("simulations")
-@click.option("--all", "together", is_flag=True, help="Falsify all requirements of the spec in one search.")
-@start_from_option
+@inputs_option("Known inputs to simulate first; the engine learns from them", multiple=True)
 @click.option(
     "--refine",
     is_flag=True,
@@ -98,8 +99,7 @@ def run(
     max_cost: float | None,
     seed: int,
     jobs: int,
-    together: bool,
-    start_from: tuple[Path, ...],
+    known: tuple[Path, ...],
     refine: bool,
     quiet: bool,
     out: Path | None,
@@ -109,7 +109,8 @@ def run(
 ) -> None:
     """Search for inputs that violate a requirement.
 
-    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl.
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Of a spec
+    with several requirements, all are searched together unless one is named.
 
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
@@ -128,13 +129,13 @@ def run(
         source = source.model_copy(update={"changes": changes})
     if llm is None:
         refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
-    sources = _all_of(source) if together else (source,)
+    sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources
-    known = []
-    if start_from:
+    start_from = []
+    if known:
         searched = loaded = [load_source(each) for each in sources]
         (fitting,) = widened(loaded[:1]) if refine else loaded[:1]
-        known = [_known(place, fitting) for place in start_from]
+        start_from = [_known(place, fitting) for place in known]
     with make_display(quiet=quiet) as display:
         results = falsify(
             searched,
@@ -144,7 +145,7 @@ def run(
             budget=Budget(budget, seconds, max_tokens, max_cost),
             jobs=jobs,
             directory=out or _new_directory(source.name),
-            start_from=known,
+            start_from=start_from,
             refine=refine,
             listeners=[display, *logs],
         )
@@ -153,12 +154,12 @@ def run(
     _finish(results, as_json=as_json)
 
 
-@click.command()
+@command()
 @directory_argument
 @jobs_option("runs")
 @executor_option
 @click.option("--budget", type=int, help="Maximum number of simulations of the run, with those before.")
-@total_options
+@total_option
 @quiet_option
 @json_option
 def resume(
@@ -167,37 +168,31 @@ def resume(
     jobs: int,
     executor: str | None,
     budget: int | None,
-    total_budget: int | None,
-    total_seconds: float | None,
-    total_tokens: int | None,
-    total_cost: float | None,
+    totals: Budget | None,
     quiet: bool,
     as_json: bool,
 ) -> None:
     """Continue the run or campaign in DIRECTORY; nothing that is recorded is simulated or asked again.
 
     A run keeps its limits, except that --budget replaces that on simulations, also of a run that has ended.
-    --jobs, --executor and the limits in total apply to campaigns only. The limits on simulations, tokens and
-    cost include what was spent before.
+    --jobs, --executor and --total apply to campaigns only. Totals of simulations, tokens and cost include
+    what was spent before.
     """
     from falsifier.campaigns.directory import is_campaign, run_directories
     from falsifier.cli.campaign import resume_campaign
     from falsifier.record.run import resume as resume_run
     from falsifier.views.progress import make_display
 
-    given = (total_budget, total_seconds, total_tokens, total_cost)
-    has_limits = any(x is not None for x in given)
     if is_campaign(directory):
         if budget is not None:
-            raise click.UsageError("--budget: the runs of a campaign keep theirs; --total-budget limits all")
-        limits = Budget(*given) if has_limits else None
-        resume_campaign(directory, jobs=jobs, executor=executor, limits=limits, quiet=quiet, as_json=as_json)
+            raise click.UsageError("--budget: the runs of a campaign keep theirs; --total simulations=N")
+        resume_campaign(directory, jobs=jobs, executor=executor, limits=totals, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
-    if has_limits or executor is not None or jobs > 1:
+    if totals is not None or executor is not None or jobs > 1:
         raise click.UsageError(
-            f"{directory}: --jobs, --executor and the limits in total apply to campaigns only; a run "
-            "continues with the jobs and the limits that it began with, except for --budget"
+            f"{directory}: --jobs, --executor and --total apply to campaigns only; a run continues with the "
+            "jobs and the limits that it began with, except for --budget"
         )
     results: list[Result] = []
     with make_display(quiet=quiet) as display:
@@ -263,29 +258,16 @@ def _write_counterexamples(result: "Result", directory: Path) -> None:
             warn(f"falsifier: {directory / file} cannot be written: {error}")
 
 
-def _all_of(source: "ProblemSource") -> "tuple[ProblemSource, ...]":
-    """Sources of all requirements of a spec.
-
-    Raises:
-        SpecError: if the target is not a spec, or names one requirement.
-    """
+def _sources(source: "ProblemSource") -> "tuple[ProblemSource, ...]":
+    """Return one source per requirement of a spec, or the source if it is about one."""
     from falsifier.problem.loading import find_spec, sources_of
 
     if source.parts.kind in ("fmu", "python") or source.stl is not None:
-        raise SpecError(f"{source.target}: --all needs a spec with several requirements; drop --all")
-    if find_spec(source.target)[1] is not None:
-        raise SpecError(
-            f"{source.target} is one requirement; for all of its spec: falsifier run {_spec_of(source)} --all"
-        )
-    return tuple(sources_of(source))
-
-
-def _spec_of(source: "ProblemSource") -> str:
-    """The spec's name if it is bundled, else its path."""
-    from falsifier.problem.loading import find_spec
-
-    path = find_spec(source.target)[0]
-    return path.stem if path.parent == bundled("specs") else str(path)
+        return (source,)
+    # NN is the name of a spec and of one of its requirements, which is meant.
+    several = sources_of(source)
+    named = [each for each in several if each.name == find_spec(source.target)[0].stem]
+    return (source,) if len(several) == 1 or named else tuple(several)
 
 
 def _new_directory(name: str) -> Path:

@@ -5,21 +5,28 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from io import StringIO
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
-import click
-
 from falsifier.cli.files import draw_evaluation
-from falsifier.cli.options import json_option, out_option, problem_options, problem_source
+from falsifier.cli.options import (
+    command,
+    inputs_option,
+    json_option,
+    out_option,
+    problem_source,
+    requirement_options,
+)
 from falsifier.cli.output import conclude
+from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, one_line
 from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.trajectory import Trajectory
+from falsifier.counterexamples.known_inputs import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.evaluate import simulate as simulate_inputs
@@ -34,27 +41,12 @@ from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_json, evaluation_lines
 
 
-@click.command()
-@problem_options
-@click.option(
-    "--input-file",
-    type=click.Path(path_type=Path),
-    metavar="u.csv",
-    help="CSV file of inputs: the first column is the time in s, each further column an input. The "
-    "input.csv of an exported counterexample is one.",
-)
-@click.option(
-    "--set",
-    "values",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="Keep an input constant, or set a parameter or start value. Repeatable.",
-)
+@command()
+@requirement_options
+@inputs_option("Inputs to simulate")
 @out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
 @json_option
-def simulate(
-    *, input_file: Path | None, values: tuple[str, ...], out: Path | None, as_json: bool, **options: Any
-) -> None:
+def simulate(*, known: Path | None, out: Path | None, as_json: bool, **options: Any) -> None:
     """Simulate your own inputs and judge the requirement; ranges of the search do not apply.
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Inputs that
@@ -62,15 +54,21 @@ def simulate(
 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
-    source, given = problem_source(options), dict(map(_value, values))
-    problem = _loaded(source, input_file, given)
+    given = _numbers(options)
+    source = problem_source(options)
+    file, stored = _split(known, source)
+    problem = _loaded(source, file, {**stored.signals} | {n: _constant(v) for n, v in given.items()})
     for note in rights_notes(problem.model):
         warn(note)
     try:
-        known = [v.name for v in problem.info.inputs]
-        signals = {name: _constant(value) for name, value in given.items() if name in known}
-        parameters = {name: value for name, value in given.items() if name not in known}
-        evaluation = simulate_inputs(problem, _read(input_file, problem) | signals, parameters)
+        driven = [v.name for v in problem.info.inputs]
+        signals = {name: _constant(value) for name, value in given.items() if name in driven}
+        parameters = {name: value for name, value in given.items() if name not in driven}
+        evaluation = simulate_inputs(
+            problem,
+            {**_read(file, problem), **stored.signals, **signals},
+            {**stored.parameters, **parameters},
+        )
     finally:
         problem.model.close()
     if evaluation.trajectory is None or evaluation.verdict is None:
@@ -84,15 +82,28 @@ def simulate(
     )
 
 
-def _value(option: str) -> tuple[str, float]:
-    name, equals, text = option.partition("=")
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not equals or not name.strip() or not isfinite(value):
-        raise click.UsageError(f"--set {option}: expected NAME=VALUE with a number, for example throttle=50")
-    return name.strip(), value
+def _numbers(options: dict[str, Any]) -> dict[str, float]:
+    """Take the numbers of ``--set`` out of a command's keyword arguments: they may lie outside of ranges."""
+    numbers, texts = dict[str, float](), list[str]()
+    for option in options["values"]:
+        name, equals, text = option.partition("=")
+        try:
+            value = float(text)
+        except ValueError:
+            value = nan
+        if equals and name.strip() and isfinite(value):
+            numbers[name.strip()] = value
+        else:
+            texts.append(option)
+    options["values"] = texts
+    return numbers
+
+
+def _split(known: Path | None, source: ProblemSource) -> tuple[Path | None, Candidate]:
+    """Return the file of inputs, or what a counterexample or run holds; of the other, nothing."""
+    if known is None or known.suffix.lower() == ".csv":
+        return known, Candidate({})
+    return None, recorded_inputs(known, source.name)
 
 
 def _constant(value: float) -> Signal:
@@ -114,14 +125,14 @@ def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
     return dict(found.signals)
 
 
-def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, float]) -> Problem:
+def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, Signal]) -> Problem:
     """Load the problem; the inputs themselves give the ranges that an FMU without a spec needs."""
     if source.parts.kind != "fmu" or source.stl is None or not Path(source.parts.file).is_file():
         return load_source(source, searches=False)
     given_file = Path(source.parts.file)
     info = read_package(given_file).info if is_package(given_file) else read_info(given_file)
     signals = dict(read_inputs(file, info).signals) if file else {}
-    signals |= {v.name: _constant(given[v.name]) for v in info.inputs if v.name in given}
+    signals |= {v.name: given[v.name] for v in info.inputs if v.name in given}
     own = {name: InputSection(range=_range(info[name], signal)) for name, signal in signals.items()}
     changes = source.changes.model_copy(update={"inputs": own | source.changes.inputs})
     return load_source(source.model_copy(update={"changes": changes}), searches=False)

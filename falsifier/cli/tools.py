@@ -12,7 +12,7 @@ from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
 from falsifier.campaigns.published import PROTOCOL_SIMULATIONS
 from falsifier.cli.inspect import one_fmu
-from falsifier.cli.options import budget_option, directory_argument, json_option, out_option
+from falsifier.cli.options import budget_option, command, directory_argument, json_option, out_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
 
-@click.command()
+@command()
 @directory_argument
 def repair(*, directory: Path) -> None:
     """Repair the run or campaign in DIRECTORY after its files were damaged.
@@ -67,7 +67,7 @@ def _repair_run(directory: Path) -> list[str]:
     return findings
 
 
-@click.command()
+@command()
 @click.argument("fmu", type=click.Path(path_type=Path))
 @out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
@@ -78,7 +78,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
     say(f"{written} written")
 
 
-@click.command()
+@command()
 @click.argument(
     "what", type=click.Choice(["spec", "manifest", "journal", "campaign"]), default="spec", required=False
 )
@@ -92,7 +92,7 @@ def schema(*, what: str) -> None:
     say(json.dumps(found, indent=2))
 
 
-@click.command()
+@command()
 @click.argument("file", type=click.Path(path_type=Path, exists=True, dir_okay=False))
 @budget_option(PROTOCOL_SIMULATIONS, note=" per run; claims that used more are rejected")
 @json_option

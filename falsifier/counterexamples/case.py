@@ -107,7 +107,7 @@ class Case:
             raise SpecError(
                 f"the nearest miss of {problem.name} now violates (robustness "
                 f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
-                f"falsifier run ... --start-from {self.place}"
+                f"falsifier run ... --inputs {self.place}"
             )
         if not self.is_miss and not evaluation.violated:
             found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"

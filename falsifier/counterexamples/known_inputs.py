@@ -33,20 +33,22 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
         raise CandidateError(f"{place}: {error}") from None
 
 
-def best_of_run(directory: Path, requirement: str | None = None) -> Candidate:
-    """Return the candidate with the smallest robustness in a run.
+def recorded_inputs(place: Path, requirement: str) -> Candidate:
+    """Return a counterexample, or the candidate with the smallest robustness in a run.
 
     Args:
-        directory: run directory.
-        requirement: the requirement that it is judged by; None: the run's first.
+        place: counterexample file or run directory.
+        requirement: the requirement that a run is judged by, if it searched that; otherwise the run's first.
 
     Raises:
-        SpecError: if every simulation failed, or there was none.
+        SpecError: if it is neither, or every simulation of the run failed.
     """
-    names = manifest.read(directory).names
-    judged = judged_candidates(directory, requirement if requirement in names else names[0])
+    if not holds_run(place):
+        return Candidate.from_json(load(place).candidate)
+    names = manifest.read(place).names
+    judged = judged_candidates(place, requirement if requirement in names else names[0])
     if not judged:
-        raise SpecError(f"{directory}: no simulation of this run has a verdict; choose another run")
+        raise SpecError(f"{place}: no simulation of this run has a verdict; choose another run")
     return min(judged, key=lambda pair: pair[0])[1]
 
 
@@ -57,8 +59,6 @@ def judged_candidates(directory: Path, requirement: str) -> list[tuple[float, Ca
 
 
 def _contained(place: Path, problem: Problem) -> Candidate:
-    if holds_run(place):
-        return best_of_run(place, problem.name)
-    if place.suffix.lower() == ".csv":
+    if place.suffix.lower() == ".csv" and not place.is_dir():
         return Candidate(read_inputs(place, problem.info).signals)
-    return Candidate.from_json(load(place).candidate)
+    return recorded_inputs(place, problem.name)

@@ -108,7 +108,8 @@ def converse(
         f"{' | '.join(dict.fromkeys(problems))}"
     )
     if problems[-1].startswith(_CUT_OFF):
-        text += f"; allow longer replies (--llm-option max_tokens={_MOST_TOKENS}) or lower --effort"
+        text += f"; allow longer replies (--llm-option max_tokens={_MOST_TOKENS}), or less "
+        text += "effort (--llm NAME@low)"
     raise NoValidReplyError(text)
 
 

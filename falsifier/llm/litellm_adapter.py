@@ -125,7 +125,7 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
         ChatSetupError: naming the option.
     """
     if "timeout" in options:
-        raise ChatSetupError("--llm-option timeout: use --timeout SECONDS, which also limits slow replies")
+        raise ChatSetupError("timeout: use --llm-option timeout=SECONDS, which also limits slow replies")
     provider = provider_of(llm)
     is_own = api_base is not None or known(llm).local or not known(llm).keys or provider in _ROUTERS
     if not options or is_own:

@@ -75,6 +75,9 @@ def join(
         raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}", file=file)
     layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
     model = model or make_model(spec, layers, path)
+    if changes is not None:
+        changes = placed(changes, model.info, file)
+        layers[-1] = changes
     experiment, grid = _experiment(
         spec, layers, model.info, lambda stop: spec_formulas(spec, stop) if stl is None else [stl], file
     )
@@ -148,6 +151,7 @@ def join_formula(
         info = model.info
         system = replace(model, allow=(*model.allow, *changes.allow), deny=(*model.deny, *changes.deny))
         data = {"model": {}, "components": {n: {"fmu": str(part.fmu)} for n, part in model.parts.items()}}
+    changes = placed(changes, info, str(path))
     data["model"]["stop_time"] = changes.stop_time or info.stop_time
     if data["model"]["stop_time"] is None:
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
@@ -161,8 +165,7 @@ def join_formula(
         inputs = [v.name for v in info.inputs]
         why = "its inputs are unbounded" if inputs else "it has no inputs"
         raise SpecError(
-            f"{path}: nothing to search: {why}; add --input NAME=LOW:HIGH:POINTS or --param NAME=LOW:HIGH; "
-            f"{did_you_mean('', inputs)}"
+            f"{path}: nothing to search: {why}; add --search NAME=LOW:HIGH; {did_you_mean('', inputs)}"
         )
     every = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(spec, name, path=path, changes=every, model=system, searches=searches)
@@ -307,14 +310,47 @@ def _check_searched(
     )
 
 
+def placed(changes: ModelChanges, info: ModelInfo, file: str) -> ModelChanges:
+    """Return the changes with each name where the model has it: options do not say what is an input.
+
+    Raises:
+        SpecError: if the model has no such name, or cannot do with it what is asked.
+    """
+    inputs, parameters = dict[str, InputSection](), dict[str, ParameterSection]()
+    sections: list[tuple[str, InputSection | ParameterSection]] = [
+        *changes.inputs.items(),
+        *changes.parameters.items(),
+    ]
+    for name, section in sections:
+        if name not in info:
+            names = [v.name for v in info.variables if v.settable or v.causality == "input"]
+            raise SpecError(
+                f"the {info.noun} has no input, parameter or start value {name!r}; "
+                f"{did_you_mean(name, names)}",
+                file=file,
+            )
+        stated = section.model_dump(exclude_unset=True)
+        if info[name].causality == "input":
+            if isinstance(section.value, str):
+                raise SpecError(f"{name}: expected a number, got {section.value!r}", file=file)
+            inputs[name] = InputSection.model_validate(stated)
+        elif not stated.keys() <= {"range", "value"} or not stated:
+            raise SpecError(
+                f"{name} is no input: --search {name}=LOW:HIGH searches it, without control points", file=file
+            )
+        else:
+            parameters[name] = ParameterSection.model_validate(stated)
+    return changes.model_copy(update={"inputs": inputs, "parameters": parameters})
+
+
 def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
     """Say which option makes one of the inputs, which all have fixed values, a searched one."""
     if not inputs:
-        return "add --input NAME=LOW:HIGH or --param NAME=LOW:HIGH"
+        return "add --search NAME=LOW:HIGH"
     name = next(iter(inputs))
     low, high = info[name].low, info[name].high
     limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
-    return f"all inputs have fixed values; give one of them a range, for example --input {name}={limits}"
+    return f"all inputs have fixed values; search one of them, for example --search {name}={limits}"
 
 
 def _bounded_inputs(info: ModelInfo) -> dict[str, InputSection]:

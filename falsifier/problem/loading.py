@@ -203,12 +203,12 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         problem = replace(problem, named_context=named_context(source))
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
-            raise SpecError("--free makes the inputs free; drop --parameterization fixed, or --free")
+            raise SpecError("shortest_piece makes inputs free: parameterization must be free, not fixed")
         step = problem.experiment.step_size or problem.experiment.output_interval
         if source.shortest_piece < step:
             raise SpecError(
-                f"--free {source.shortest_piece:g}: inputs change at communication steps, {step:g} s apart; "
-                "give at least that, or a smaller --output-interval"
+                f"--parameterization free:{source.shortest_piece:g}: inputs change at communication steps, "
+                f"{step:g} s apart; give at least that, or a smaller --output-interval"
             )
         problem = replace(problem, space=problem.space.freed(source.shortest_piece))
     if source.parameterization == "fixed":
@@ -240,8 +240,8 @@ def _of_spec(source: ProblemSource, *, searches: bool) -> Problem:
         if len(spec.requirements) > 1:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{source.target.rstrip(':')}:{next(iter(spec.requirements))}, or falsify all of them "
-                "with --all. "
+                f"{source.target.rstrip(':')}:{next(iter(spec.requirements))}; falsifier run "
+                f"{source.target.rstrip(':')} falsifies all of them. "
                 f"Known: {', '.join(spec.requirements)}",
                 file=str(path),
             )
@@ -343,7 +343,7 @@ def _check_keys(arguments: Mapping[str, object]) -> None:
     if beside is not None:
         raise SpecError(
             "no argument of a template on the command line; simulations are changed by the other options "
-            "(--stop-time, --input, --param, ...), or write a spec with [requirements.NAME]",
+            "(--stop-time, --set, --search, ...), or write a spec with [requirements.NAME]",
             file=_OPTION,
             key=beside,
         )

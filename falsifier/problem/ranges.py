@@ -9,7 +9,6 @@ from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpac
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.problem.sections import InputSection, ParameterSection
 from falsifier.problem.shorthand import named_file
-from falsifier.problem.source import MODEL_FILES
 
 # Number of control points of an input of which nobody states it: both ends, the middle and two in between.
 DEFAULT_POINTS = 5
@@ -53,7 +52,7 @@ def search_space(
     for name, parameter in parameters.items():
         key = f"parameters.{name}"
         if name in info and info[name].causality == "input":
-            raise SpecError(f"{name} is an input; {_as_input(name, parameter, file)}", file=file, key=key)
+            raise SpecError(f"{name} is an input; write [inputs.{name}]", file=file, key=key)
         settable = [v for v in info.variables if v.settable and v.causality != "input"]
         _check_unconnected(name, info, file, key)
         if name in info and not info[name].settable:
@@ -85,7 +84,7 @@ def input_range(variable: Variable, section: InputSection, *, file: str | None, 
         if smallest is None or largest is None:
             raise SpecError(
                 "the FMU specifies no min and max for this input; add range = [low, high] or "
-                f"--input {variable.name}=LOW:HIGH[:POINTS]",
+                f"--search {variable.name}=LOW:HIGH[:POINTS]",
                 file=file,
                 key=f"{key}.range",
             )
@@ -255,14 +254,3 @@ def _variable(name: str, variables: Iterable[Variable], otherwise: str, file: st
     if name not in known:
         raise SpecError(f"{otherwise}; {did_you_mean(name, known)}", file=file, key=key)
     return known[name]
-
-
-def _as_input(name: str, section: ParameterSection, file: str) -> str:
-    """Say how to write as an input what was written as a parameter."""
-    text = "LOW:HIGH" if section.value is None else str(section.value)
-    if section.range is not None:
-        text = ":".join(f"{value:g}" for value in section.range)
-    option = f"--input {name}={text}"
-    if file.endswith(MODEL_FILES):
-        return f"write {option}"
-    return f"write {option}, or [inputs.{name}] in the spec"

@@ -60,20 +60,22 @@ def changes_from(
 
 def changes_from_options(
     *,
-    inputs: Iterable[str] = (),
-    parameters: Iterable[str] = (),
+    values: Iterable[str] = (),
+    ranges: Iterable[str] = (),
     allow: Iterable[str] = (),
     deny: Iterable[str] = (),
     **experiment: float | Interface | None,
 ) -> ModelChanges:
     """Return the changes for command-line options.
 
+    Whether a name is an input or a parameter is known when the changes are joined with the model.
+
     Args:
-        inputs: ``name=low:high`` (searched with the spec's control points, or else a free parameterization),
-            ``name=low:high:points`` or ``name=low:high:points:interpolation`` (searched with these), ``name``
-            (searched as in the spec, or between the FMU's min and max) or ``name=value`` (kept constant).
-        parameters: ``name=value`` (fixed), ``name=low:high`` (searched) or ``name=text`` (a string; a file is
-            named relative to the current folder).
+        values: ``name=value`` (an input is kept constant, a parameter or start value set) or ``name=text`` (a
+            string; a file is named relative to the current folder).
+        ranges: ``name=low:high`` (an input is searched with the spec's control points, or else a free
+            parameterization), ``name=low:high:points``, ``name=low:high:points:interpolation``, or ``name``
+            (an input is searched as in the spec, or between the FMU's min and max).
         allow: ``write:PATH``, ``read:PATH`` or ``programs``; paths begin in the current folder.
         deny: ``network``.
         experiment: fields of ModelChanges; None leaves a field unchanged.
@@ -81,19 +83,24 @@ def changes_from_options(
     Raises:
         SpecError: naming the option that is invalid.
     """
-    parameter_sections = _once("--param", map(_parameter, parameters))
-    return _changes(_once("--input", map(_input, inputs)), parameter_sections, experiment, allow, deny)
+    constant = _once("--set", map(_value, values))
+    searched = _once("--search", map(_range, ranges))
+    if both := sorted(constant.keys() & searched.keys()):
+        raise SpecError(f"{both[0]}: --set keeps it constant, --search varies it; drop one of them")
+    return _changes(searched, constant, experiment, allow, deny)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     """Return the command-line options for these changes, the inverse of ``changes_from_options``.
 
-    >>> options_from(changes_from_options(inputs=["u=0:1:3"], stop_time=5.0))
-    [('--input', 'u=0:1:3'), ('--stop-time', '5.0')]
+    >>> options_from(changes_from_options(ranges=["u=0:1:3"], stop_time=5.0))
+    [('--search', 'u=0:1:3'), ('--stop-time', '5.0')]
     """
-    options = [("--input", _input_option(name, section)) for name, section in changes.inputs.items()]
-    for name, parameter in changes.parameters.items():
-        options.append(("--param", f"{name}={_parameter_option(parameter)}"))
+    options = [
+        _option(name, section)
+        for sections in (changes.inputs, changes.parameters)
+        for name, section in sections.items()
+    ]
     for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))
@@ -158,49 +165,47 @@ def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[
     return found
 
 
-def _input(option: str) -> tuple[str, dict[str, object]]:
+def _value(option: str) -> tuple[str, dict[str, object]]:
+    name, parts = _split(option, "--set", "NAME=VALUE", "mass=1200")
+    numbers = [_as_number(part) for part in parts]
+    if None in numbers:
+        return name, {"value": named_file(":".join(parts), Path())}
+    if len(numbers) > 1:
+        raise SpecError(f"--set {option}: expected one value; to search a range: --search {option}")
+    return name, {"value": numbers[0]}
+
+
+def _range(option: str) -> tuple[str, dict[str, object]]:
     if option.strip() and "=" not in option:
         return option.strip(), {}
-    name, parts = _split(option, "--input")
+    name, parts = _split(option, "--search", "NAME=LOW:HIGH[:POINTS]", "throttle=0:100:7")
     if len(parts) == 1:
-        if _as_number(parts[0]) is None:
+        if _as_number(parts[0]) is not None:
             raise SpecError(
-                f"--input {option}: expected a number, or a range LOW:HIGH with a colon, for example "
-                f"--input {name}={_as_range(parts[0])}"
+                f"--search {option}: expected a range LOW:HIGH; to keep it constant: --set {option}"
             )
-        return name, {"value": _number(parts[0], option)}
+        raise SpecError(
+            f"--search {option}: expected a range LOW:HIGH with a colon, for example "
+            f"--search {name}={_as_range(parts[0])}"
+        )
     if "" in (part.strip() for part in parts[:2]):
-        raise SpecError(f"--input {option}: expected NAME=LOW:HIGH, for example --input {name}=0:1")
+        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH, for example --search {name}=0:1")
     section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
     if len(parts) > 2:
         if not parts[2].isdigit():
             raise SpecError(
-                f"--input {option}: {parts[2]!r} is not a number of control points; expected 1 or more"
+                f"--search {option}: {parts[2]!r} is not a number of control points; expected 1 or more"
             )
         section["control_points"] = int(parts[2])
     if len(parts) > 3:
         if parts[3] not in INTERPOLATIONS:
             raise SpecError(
-                f"--input {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
+                f"--search {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
             )
         section["interpolation"] = parts[3]
     if len(parts) > 4:
-        raise SpecError(f"--input {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
+        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
     return name, section
-
-
-def _parameter(option: str) -> tuple[str, dict[str, object]]:
-    name, parts = _split(option, "--param")
-    numbers = [_as_number(part) for part in parts]
-    if None in numbers:
-        return name, {"value": named_file(":".join(parts), Path())}
-    if len(numbers) == 1:
-        return name, {"value": numbers[0]}
-    if len(numbers) == 2:
-        return name, {"range": (numbers[0], numbers[1])}
-    raise SpecError(
-        f"--param {option}: expected NAME=VALUE or NAME=LOW:HIGH, for example --param {name}=1000:1500"
-    )
 
 
 def named_file(text: str, folder: Path) -> str:
@@ -213,11 +218,9 @@ def named_file(text: str, folder: Path) -> str:
     return str(path.absolute()) if text and is_path else text
 
 
-def _split(option: str, flag: str) -> tuple[str, list[str]]:
+def _split(option: str, flag: str, ways: str, example: str) -> tuple[str, list[str]]:
     name, equals, rest = option.partition("=")
     if not equals or not name.strip() or not rest.strip():
-        ways = "NAME=LOW:HIGH:POINTS" if flag == "--input" else "NAME=VALUE or NAME=LOW:HIGH"
-        example = "throttle=0:100:7" if flag == "--input" else "mass=1200 or mass=1000:1500"
         raise SpecError(f"{flag} {option}: expected {ways}, for example {flag} {example}")
     return name.strip(), rest.strip().split(":")
 
@@ -242,20 +245,15 @@ def _as_range(text: str) -> str:
     return f"{match[1]}:{match[2]}" if match else "0:100"
 
 
-def _parameter_option(section: ParameterSection) -> str:
-    if section.range is not None:
-        return ":".join(f"{v:.17g}" for v in section.range)
-    return section.value if isinstance(section.value, str) else f"{section.value:.17g}"
-
-
-def _input_option(name: str, section: InputSection) -> str:
+def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:
     if section.value is not None:
-        return f"{name}={section.value:.17g}"
+        value = section.value if isinstance(section.value, str) else f"{section.value:.17g}"
+        return "--set", f"{name}={value}"
     if section.range is None:
-        return name
+        return "--search", name
     said = [f"{v:.17g}" for v in section.range]
-    if section.control_points is not None:
+    if isinstance(section, InputSection) and section.control_points is not None:
         said.append(str(section.control_points))
         if section.interpolation is not None:
             said.append(section.interpolation)
-    return f"{name}={':'.join(said)}"
+    return "--search", f"{name}={':'.join(said)}"

@@ -119,7 +119,7 @@ class Budget:
             if spent.cost is None:
                 raise SpecError(
                     "the price of this language model is unknown, so its cost cannot be limited: state the "
-                    "price (--price), or limit the tokens instead (--max-tokens)"
+                    "price (--llm-option price=SENT:RECEIVED), or limit the tokens instead (--max-tokens)"
                 )
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"

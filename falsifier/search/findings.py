@@ -156,7 +156,7 @@ def _remedy(problem: Problem, coarse: Sequence[InputRange]) -> str:
     stated = source.changes.inputs if source is not None else {}
     open_ = [r for r in coarse if r.name in stated]
     if open_:
-        options = " ".join(f"--input {r.name}={r.low:g}:{r.high:g}" for r in open_)
+        options = " ".join(f"--search {r.name}={r.low:g}:{r.high:g}" for r in open_)
         return f"{_REFINE}, or {options} without a number of control points"
     limits = limits_of([problem])
     count, shortest = limits.max_control_points, limits.min_interval

@@ -138,7 +138,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
     if max_cost is not None and price_of(llm) is None:
         raise SpecError(
             f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
-            "--price SENT:RECEIVED, or use --max-tokens instead"
+            "--llm-option price=SENT:RECEIVED, or use --max-tokens instead"
         )
     return connect(
         llm.name,

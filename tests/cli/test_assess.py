@@ -32,7 +32,7 @@ def test_violations_are_counted_and_decide_the_exit_code(tmp_path: Path) -> None
 
 
 def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
-    vary = ["--vary", "G[0,10] (x <= {limit})", "--between", "0:3", "--engine", "corners"]
+    vary = ["--stl", "G[0,10] (x <= {limit})", "--between", "0:3", "--engine", "corners"]
     done = falsifier("margin", NEVER, *vary, "--budget", "40", "--json", cwd=tmp_path)
     assert done.code == 1, done.err
     assert 0.95 < done.json["falsified"] < done.json["unfalsified"] < 1.05
@@ -40,9 +40,12 @@ def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
 
 
 def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
-    for wrong in (["--between", "100"], ["--between", "0:3", "--stl", "x <= 1"]):
-        done = falsifier("margin", NEVER, "--vary", "G[0,10] (x <= {limit})", *wrong, cwd=tmp_path)
-        assert done.code == 2 and ("--between 100" in done.err or "drop --stl" in done.err)
+    for wrong, said in (
+        (["--stl", "x <= {limit}", "--between", "100"], "--between 100"),
+        (["--stl", "x <= 1", "--between", "0:3"], "--stl: expected a formula with {limit}"),
+    ):
+        done = falsifier("margin", NEVER, *wrong, cwd=tmp_path)
+        assert done.code == 2 and said in done.err
 
 
 def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path) -> None:

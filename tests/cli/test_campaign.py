@@ -50,11 +50,11 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
 
 
 def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:
-    stopped = bench(command, "--out", "c", "--total-budget", "5")
+    stopped = bench(command, "--out", "c", "--total", "simulations=5")
     assert stopped.exit_code == 3
     assert "the budget of 5 simulations is used up" in stopped.stderr
     assert "falsifier resume c" in stopped.stderr
-    resumed = command("resume", "c", "--total-budget", "1000", "--quiet")
+    resumed = command("resume", "c", "--total", "simulations=1000", "--quiet")
     assert resumed.exit_code == 0, resumed.output
     whole = bench(command, "--out", "whole", "--quiet")
     times = {"simulation_seconds", "seconds"}
@@ -88,12 +88,10 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
             "5",
             "--max-cost",
             "2",
-            "--total-cost",
-            "9",
-            "--calls",
-            "3",
+            "--total",
+            "cost=9",
         ),
-        *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024", "--effort", "high", "--price", "1:2"),
+        *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024@high", "--llm-option", "price=1:2"),
         *("--variant", "MP4", "--variant", "MP5", "--anonymous"),
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
@@ -104,7 +102,7 @@ def test_methods_are_all_combinations(command: Any, monkeypatch: pytest.MonkeyPa
     assert ("openai/gpt-5-nano", "low", "MP5", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}
-    assert (request.limits.cost, request.calls) == (9.0, 3)
+    assert request.limits.cost == 9.0
     assert {(r.llm.price, r.llm.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
 
 
@@ -118,7 +116,7 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("falsifier.cli.campaign.check_request", lambda *_, **__: None)
     monkeypatch.setattr("falsifier.cli.campaign.run_campaign", record)
     command("bench", "--suite", "arch-comp", "--engine", "uniform")
-    command("bench", "--suite", "arch-comp", "--instance", "2", "--engine", "uniform")
+    command("bench", "--suite", "arch-comp", "--parameterization", "instance2", "--engine", "uniform")
     command("bench", "AT1", "--engine", "surrogate")
     first, second, plain = seen
     # A suite is run as the competition does; other targets as falsifier run would.
@@ -151,8 +149,8 @@ def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
     [
         (["bench"], "expected either TARGETS (requirements or specs)"),
         (["bench", HARD, "--suite", "arch-comp"], "expected either TARGETS (requirements or specs)"),
-        (["bench", HARD, "--instance", "2"], "--instance requires --suite"),
-        (["bench", HARD, "--variant", "MP1"], "--variant and --effort require --llm"),
+        (["bench", HARD, "--parameterization", "free:1"], "applies to single runs only"),
+        (["bench", HARD, "--variant", "MP1"], "--variant requires --llm"),
         (["bench", HARD, "--anonymous"], "--anonymous: applies to language models only"),
     ],
 )

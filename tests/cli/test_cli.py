@@ -13,10 +13,10 @@ from tests.command import ROOT, falsifier
     [
         (["run", "AT1", "--stl", "G[0,20] (sped <= 120)"], "did you mean 'speed'"),
         (["run", "AT1", "--engine", "corner"], "did you mean 'corners'"),
-        (["run", "AT1", "--input", "throtle=0:100:7"], "did you mean 'throttle'"),
+        (["run", "AT1", "--search", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "simulations: expected a whole number, at least 1, got 0"),
         (["run", "AT1", "--budget", "many"], "many"),
-        (["run", "AT1", "--effort", "low"], "add --llm NAME"),
+        (["run", "AT1", "--variant", "MP4"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
         (["run", "gone.fmu", "--stl", "G (x >= 0)"], "gone.fmu: no such file"),
         (["run", "gone.fmu"], "gone.fmu: no such file"),

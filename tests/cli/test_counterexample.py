@@ -155,7 +155,7 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(bundled("fmus") / "AT.fmu", folder / "AT.fmu")
     spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
     (folder / "my.toml").write_text(spec.partition("# AT5i")[0])
-    done = run(folder, "run", "my.toml", "--all", "--engine", "corners", "--quiet", "--out", "run")
+    done = run(folder, "run", "my.toml", "--engine", "corners", "--quiet", "--out", "run")
     assert done.code == 1, done.err
     assert "2 of 2 falsified" in done.out
     return folder

@@ -65,7 +65,7 @@ def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
     assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0
     again = falsifier("init", "car.fmu", cwd=tmp_path)
-    assert (again.code, "--force" in again.err) == (2, True)
+    assert (again.code, "delete it first" in again.err) == (2, True)
     for command in (("check", "car.toml"), ("run", "car.toml", "--budget", "2"), ("run", "car.toml:R1")):
         asked = falsifier(*command, cwd=tmp_path)
         assert asked.code == 2

@@ -20,7 +20,7 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
         falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         sent = server.received[1].body["messages"]
     printed = falsifier(
-        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--samples", "1", "--json"),
+        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--at", "2", "--json"),
         cwd=tmp_path,
     )
     assert json.loads(printed.out) == sent
@@ -64,11 +64,6 @@ def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path
     assert "throttle" not in text
 
 
-def test_a_prompt_of_fewer_samples_needs_a_run(tmp_path: Path) -> None:
-    done = falsifier("llm", "prompt", "AT1", "--samples", "1", cwd=tmp_path)
-    assert (done.code, "--after" in done.err) == (2, True)
-
-
 def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
     with serving(Step("ready")) as server:
         done = falsifier("llm", "check", "openai/mine", "--api-base", server.url, cwd=tmp_path, env=ENV)
@@ -79,19 +74,21 @@ def test_check_reports_the_answer_and_what_it_takes(tmp_path: Path) -> None:
 
 
 def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
-    asking = ("llm", "prompt", "AT1", "--variant", "MP2", "--reply", "points", "--json")
+    asking = ("llm", "prompt", "AT1", "--variant", "MP2", "--llm-option", "reply=points", "--json")
     printed = json.loads(falsifier(*asking, cwd=tmp_path).out)
     with serving(Step("All out. <point>100, 100, 100, 100, 100, 100, 100, 0, 0, 0</point>")) as server:
         done = falsifier(
-            *at1(server.url, "--variant", "MP2", "--reply", "points", "--out", "run"), cwd=tmp_path, env=ENV
+            *at1(server.url, "--variant", "MP2", "--llm-option", "reply=points", "--out", "run"),
+            cwd=tmp_path,
+            env=ENV,
         )
         (asked,) = server.received
     assert (done.code, asked.body["messages"]) == (1, printed)
     assert "response_format" not in asked.body and "</point>" in printed[0]["content"]
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert '"reply": "points"' in json.dumps(manifest)
-    unnamed = falsifier("run", "AT1", "--reply", "points", cwd=tmp_path)
-    assert (unnamed.code, "--reply: applies to language models only" in unnamed.err) == (2, True)
+    unnamed = falsifier("run", "AT1", "--llm-option", "reply=points", cwd=tmp_path)
+    assert (unnamed.code, "--llm-option: applies to language models only" in unnamed.err) == (2, True)
 
 
 def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> None:
@@ -110,7 +107,7 @@ def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> Non
 
 def test_a_run_without_a_usable_answer_fails_and_says_why_in_the_last_line(tmp_path: Path) -> None:
     with serving(*[Step("[]")] * 6) as server:
-        limits = ("--max-tokens", "200", "--price", "1:1", "--no-cache")
+        limits = ("--max-tokens", "200", "--llm-option", "price=1:1", "--llm-option", "cache=no")
         done = falsifier(*at1(server.url, *limits, "--out", "run"), cwd=tmp_path, env=ENV)
         again = falsifier(*at1(server.url, *limits, "--json"), cwd=tmp_path, env=ENV)
     assert (done.code, again.code, again.json["status"]) == (3, 3, "failed")
@@ -123,7 +120,17 @@ def test_a_campaign_counts_a_run_without_a_usable_answer_as_failed(tmp_path: Pat
     with serving(*[Step("[]")] * 6) as server:
         done = falsifier(
             *("bench", "AT1", "--llm", "openai/gpt-5-mini", "--api-base", server.url, "--runs", "1"),
-            *("--max-tokens", "200", "--price", "1:1", "--no-cache", "--out", "c", "--json"),
+            *(
+                "--max-tokens",
+                "200",
+                "--llm-option",
+                "price=1:1",
+                "--llm-option",
+                "cache=no",
+                "--out",
+                "c",
+                "--json",
+            ),
             cwd=tmp_path,
             env=ENV,
         )

@@ -1,13 +1,12 @@
 """Options about language models."""
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
 from falsifier.cli import cli
-from falsifier.cli.llm_options import asking
+from falsifier.cli.llm_options import read_llm_options
 
 
 @pytest.mark.parametrize("command", [["run"], ["bench"]])
@@ -19,10 +18,10 @@ from falsifier.cli.llm_options import asking
             ["--max-tokens", "10", "--max-cost", "1"],
             "--max-tokens, --max-cost: applies to language models only",
         ),
-        (["--llm", "nobody/x", "--timeout", "nan"], "--timeout nan: expected a number of seconds"),
+        (["--llm", "nobody/x", "--llm-option", "timeout=nan"], "timeout=nan: expected a number of seconds"),
         (
-            ["--llm", "nobody/x", "--price", "2"],
-            "--price 2: expected SENT:RECEIVED in US dollars per million tokens sent and received, for "
+            ["--llm", "nobody/x", "--llm-option", "price=2"],
+            "price=2: expected SENT:RECEIVED in US dollars per million tokens sent and received, for "
             "example 0.25:2",
         ),
     ],
@@ -40,6 +39,4 @@ def test_options_of_language_models_that_cannot_be_used_are_wrong_usage(
     ("value", "passed"), [("4000", 4000), ("0.5", 0.5), ("low", "low"), ("nan", "nan"), ("-inf", "-inf")]
 )
 def test_options_are_passed_as_finite_numbers_or_as_text(value: str, passed: str | float) -> None:
-    options: dict[str, Any] = dict.fromkeys(("api_base", "timeout", "fallback", "reply", "price"))
-    options |= {"anonymous": False, "no_cache": False, "llm_options": (f"name={value}",)}
-    assert asking(options, named=True)["options"] == {"name": passed}
+    assert read_llm_options([f"name={value}"]) == {"options": {"name": passed}}

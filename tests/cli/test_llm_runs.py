@@ -69,7 +69,9 @@ def test_after_three_bad_replies_the_run_goes_on_with_a_random_change(tmp_path: 
 
 def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
     with serving(reply(BRAKE_LATE), Step(status=401)) as server:
-        broken = falsifier(*at1(server.url, "--out", "run", "--no-cache"), cwd=tmp_path, env=ENV)
+        broken = falsifier(
+            *at1(server.url, "--out", "run", "--llm-option", "cache=no"), cwd=tmp_path, env=ENV
+        )
         assert broken.code == 3
         assert "OPENAI_API_KEY" in broken.out
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
@@ -85,7 +87,9 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
 
 def test_a_resumed_run_asks_again_where_it_failed_and_has_paid_for_that(tmp_path: Path) -> None:
     with serving(*[reply(BRAKE_LATE)] * 10) as server:
-        broken = falsifier(*at1(server.url, "--out", "run", "--no-cache"), cwd=tmp_path, env=ENV)
+        broken = falsifier(
+            *at1(server.url, "--out", "run", "--llm-option", "cache=no"), cwd=tmp_path, env=ENV
+        )
     assert (broken.code, "to continue: falsifier resume run" in broken.out + broken.err) == (3, True)
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     with serving(reply(FULL)) as server:
@@ -117,7 +121,7 @@ def test_an_unknown_option_is_refused_before_the_first_simulation(tmp_path: Path
     named = ("run", "AT1", "--llm", "openai/gpt-5-mini", "--out", "run", "--llm-option")
     for option, told in (
         ("foo=1", "--llm-option foo: openai has no such option"),
-        ("timeout=9", "--timeout"),
+        ("timeout=x", "expected a number of seconds"),
     ):
         done = falsifier(*named, option, cwd=tmp_path, env={"OPENAI_API_KEY": "sk-some-key"})
         assert (done.code, told in done.err) == (2, True), done.err

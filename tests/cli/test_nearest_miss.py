@@ -16,7 +16,7 @@ def test_a_run_that_falsified_nothing_is_asked_about_its_nearest_miss(tmp_path: 
         assert "counterexample" not in done.out
     pictures = ("nearest-miss.png", "shrunk.png", "robustness-map.png")
     assert all((tmp_path / "r" / name).exists() for name in pictures)
-    shrunk = falsifier("simulate", never, "--input-file", "r/shrunk.csv", cwd=tmp_path)
+    shrunk = falsifier("simulate", never, "--inputs", "r/shrunk.csv", cwd=tmp_path)
     assert shrunk.code == 0 and "not violated by these inputs" in shrunk.out
     refused = falsifier("explain", "r", "--map", "--at-most", "0.1", cwd=tmp_path)
     assert refused.code == 2 and "--at-most: applies to --shrink only" in refused.err

@@ -39,4 +39,4 @@ def test_two_formulas_are_refused_instead_of_the_last_one_taken(tmp_path: Path) 
     twice = ("--stl", "G (y <= 5)", "--stl", "G (y <= 6)")
     done = falsifier("run", str(fixture("CheapLag_2")), *twice, cwd=tmp_path)
     assert done.code == 2
-    assert "--stl: given 2 times" in done.err and "--all" in done.err
+    assert "--stl: given 2 times" in done.err and "falsifier run my.toml" in done.err

@@ -61,8 +61,8 @@ def asked(server: Server, model: str) -> list[str]:
         "openai/gpt-5-mini",
         "--api-base",
         server.url,
-        "--price",
-        "1:2",
+        "--llm-option",
+        "price=1:2",
     ]
 
 

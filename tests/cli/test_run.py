@@ -56,7 +56,7 @@ def test_the_text_names_what_was_found_and_where_it_is(tmp_path: Path) -> None:
 
 def test_a_used_up_budget_ends_with_zero(tmp_path: Path) -> None:
     done = falsifier(
-        "run", "AT1", "--engine", "uniform", "--budget", "3", "--param", "finalDrive=3", cwd=tmp_path
+        "run", "AT1", "--engine", "uniform", "--budget", "3", "--set", "finalDrive=3", cwd=tmp_path
     )
     assert done.code == 0, done.err
     assert "not falsified after 3 simulations" in done.out
@@ -104,7 +104,7 @@ def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path)
 def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path) -> None:
     fmu, stl = str(bundled("fmus") / "AT.fmu"), "G[0,20] (speed <= 200)"
     common = ("--engine", "corners", "--budget", "1", "--quiet", "--json")
-    done = falsifier("run", fmu, "--stl", stl, "--input", "throttle", *common, cwd=tmp_path)
+    done = falsifier("run", fmu, "--stl", stl, "--search", "throttle", *common, cwd=tmp_path)
     assert done.json["best"]["signals"].keys() == {"throttle"}
     assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
     manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
@@ -117,18 +117,21 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((*SPEED, "--input", "throttle=50", "--input", "brake=0"), "for example --input throttle=0:100"),
+        ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "for example --search throttle=0:100"),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
-        ((*SPEED, "--input", "throttle=0-100"), "for example --input throttle=0:100"),
-        ((*SPEED, "--input", "throttle=-5.5..7"), "for example --input throttle=-5.5:7"),
-        ((*SPEED, "--param", "throttle=0:100"), "throttle is an input; write --input throttle=0:100"),
-        (("AT1", "--param", "throttle=3"), "write --input throttle=3.0, or [inputs.throttle] in the spec"),
+        ((*SPEED, "--search", "throttle=0-100"), "for example --search throttle=0:100"),
+        ((*SPEED, "--search", "throttle=-5.5..7"), "for example --search throttle=-5.5:7"),
+        ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=0:100"),
+        ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
+        ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
+        (("AT1", "--set", "throtle=3"), "did you mean 'throttle'?"),
+        (("my.fmu", "--stl", "G (speed <= 1)", "--parameterization", "fixd"), "only specs have profiles"),
+        (("AT1", "--parameterization", "free,fixed"), "for example instance2,fixed"),
+        (("AT1", "--parameterization", "free:x"), "expected a time in s"),
         (("at1",), "did you mean 'AT1'?"),
-        (("AT1", "--all"), "for all of its spec: falsifier run AT --all"),
         (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
-        (("AT",), "for example AT:AT1, or falsify all of them with --all"),
         ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
-        ((*SPEED, "--input", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
+        ((*SPEED, "--search", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
         (("empty.toml",), "empty.toml: the file contains nothing; write [model]"),
     ],
 )
@@ -193,14 +196,14 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
 
 def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
     falsify("AT1", "corners", budget=1, directory=tmp_path / "run")
-    for option in (("--total-budget", "8"), ("--jobs", "2")):
+    for option in (("--total", "simulations=8"), ("--jobs", "2")):
         refused = falsifier("resume", "run", *option, cwd=tmp_path)
         assert refused.code == 2
         assert "apply to campaigns only" in refused.err
 
 
 def test_parameters_alone_cannot_be_refined(tmp_path: Path) -> None:
-    stl = ("--stl", "G[0,10] (y <= 11)", "--input", "u=3", "--param", "gain=0.5:1", "--budget", "1")
+    stl = ("--stl", "G[0,10] (y <= 11)", "--set", "u=3", "--search", "gain=0.5:1", "--budget", "1")
     done = falsifier("run", str(fixture("CheapLag_2")), *stl, "--refine", cwd=tmp_path)
     assert done.code == 0, done.err
     assert "--refine: no input is searched" in done.err
@@ -222,21 +225,11 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     assert "Traceback" not in done.err
 
 
-def test_a_parameter_that_is_not_understood_is_told_with_a_parameter_as_example(tmp_path: Path) -> None:
-    for given in ("mass", "mass=", "mass=1:2:3"):
-        done = falsifier("run", "AT1", "--param", given, cwd=tmp_path)
-        assert done.code == 2
-        assert (
-            "NAME=VALUE or NAME=LOW:HIGH, for example --param mass=" in done.err
-            and "throttle" not in done.err
-        )
-
-
 def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
     arguments = (
         "--stl",
         "G[0,20] (brake > 10 or speed <= 120)",
-        "--input",
+        "--search",
         "throttle=0:100:7",
         "--budget",
         "9",
@@ -250,7 +243,7 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
     arguments = (
         "--stl",
         "G[0,10] (y <= 100)",
-        "--input",
+        "--search",
         "u=4.9:10:1",
         "--budget",
         "8",
@@ -268,7 +261,7 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
 
 def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
     """A bug that only fast inputs reach: a level with the command's own control points does not find it."""
-    stl = ("--stl", "G[0,10] (u - y <= 1.5)", "--input", "u=-1:1:3", "--stop-time", "10")
+    stl = ("--stl", "G[0,10] (u - y <= 1.5)", "--search", "u=-1:1:3", "--stop-time", "10")
     search = ("--engine", "cma", "--budget", "30", "--out", "run", "--refine")
     done = falsifier("run", str(fixture("CheapLag_2")), *stl, *search, cwd=tmp_path)
     assert done.code == 1, done.err
@@ -290,7 +283,7 @@ def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
 
 def test_known_inputs_of_a_refined_search_keep_what_its_finer_levels_can_express(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0,-1\n4,-1\n4,1\n10,1\n")
-    known = ("--engine", "uniform", "--budget", "3", "--start-from", "u.csv", "--refine", "--json")
+    known = ("--engine", "uniform", "--budget", "3", "--inputs", "u.csv", "--refine", "--json")
     done = falsifier("run", "python:tests.problems:fast_only", *known, cwd=tmp_path)
     assert done.code == 1, done.err
     assert done.json["spent"]["simulations"] == 1

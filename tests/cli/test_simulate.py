@@ -13,14 +13,14 @@ EASY = "python:tests.problems:easy"
 
 def test_own_inputs_are_judged_and_written(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u,x\n0,1,0\n8,1,0\n8,-1,0\n10,-1,0\n")
-    done = falsifier("simulate", EASY, "--input-file", "u.csv", "--out", "o", "--json", cwd=tmp_path)
+    done = falsifier("simulate", EASY, "--inputs", "u.csv", "--out", "o", "--json", cwd=tmp_path)
     assert done.code == 1, done.err
     assert done.json["violated"] and done.json["critical_time"] == pytest.approx(8)
     assert "not inputs of the model, and not used: x" in done.err
     assert {OUTPUT, INPUT, CRITICAL} <= colours(tmp_path / "o" / "trajectory.png")
     header, *rows = (tmp_path / "o" / "trajectory.csv").read_text().splitlines()
     assert header == "time,x,u" and len(rows) == 101
-    again = falsifier("simulate", EASY, "--input-file", "o/input.csv", "--json", cwd=tmp_path)
+    again = falsifier("simulate", EASY, "--inputs", "o/input.csv", "--json", cwd=tmp_path)
     assert again.json["robustness"] == done.json["robustness"]
 
 
@@ -71,9 +71,9 @@ def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--set", "u=high"], "expected NAME=VALUE"),
+        (["--set", "u=high"], "takes no options"),
         (["--set", "w=1"], "no parameter 'w'"),
-        (["--input-file", "none.csv"], "none.csv"),
+        (["--inputs", "none.csv"], "none.csv"),
     ],
 )
 def test_wrong_use_ends_with_two(arguments: list[str], said: str, tmp_path: Path) -> None:
@@ -89,7 +89,7 @@ def test_a_failed_simulation_ends_with_three(tmp_path: Path) -> None:
 def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0,1\n10,1\n")
     target = "python:tests.problems:impossible"
-    start = ["--start-from", "u.csv", "--engine", "uniform", "--budget", "3", "--json"]
+    start = ["--inputs", "u.csv", "--engine", "uniform", "--budget", "3", "--json"]
     done = falsifier("run", target, *start, "--out", "run", cwd=tmp_path)
     assert done.code == 0, done.err
     lines = [json.loads(line) for line in (tmp_path / "run" / "journal.jsonl").read_text().splitlines()]
@@ -103,10 +103,10 @@ def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) ->
     resumed = falsifier("resume", "run", "--json", cwd=tmp_path)
     assert resumed.code == 0, resumed.err
     assert resumed.json["best"] == done.json["best"]
-    assert falsifier("run", target, "--start-from", "run", *start[2:], cwd=tmp_path).code == 0
+    assert falsifier("run", target, "--inputs", "run", *start[2:], cwd=tmp_path).code == 0
 
 
 def test_inputs_outside_the_ranges_do_not_start_a_run(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0,7\n")
-    done = falsifier("run", EASY, "--start-from", "u.csv", cwd=tmp_path)
+    done = falsifier("run", EASY, "--inputs", "u.csv", cwd=tmp_path)
     assert done.code == 2 and "u.csv: input 'u' at t = 0 s: 7 is outside its range [-1, 1]" in done.err

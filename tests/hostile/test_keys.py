@@ -59,7 +59,7 @@ def run(behaviour: Behaviour, folder: Path) -> Done:
     with misbehaving(behaviour) as server:
         return falsifier(
             *("run", "AT1", "--llm", "openai/m", "--api-base", server.url, "--variant", "MP4"),
-            *("--budget", "2", "--out", "run", "--no-cache"),
+            *("--budget", "2", "--out", "run", "--llm-option", "cache=no"),
             cwd=folder,
             env={"OPENAI_API_KEY": KEY, "MY_PASSWORD": OTHER},
         )
@@ -140,7 +140,7 @@ def test_an_address_in_the_environment_is_used_with_its_password_and_shown_witho
     with misbehaving(sends(page)) as server:
         address = server.url.replace("://", f"://me:{PASSWORD}@")
         done = falsifier(
-            *("run", "AT1", "--llm", "openai/m", "--budget", "2", "--out", "run", "--no-cache"),
+            *("run", "AT1", "--llm", "openai/m", "--budget", "2", "--out", "run", "--llm-option", "cache=no"),
             cwd=tmp_path,
             env={"OPENAI_API_BASE": address, "HTTP_PROXY": "", "http_proxy": ""},
         )

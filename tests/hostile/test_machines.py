@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs a
 
 FMU = ROOT / "tests" / "fixtures" / "fmus" / "Lag_2.fmu"
 RUN = [
-    *("run", str(FMU), "--input", "u=0:1", "--interface", "co-simulation", "--stop-time", "1", "--quiet"),
+    *("run", str(FMU), "--search", "u=0:1", "--interface", "co-simulation", "--stop-time", "1", "--quiet"),
     *(
         "--stl",
         "G[0,1] (x <= 2)",

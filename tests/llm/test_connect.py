@@ -101,5 +101,5 @@ def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
 
 
 def test_the_time_for_a_reply_is_not_an_option_of_the_provider() -> None:
-    with pytest.raises(ChatSetupError, match="--llm-option timeout: use --timeout SECONDS"):
+    with pytest.raises(ChatSetupError, match="use --llm-option timeout=SECONDS"):
         connect("ollama_chat/x", options={"timeout": 5})

@@ -51,7 +51,7 @@ def test_requirement_then_profile_then_option_override_the_spec() -> None:
     assert (narrowed.space.inputs[0].high, narrowed.experiment.stop_time) == (50.0, 30.0)
     coarse = joined("S", profile="coarse").space.inputs[0]
     assert (coarse.high, coarse.control_points, coarse.interpolation) == (50.0, 2, "constant")
-    options = {"inputs": ["throttle=10:20:3"], "parameters": ["finalDrive=3.1"], "stop_time": 25.0}
+    options = {"ranges": ["throttle=10:20:3"], "values": ["finalDrive=3.1"], "stop_time": 25.0}
     changed = joined("S", profile="coarse", options=options)
     assert [(r.low, r.high, r.control_points) for r in changed.space.inputs] == [(10.0, 20.0, 3)]
     assert changed.parameters == {"brake": 0.0, "finalDrive": 3.1}
@@ -76,12 +76,12 @@ def test_internal_signals_that_a_formula_names_are_recorded_beside_the_outputs()
         ({"requirement": "T"}, "'T'"),
         ({"profile": "fine"}, "'fine'"),
         ({"stl": "G[0,50] (speed <= 1)"}, "--stl"),
-        ({"options": {"parameters": ["speed=3"]}}, "parameters.speed"),
+        ({"options": {"values": ["speed=3"]}}, "parameters.speed"),
         (
-            {"options": {"inputs": ["throttle=3"], "parameters": ["finalDrive=3"]}},
+            {"options": {"values": ["throttle=3", "finalDrive=3"]}},
             "inputs",
         ),  # nothing is left
-        ({"options": {"inputs": [], "output_interval": 0.03}}, "model.output_interval"),
+        ({"options": {"output_interval": 0.03}}, "model.output_interval"),
     ],
 )
 def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -> None:
@@ -103,7 +103,7 @@ def test_an_fmu_alone_is_searched_over_its_bounded_inputs() -> None:
     fixed = join_formula(
         bundled("fmus") / "AT.fmu",
         "G[0,20] (speed <= 120)",
-        changes=changes_from_options(inputs=["brake=3"], parameters=["finalDrive=3:3.5"]),
+        changes=changes_from_options(values=["brake=3"], ranges=["finalDrive=3:3.5"]),
     )
     assert (fixed.space.inputs, fixed.parameters) == ((), {"brake": 3.0})
 
@@ -135,7 +135,7 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
 
 
 def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="--input"):
+    with pytest.raises(SpecError, match="--search"):
         join_formula(fixture("Ball_2"), "G[0,1] (h >= -9)", changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
         join_formula(tmp_path / "gone.fmu", "G (x >= 0)", changes=changes_from_options())

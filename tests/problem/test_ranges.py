@@ -10,7 +10,7 @@ from falsifier.problem.sections import InputSection
 
 
 def test_a_range_that_nobody_knows_must_be_given() -> None:
-    with pytest.raises(SpecError, match=r"or --input u=LOW:HIGH\[:POINTS\]"):
+    with pytest.raises(SpecError, match=r"or --search u=LOW:HIGH\[:POINTS\]"):
         input_range(Variable("u"), InputSection(control_points=3), file="my.toml", key="inputs.u")
 
 

@@ -13,6 +13,7 @@ from falsifier.problem.shorthand import changes_from, changes_from_options, opti
         ("throttle=", "expected NAME="),
         ("=0:1", "expected NAME="),
         ("throttle=0:x", "'x' is not a number"),
+        ("throttle=3", "to keep it constant: --set throttle=3"),
         ("throttle=0:1:many", "not a number of control points"),
         ("throttle=0:1:3:cubic", "known: pchip, linear, constant"),
         ("throttle=1:0:3", "low < high"),
@@ -20,14 +21,14 @@ from falsifier.problem.shorthand import changes_from, changes_from_options, opti
 )
 def test_options_that_cannot_be_read_are_named(option: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
-        changes_from_options(inputs=[option])
+        changes_from_options(ranges=[option])
 
 
 @pytest.mark.parametrize(
     "options",
     [
-        {"inputs": ["u=0:1:3"], "stop_time": 5.0},
-        {"inputs": ["u=-0.1:0.3:3:linear", "v=0.25", "w"], "parameters": ["p=1e-07", "q=0:0.1"]},
+        {"ranges": ["u=0:1:3"], "stop_time": 5.0},
+        {"ranges": ["u=-0.1:0.3:3:linear", "w", "q=0:0.1"], "values": ["p=1e-07", "v=0.25"]},
         {"interface": "model-exchange", "output_interval": 0.01},
         {"allow": ["write:/data/logs", "programs"], "deny": ["network"]},
         {},
@@ -37,10 +38,8 @@ def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
     changes = changes_from_options(**options)
     said: dict[str, Any] = {}
     for name, value in options_from(changes):
-        key = {"--input": "inputs", "--param": "parameters"}.get(
-            name, name.removeprefix("--").replace("-", "_")
-        )
-        if key in ("inputs", "parameters", "allow", "deny"):
+        key = {"--search": "ranges", "--set": "values"}.get(name, name.removeprefix("--").replace("-", "_"))
+        if key in ("ranges", "values", "allow", "deny"):
             said.setdefault(key, []).append(value)
         else:
             said[key] = value
@@ -48,13 +47,11 @@ def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
 
 
 def test_values_of_python_mean_the_same_as_options() -> None:
-    values = changes_from(
-        inputs={"a": 1, "b": (0, 2), "c": (0, 2, 7, "linear"), "d": None}, parameters={"p": 3, "q": (0, 1)}
+    given = changes_from(
+        inputs={"b": (0, 2), "c": (0, 2, 7, "linear"), "d": None, "q": (0, 1)}, parameters={"p": 3, "a": 1}
     )
-    options = changes_from_options(
-        inputs=["a=1", "b=0:2", "c=0:2:7:linear", "d"], parameters=["p=3", "q=0:1"]
-    )
-    assert values == options
+    said = changes_from_options(ranges=["b=0:2", "c=0:2:7:linear", "d", "q=0:1"], values=["p=3", "a=1"])
+    assert given == said
 
 
 def test_a_section_says_all_that_a_spec_can() -> None:
@@ -76,8 +73,9 @@ def test_values_that_mean_nothing_are_named(value: object) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"inputs": ["u=0:1:3", "v", "u"]}, "--input u: given twice"),
-        ({"parameters": ["p=1", "p=0:1"]}, "--param p: given twice"),
+        ({"ranges": ["u=0:1:3", "v", "u"]}, "--search u: given twice"),
+        ({"values": ["p=1", "p=2"]}, "--set p: given twice"),
+        ({"values": ["p=1"], "ranges": ["p=0:1"]}, "p: --set keeps it constant, --search varies it"),
     ],
 )
 def test_a_name_is_given_once(options: dict[str, Any], message: str) -> None:

@@ -5,7 +5,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 
-CHANGED = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brake=0"], stop_time=30.0))
+CHANGED = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ def test_its_name_is_the_targets_last_part(target: str, name: str) -> None:
 
 
 def test_equal_sources_are_equal_keys() -> None:
-    again = ProblemSource(target="AT1", changes=changes_from_options(inputs=["brake=0"], stop_time=30.0))
+    again = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
     assert len({CHANGED, again, ProblemSource(target="AT1")}) == 2
 
 

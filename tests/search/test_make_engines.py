@@ -77,7 +77,7 @@ def test_a_missing_key_is_said_before_the_first_question() -> None:
 
 def test_a_limit_on_money_needs_a_price() -> None:
     asked = request(llm="hosted_vllm/mine").model_copy(update={"budget": Budget(cost=1.0)})
-    with pytest.raises(SpecError, match="--price"):
+    with pytest.raises(SpecError, match="price=SENT:RECEIVED"):
         make_engines(asked, [PROBLEM], None)
     priced = LLMSettings(name="hosted_vllm/mine", price=(0.25, 2.0), cache=False)
     (engine,) = make_engines(asked.model_copy(update={"llm": priced}), [PROBLEM], None)

@@ -71,7 +71,7 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     assert told(stated) == (
         "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
         "formula's smallest window is 1 s. To try them: falsifier run ... --refine (slow inputs first, then "
-        "faster ones), or --input u=-1:1 without a number of control points."
+        "faster ones), or --search u=-1:1 without a number of control points."
     )
     assert told(replace(stated, source=None)).endswith(
         "falsify(..., refine=True), or InputRange(..., free=Freedom(200, 0.05))."

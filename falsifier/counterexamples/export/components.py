@@ -219,9 +219,7 @@ def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
     document.add(
         tomlkit.comment(f"The component {one_line(member.name)} alone, with what it saw in the system:")
     )
-    document.add(
-        tomlkit.comment(f"    falsifier simulate {file_name(member.name)}.toml --input-file input.csv")
-    )
+    document.add(tomlkit.comment(f"    falsifier simulate {file_name(member.name)}.toml --inputs input.csv"))
     model = {
         "fmu": member.path.name,
         "interface": member.interface,

@@ -5,6 +5,7 @@ import shlex
 from falsifier.campaigns.analysis import Run
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
+from falsifier.problem.source import ProblemSource
 from falsifier.search.request import LLMSettings, RunRequest
 
 
@@ -28,9 +29,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
-        ("--profile", problem.profile),
-        ("--parameterization", None if problem.parameterization == "free" else problem.parameterization),
-        ("--free", None if problem.shortest_piece is None else f"{problem.shortest_piece:g}"),
+        ("--parameterization", _parameterization(problem)),
         *options_from(without_limits(problem.changes) if request.levels else problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
@@ -40,7 +39,6 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
         ("--jobs", request.jobs if request.jobs > 1 else None),
-        ("--all", True if shared else None),
         ("--refine", True if request.levels else None),
     ]
     words = ["falsifier", "run", target]
@@ -49,15 +47,21 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     return shlex.join(words)
 
 
+def _parameterization(problem: ProblemSource) -> str | None:
+    kind = "fixed" if problem.parameterization == "fixed" else None
+    if problem.shortest_piece is not None:
+        kind = f"free:{problem.shortest_piece:g}"
+    return ",".join(word for word in (problem.profile, kind) if word) or None
+
+
 def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
     return [
-        ("--llm", llm.name),
-        ("--effort", llm.effort),
+        ("--llm", f"{llm.name}@{llm.effort}" if llm.effort else llm.name),
         ("--api-base", llm.api_base),
         ("--variant", llm.variant),
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
-        ("--price", None if llm.price is None else f"{llm.price[0]:g}:{llm.price[1]:g}"),
-        ("--reply", None if llm.reply == "json" else llm.reply),
+        ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
+        ("--llm-option", None if llm.reply == "json" else f"reply={llm.reply}"),
         ("--anonymous", True if llm.anonymous else None),
         ("--fallback", llm.fallback),
     ]

@@ -29,7 +29,7 @@ def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) 
 
 
 def test_a_search_can_be_repeated_from_its_command() -> None:
-    changes = changes_from_options(inputs=["u=0:1:3"], stop_time=5.0)
+    changes = changes_from_options(ranges=["u=0:1:3"], stop_time=5.0)
     request = RunRequest(
         problems=(ProblemSource(target="my.toml:R", stl="G[0,1] (x <= 1)", changes=changes),),
         engine="uniform",
@@ -38,7 +38,7 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         jobs=2,
     )
     assert run_command(request) == (
-        "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --input u=0:1:3 --stop-time 5.0 --engine uniform "
+        "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --search u=0:1:3 --stop-time 5.0 --engine uniform "
         "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
     quick = request.model_copy(update={"budget": Budget(None, 9.0)})
@@ -51,7 +51,7 @@ def test_a_models_search_can_be_repeated_too() -> None:
     )
     request = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model)
     assert run_command(request) == (
-        "falsifier run AT1 --llm openai/gpt-5-mini --effort high --variant MP4 --price 0.25:2 --anonymous "
+        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 --anonymous "
         "--budget 100 --seed 0"
     )
 
