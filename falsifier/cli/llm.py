@@ -159,7 +159,7 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
 
 
 def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
-    sent = [message.model_dump() for message in messages]
+    sent = [{"role": message.role, "content": message.content} for message in messages]
     return json.dumps(
         {"messages": sent, "tools": [t.model_dump() for t in tools]} if tools else sent, indent=2
     )
