@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 
-from falsifier.errors import SpecError
-from falsifier.llm.messages import Usage
-from falsifier.search.budget import Budget, Spent
+from falsifier.errors import ChatError, SpecError
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.replay import ScriptedChat
+from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 
 
 @pytest.mark.parametrize(
@@ -48,3 +49,54 @@ def test_whole_numbers_of_numpy_become_ints() -> None:
         SpecError, match=r"budget: simulations: expected a whole number, at least 1, got 2\.5"
     ):
         Budget(2.5)  # type: ignore[arg-type]
+
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+
+
+class Asked(ScriptedChat):
+    """Keeps the deadlines that it is asked with; fails if told so."""
+
+    def __init__(self, *script: str, error: ChatError | None = None) -> None:
+        super().__init__(script)
+        self.left: list[float | None] = []
+        self.error = error
+
+    def complete(self, request: ChatRequest) -> ChatReply:
+        self.left.append(request.seconds_left)
+        if self.error:
+            raise self.error
+        return super().complete(request)
+
+
+def test_a_request_gets_the_seconds_that_are_left() -> None:
+    inner = Asked("a", "b")
+    chat = BoundedChat(inner, Budget(simulations=9, seconds=100.0), lambda: Spent(seconds=40.0))
+    assert chat.complete(QUESTION).text == "a"
+    assert inner.left[0] is not None and 0 < inner.left[0] <= 60.0
+
+
+def test_without_a_limit_on_the_time_there_is_no_deadline() -> None:
+    inner = Asked("a")
+    BoundedChat(inner, Budget(simulations=9), lambda: Spent(seconds=40.0)).complete(QUESTION)
+    assert inner.left == [None]
+
+
+def test_nothing_is_asked_beyond_a_limit() -> None:
+    inner, spent = Asked("a"), Spent(prompt_tokens=90, completion_tokens=10)
+    with pytest.raises(LimitReached, match="tokens is used up"):
+        BoundedChat(inner, Budget(tokens=100), lambda: spent).complete(QUESTION)
+    assert not inner.left
+
+
+def test_a_failure_at_the_end_of_the_time_is_the_end_of_the_time() -> None:
+    spent = iter([Spent(seconds=1.0), Spent(seconds=1.0), Spent(seconds=9.99)])
+    chat = BoundedChat(Asked(error=ChatError("too late")), Budget(seconds=10.0), lambda: next(spent))
+    with pytest.raises(LimitReached, match="10 s"):
+        chat.complete(QUESTION)
+
+
+def test_a_failure_before_the_end_of_the_time_stays_a_failure() -> None:
+    chat = BoundedChat(Asked(error=ChatError("refused")), Budget(seconds=10.0), lambda: Spent(seconds=1.0))
+    with pytest.raises(ChatError, match="refused"):
+        chat.complete(QUESTION)

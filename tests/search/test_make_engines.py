@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
 from falsifier.context.values import Context, Level, Named
 from falsifier.engines.hybrid import Hybrid
@@ -106,3 +107,10 @@ def test_the_surrogate_alone_reads_levels_and_what_is_recorded_is_not_read_again
     assert recorded.context == read.context
     with pytest.raises(SpecError, match="cannot be read"):
         told_problems(request(), [problem], {})
+
+
+@pytest.mark.parametrize("option", ["api_key", "extra_body", "headers", "azure_ad_token"])
+def test_options_that_may_hold_a_key_are_refused_and_not_shown(option: str) -> None:
+    with pytest.raises(ValidationError, match="read from the environment") as caught:
+        LLMSettings(name="openai/m", options={option: "the-secret"})
+    assert "the-secret" not in str(caught.value)

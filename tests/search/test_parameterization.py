@@ -1,16 +1,10 @@
-from dataclasses import replace
-
 import pytest
 
-from falsifier.core.space import InputRange
 from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.box import BoxEngine
-from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.search.events import Event, RunStarted
-from falsifier.search.findings import inexpressible
-from falsifier.search.levels import Level
 from falsifier.search.parameterization import (
     engine_parameterization,
     parameterization_note,
@@ -58,44 +52,3 @@ def test_an_input_that_only_a_free_parameterization_has_is_found_without_further
     assert parameterization_of(started[0].searched) == "free"
     five = Problem.from_fmu(fmu_path("Lag_2"), FAST, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
     assert not falsify(five, "sobol", budget=20).falsified
-
-
-def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, [Level(0, searched_space(problem.space, engine, None))], 20)
-    return finding.text if finding else ""
-
-
-def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_it() -> None:
-    formula = "G[0,9] (F[0,1] (y <= 1))"
-    stated = Problem.from_fmu(fmu_path("Lag_2"), formula, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
-    assert told(stated) == (
-        "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
-        "formula's smallest window is 1 s. To try them: falsifier run ... --refine (slow inputs first, then "
-        "faster ones), or --search u=-1:1 without a number of control points."
-    )
-    assert told(replace(stated, source=None)).endswith(
-        "falsify(..., refine=True), or InputRange(..., free=Freedom(200, 0.05))."
-    )
-
-
-def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
-    free = lag_problem(free=FREE)
-    assert not told(free)
-    assert "--engine surrogate" in told(free, "cma")
-    fixed = load_problem("AT1", parameterization="fixed")
-    assert "--parameterization free" in told(fixed)
-
-
-def test_constant_and_held_inputs_are_described_as_such() -> None:
-    problem = lag_problem()
-    u = problem.space.inputs[0]
-
-    def text(changed: InputRange) -> str:
-        return told(replace(problem, space=replace(problem.space, inputs=(changed,))))
-
-    assert "u was constant" in text(replace(u, control_points=1))
-    assert "u had 4 held pieces of 2.5 s" in text(replace(u, interpolation="constant"))
-
-
-def test_as_many_control_points_as_make_sense_leave_nothing_out() -> None:
-    assert not told(lag_problem(points=100))
