@@ -29,9 +29,10 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.record import manifest
-from falsifier.record.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.record.manifest import InputRecord, Manifest
 from falsifier.record.records import EvaluatedRecord
+from falsifier.record.trajectory_files import recorded_trajectory
 from falsifier.search.findings import Failure
 from falsifier.search.findings import failures as by_cause
 

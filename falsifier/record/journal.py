@@ -11,25 +11,21 @@
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
 a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
-is noticed. Only record/repair.py, which drops what is damaged, touches these files beside this module.
+is noticed. ``manifest`` and ``trajectory_files`` have the other files; ``repair`` drops what is damaged.
 """
 
 import errno
-import logging
 import os
 import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import cache
-from io import BytesIO
 from pathlib import Path
 from time import monotonic
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import check_seal, checksum, remove_partial, write_whole
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.files import check_seal, remove_partial
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record.records import (
@@ -43,14 +39,17 @@ from falsifier.record.records import (
     parse_line,
 )
 from falsifier.record.sealed import locked
+from falsifier.record.trajectory_files import (
+    TRAJECTORIES,
+    TRAJECTORY_NAMES,
+    recorded_trajectory,
+    save_trajectory,
+)
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.request import Keep
 
-_LOG = logging.getLogger(__name__)
-
 MANIFEST = "manifest.json"
 JOURNAL = "journal.jsonl"
-TRAJECTORIES = "trajectories"
 LOCK = "lock"
 STOP = "stop"
 
@@ -59,7 +58,6 @@ STOP = "stop"
 _SYNC_PERIOD = 1.0
 # With Keep "history" the first so many trajectories are kept, then each that improves on the best.
 _KEPT_TRAJECTORIES = 200
-_TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 # Errors of the operating system that say that a path can never be a folder.
 _NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 # Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
@@ -81,7 +79,7 @@ class Journal:
         path = directory / JOURNAL
         _check_is_file(path)
         _drop_torn_line(path)
-        remove_partial(directory / TRAJECTORIES, _TRAJECTORY_NAMES)
+        remove_partial(directory / TRAJECTORIES, TRAJECTORY_NAMES)
         remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
         self.records = read_journal(directory)
         self._file = path.open("ab", buffering=0)
@@ -370,43 +368,6 @@ def recorded_evaluations(
                 tuple(record.log),
             )
     return dict(sorted(evaluations.items()))
-
-
-def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
-    """Write a trajectory to a run directory and force it to disk; return its name for the record."""
-    buffer = BytesIO()
-    trajectory.save(buffer)
-    content = buffer.getvalue()
-    name = f"{TRAJECTORIES}/{index}-{checksum(content)}.npz"
-    write_whole(directory / name, content)
-    return name
-
-
-def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
-    """Load the trajectory of a record; None if it was not kept, or is damaged, of which a warning tells."""
-    if name is None:
-        return None
-    path = directory / name
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        _tell_lost(path, error.strerror or "it cannot be read")
-        return None
-    if is_intact(path, content):
-        return Trajectory.load(BytesIO(content))
-    _tell_lost(path, "its checksum does not match")
-    return None
-
-
-@cache
-def _tell_lost(path: Path, why: str) -> None:
-    """Tell it once, however often a command reads the file."""
-    _LOG.warning("%s is damaged: %s. It is left out, or simulated again where it is needed.", path, why)
-
-
-def is_intact(path: Path, content: bytes) -> bool:
-    """Whether the content of a trajectory's file matches the checksum in its name."""
-    return path.stem.rpartition("-")[2] == checksum(content)
 
 
 _Key = tuple[str | int, ...]

@@ -59,15 +59,6 @@ def test_one_writer_per_directory(tmp_path: Path) -> None:
         pass
 
 
-def test_a_damaged_line_is_named(tmp_path: Path) -> None:
-    falsify(impossible(), "uniform", budget=3, directory=tmp_path)
-    path = tmp_path / "journal.jsonl"
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join([lines[0], "{broken", *lines[2:]]) + "\n")
-    with pytest.raises(JournalError, match="line 2 is damaged"):
-        read_journal(tmp_path)
-
-
 def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(tmp_path: Path) -> None:
     dead = 2**22 + 7
     folder = tmp_path / "trajectories"

@@ -20,7 +20,8 @@ from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
 from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.problem.problem import held_text
-from falsifier.record.journal import read_journal, recorded_candidates, recorded_trajectory
+from falsifier.record.journal import read_journal, recorded_candidates
+from falsifier.record.trajectory_files import recorded_trajectory
 from falsifier.search.levels import level_results
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.margins import is_on_limit, margin_words

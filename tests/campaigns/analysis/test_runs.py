@@ -61,14 +61,6 @@ def test_a_folder_that_is_neither_is_named(tmp_path: Path) -> None:
         load(tmp_path)
 
 
-def test_a_damaged_line_is_named(campaign: Path, tmp_path: Path) -> None:
-    run = load(campaign)[0]
-    (tmp_path / "manifest.json").write_bytes((run.directory / "manifest.json").read_bytes())
-    (tmp_path / "journal.jsonl").write_text('{"kind":"evaluated"}\n')
-    with pytest.raises(JournalError, match="line 1 is damaged"):
-        load_run(tmp_path)
-
-
 def test_loading_reads_each_line_once_and_passes_over_the_candidates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
