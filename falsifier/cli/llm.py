@@ -9,10 +9,10 @@ import click
 
 from falsifier.cli.llm_options import (
     anonymous_option,
-    api_base_option,
+    connection_options,
+    connection_settings,
     context_option,
     llm_option_option,
-    name_and_effort,
     read_llm_options,
     variant_option,
 )
@@ -22,7 +22,7 @@ from falsifier.cli.options import (
     problem_source,
     requirement_options,
 )
-from falsifier.cli.output import say
+from falsifier.cli.output import conclude, say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_source
@@ -194,20 +194,30 @@ def _size(messages: Sequence["Message"]) -> str:
 
 @command()
 @click.argument("name")
-@api_base_option
-def check(*, name: str, api_base: str | None) -> None:
-    """Check name and key of a language model with one short request.
+@connection_options
+def check(*, name: str, **options: Any) -> None:
+    """Check name and key of a language model, and what runs need of it, with a few short requests.
 
-    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. The output includes the
-    price.
+    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. Exits with 3 if no usable answer
+    comes.
     """
-    from falsifier.llm.connect import check_llm
+    from falsifier.llm.check import check_llm
+    from falsifier.llm.usage import Price
 
-    model, effort = name_and_effort(name)
-    found = check_llm(model, api_base=api_base, effort=effort)
+    settings = connection_settings({"llm": name, **options})
+    assert settings is not None
+    found = check_llm(
+        settings.name,
+        api_base=settings.api_base,
+        effort=settings.effort,
+        options=settings.options,
+        price=Price(*settings.price) if settings.price else None,
+        timeout=settings.timeout,
+    )
     price = "unknown" if found.price is None else str(found.price)
     key = f"key from {found.key}" if found.key else "no key needed"
-    say(
-        f"{found.llm}: replied {found.reply!r} after {found.seconds:.1f} s "
-        f"({counted(found.usage.tokens, 'token')}); {key}; price: {price}"
-    )
+    lines = [f"{found.llm}: {key}; price: {price}; {counted(found.usage.tokens, 'token')} for this check"]
+    lines += [f"  {'ok ' if f.works else 'no '} {f.name}: {f.said}" for f in found.features]
+    if not found.is_usable:
+        lines.append("  no usable answer came: a run with this language model would fail")
+    conclude("\n".join(lines), 0 if found.is_usable else 3)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 from time import perf_counter
 from typing import Any
 
@@ -35,7 +36,7 @@ from falsifier.llm.messages import (
     cleaned,
     without_limits,
 )
-from falsifier.llm.providers import find_key, known
+from falsifier.llm.providers import find_key, known, provider_of
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, Gate, retried
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
@@ -201,13 +202,13 @@ class LiteLLMChat:
         def ask() -> ChatReply:
             response = litellm.completion(
                 model=self.llm,
-                messages=[sent_message(m) for m in request.messages],
+                messages=[sent_message(m, marks=known(self.llm).marks) for m in request.messages],
                 api_base=self.api_base,
                 timeout=timeout,
                 drop_params=True,  # what the LLM does not accept is omitted; _effective() reports it
                 **{"api_key": key, **arguments},
             )
-            return self._reply(request, response, arguments, perf_counter() - started)
+            return self._reply(request, response, arguments, mode, perf_counter() - started)
 
         try:
             return cleaned(within(seconds, ask), secrets)
@@ -219,6 +220,7 @@ class LiteLLMChat:
                 key_variables=known(self.llm).keys,
                 secrets=secrets,
                 offers_tools=bool(request.tools),
+                options=self.options,
             )
             if isinstance(failure, UnreadableReplyError):
                 return ChatReply(
@@ -226,7 +228,7 @@ class LiteLLMChat:
                     finish_reason=UNREADABLE,
                     usage=self._lost(request, timed_out=0),
                     seconds=perf_counter() - started,
-                    parameters=self._effective(arguments),
+                    parameters=self._effective(arguments, mode),
                 )
             if isinstance(error, TimeoutError) or type(error).__name__ == "Timeout":
                 failure.lost = self._lost(request, timed_out=1)
@@ -244,6 +246,10 @@ class LiteLLMChat:
         arguments = self._options()
         if provider.openai_client:
             arguments["max_retries"] = 0  # the client would silently retry twice
+        if provider_of(self.llm) == "openai" and self.api_base is None:
+            # Requests that begin alike go to the machine that has kept the beginning.
+            beginning = request.messages[0].content.encode()
+            arguments["prompt_cache_key"] = sha256(beginning).hexdigest()[:16]
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
             if provider.effort == "allowed":
@@ -268,7 +274,7 @@ class LiteLLMChat:
         return arguments
 
     def _reply(
-        self, request: ChatRequest, response: Any, arguments: Mapping[str, Any], seconds: float
+        self, request: ChatRequest, response: Any, arguments: Mapping[str, Any], mode: Mode, seconds: float
     ) -> ChatReply:
         choice = response.choices[0]
         refusal = _refusal(choice.message)
@@ -292,7 +298,7 @@ class LiteLLMChat:
                 reported_cost=self._believed(reported),
             ),
             seconds=seconds,
-            parameters=self._effective(arguments),
+            parameters=self._effective(arguments, mode),
         )
 
     def _believed(self, cost: float | None) -> float | None:
@@ -301,13 +307,13 @@ class LiteLLMChat:
             return cost
         return cost if cost and self.api_base is None else None
 
-    def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    def _effective(self, arguments: Mapping[str, Any], mode: Mode) -> dict[str, Any]:
         """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
         dropped = dropped_parameters(self.llm, arguments)
         own_names = {"reasoning_effort": "effort"}
         omitted = {own_names.get(name, name) for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
-        effective["mode"] = arguments.get("response_format", {}).get("type", "prompt")
+        effective["mode"] = mode if "response_format" in arguments else "prompt"
         if "tools" in arguments:
             effective["tools"] = [tool["function"]["name"] for tool in arguments["tools"]]
         if "max_tokens" in effective:

@@ -1,21 +1,18 @@
 """From an LLM's name to a chat that retries, adapts to the server and never pays twice for one question."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from falsifier.errors import ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
-from falsifier.llm.litellm_adapter import check_name, check_options, listed_price
-from falsifier.llm.messages import Chat, ChatRequest, Message, Mode, Usage
+from falsifier.llm.litellm_adapter import check_name, check_options
+from falsifier.llm.messages import Chat, Mode
 from falsifier.llm.model_file import check_model_file, is_model_file, served
-from falsifier.llm.providers import check_address, find_key, first_mode, key_variable
+from falsifier.llm.providers import check_address, find_key, first_mode
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate
 from falsifier.llm.usage import Price
-
-_HELLO = ChatRequest(messages=(Message(role="user", content="Reply with the word ready."),))
 
 
 def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, Any] | None = None) -> None:
@@ -83,50 +80,3 @@ def connect(
         attempts=attempts,
     )
     return chat if cache is None else CachedChat(chat, cache)
-
-
-@dataclass(frozen=True, slots=True)
-class LLMCheck:
-    """Result of one short request.
-
-    Attributes:
-        llm: name of the LLM.
-        key: environment variable that contains the key; empty if none is needed.
-        price: what the LLM costs; None if unknown.
-        reply: what it answered.
-        usage: tokens and cost of the request.
-        seconds: how long it took.
-    """
-
-    llm: str
-    key: str
-    price: Price | None
-    reply: str
-    usage: Usage
-    seconds: float
-
-
-def check_llm(
-    llm: str,
-    *,
-    effort: str | None = None,
-    api_base: str | None = None,
-    price: Price | None = None,
-    timeout: float = 60.0,
-) -> LLMCheck:
-    """Check name and key, and ask the LLM for one word.
-
-    Raises:
-        ChatError: saying what is wrong.
-    """
-    chat = connect(llm, effort=effort, api_base=api_base, price=price, timeout=timeout, attempts=2)
-    reply = chat.complete(_HELLO)
-    listed = Price(0.0, 0.0) if is_model_file(llm) else listed_price(llm, api_base=api_base)
-    return LLMCheck(
-        llm=llm,
-        key=key_variable(llm),
-        price=price or listed,
-        reply=reply.text.strip(),
-        usage=reply.usage,
-        seconds=reply.seconds,
-    )

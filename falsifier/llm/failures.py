@@ -40,6 +40,8 @@ _UNREADABLE_WORDS = (
 )
 _CONTEXT_WORDS = ("contextwindow", "context_length", "maximum context", "context size", "exceed_context")
 _QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
+# A key that is right may belong to an account that is not.
+_ACCOUNT_WORDS = ("organization", "organisation", "project", "verif", "not have access", "region", "country")
 _LONGEST_DETAIL = 600
 # What the client library puts before the server's own words, several times over.
 _FULL_STOP = re.compile(r"(?<!\.)\.$")
@@ -101,6 +103,7 @@ def classify(
     key_variables: tuple[str, ...],
     secrets: Iterable[str],
     offers_tools: bool = False,
+    options: Iterable[str] = (),
 ) -> ChatError:
     """Translate an exception raised by a request into an error of this package, without secrets.
 
@@ -111,6 +114,7 @@ def classify(
         key_variables: environment variables that may contain the key.
         secrets: texts to remove from the message.
         offers_tools: whether the request offered tools.
+        options: names of the options that the user passes on.
     """
     where = f" at {redact(api_base, secrets)}" if api_base else ""
     if isinstance(error, RefusedReplyError):
@@ -133,6 +137,16 @@ def classify(
         )
     if isinstance(error, BrokenReplyError):
         return TransientChatError(f"{llm}{where}: {redact(printable(str(error)), secrets)}")
+    if status == 403 and any(word in lowered for word in _ACCOUNT_WORDS):
+        return ChatError(
+            f"{llm}{where}: the account behind {keys} may not use this LLM: have it allowed for the "
+            f"organisation or project of the key, or take another LLM or key. {detail}"
+        )
+    if status == 413:
+        return ContextExceededError(
+            f"{llm}{where}: the request is larger than the server, or a proxy before it, takes; use a "
+            f"plainer prompt variant (--variant), or raise its limit. {detail}"
+        )
     if status in (401, 403):
         return ChatError(f"{llm}{where}: the provider rejected the key; check {keys}. {detail}")
     if status in (400, 422, 500) and any(word in lowered for word in _UNREADABLE_WORDS):
@@ -146,6 +160,11 @@ def classify(
         and not speaks_of_format
     ):
         return ToolsUnsupportedError(f"{llm}{where}: {detail}")
+    refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
+    if status in (400, 422) and refused:
+        return ChatError(
+            f"{llm}{where}: the server refuses the option {refused}; drop --llm-option {refused}. {detail}"
+        )
     if status == 404:
         return ChatError(
             f"{llm}{where}: no such LLM or address; check the LLM's name, --api-base, and whether the "

@@ -185,9 +185,20 @@ def _takes(llm: str, arguments: Mapping[str, Any]) -> bool:
     return True
 
 
-def sent_message(message: Message) -> dict[str, Any]:
-    """Message with OpenAI's field names; an assistant's message that only makes calls has no content."""
+def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
+    """Message with OpenAI's field names; an assistant's message that only makes calls has no content.
+
+    Args:
+        message: what is sent.
+        marks: whether to mark what the next question will begin with, too.
+    """
     sent: dict[str, Any] = {"role": message.role, "content": message.content}
+    if marks and message.stable:
+        kept, rest = message.content[: message.stable], message.content[message.stable :]
+        sent["content"] = [
+            {"type": "text", "text": kept, "cache_control": {"type": "ephemeral"}},
+            *([{"type": "text", "text": rest}] if rest else []),
+        ]
     if message.tool_call_id:
         sent["tool_call_id"] = message.tool_call_id
     if message.tool_calls:

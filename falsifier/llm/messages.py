@@ -92,6 +92,9 @@ class Usage(_Value):
 
     prompt_tokens: int = 0
     completion_tokens: int = Field(default=0, description="Reasoning included.")
+    cached_tokens: int = Field(
+        default=0, description="Part of the prompt tokens that the provider had kept, if it reports it."
+    )
     reasoning_tokens: int = Field(
         default=0, description="Part of the completion tokens, if the provider reports it."
     )
@@ -115,6 +118,7 @@ class Usage(_Value):
         return Usage(
             prompt_tokens=self.prompt_tokens + other.prompt_tokens,
             completion_tokens=self.completion_tokens + other.completion_tokens,
+            cached_tokens=self.cached_tokens + other.cached_tokens,
             reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
             cost=None if None in costs else sum(cost or 0.0 for cost in costs),
             estimated=self.estimated or other.estimated,

@@ -27,6 +27,7 @@ class Provider:
             only on an explicit list.
         echo: fields of tool calls that must be sent back with them, such as signed reasoning; the provider
             rejects the conversation without them.
+        marks: whether it keeps only what is marked of a prompt.
         limits: whether schemas may state numbers of items and ranges of numbers.
     """
 
@@ -38,6 +39,7 @@ class Provider:
     defaults: Mapping[str, Any] = field(default_factory=dict)
     effort: Literal["native", "allowed"] = "native"
     echo: tuple[str, ...] = ()
+    marks: bool = False
     limits: bool = False
 
 
@@ -55,7 +57,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
         "openai": Provider(("OPENAI_API_KEY",), openai_client=True, limits=True),
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
-        "anthropic": Provider(("ANTHROPIC_API_KEY",), echo=("thinking_blocks",)),
+        "anthropic": Provider(("ANTHROPIC_API_KEY",), echo=("thinking_blocks",), marks=True),
         "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY"), echo=("provider_specific_fields",)),
         "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), effort="allowed"),
         "mistral": Provider(("MISTRAL_API_KEY",)),

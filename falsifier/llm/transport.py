@@ -296,6 +296,11 @@ def _unreadable(body: bytes) -> str:
     error = sent.get("error") if isinstance(sent, dict) else None
     if error:
         return f"the server reports: {error}" if isinstance(error, str) else ""
+    if isinstance(sent, dict) and sent.get("choices") == []:
+        return (
+            "the server answers without any choice; its log, or the provider's page on the state of the "
+            "service, says why"
+        )
     begins = text[:_LONGEST_BEGINNING].strip()
     return (
         f"the reply does not have the form of an LLM's (it begins with {begins!r}): check --api-base, and "

@@ -88,6 +88,8 @@ def usage_of(
     completion = _count(getattr(response_usage, "completion_tokens", None))
     details = getattr(response_usage, "completion_tokens_details", None)
     reasoning = _count(getattr(details, "reasoning_tokens", None)) or 0
+    kept = getattr(response_usage, "prompt_tokens_details", None)
+    cached = _count(getattr(kept, "cached_tokens", None)) or 0
     estimated = not prompt and not completion
     if prompt is None or estimated:
         prompt, estimated = sum(count_tokens(part, llm) for part in _sent(request)), True
@@ -100,6 +102,7 @@ def usage_of(
     return Usage(
         prompt_tokens=prompt,
         completion_tokens=completion,
+        cached_tokens=min(cached, prompt),
         reasoning_tokens=min(reasoning, completion),
         cost=cost,
         estimated=estimated,

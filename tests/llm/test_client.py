@@ -380,3 +380,51 @@ def test_a_timeout_longer_than_a_socket_can_wait() -> None:
     with serving(Step("ok")) as server:
         chat = LiteLLMChat("openai/some-model", api_base=server.url, timeout=1e12)
         assert chat.send(REQUEST).text == "ok"
+
+
+KEPT = ChatRequest(
+    messages=(
+        Message(role="system", content="standing", stable=8),
+        Message(role="user", content="samples and news", stable=7),
+    )
+)
+
+
+@pytest.mark.usefixtures("keys")
+def test_what_the_next_question_begins_with_is_marked_where_a_provider_keeps_nothing_else() -> None:
+    with serving(Step("a"), Step("b")) as server:
+        LiteLLMChat("anthropic/claude-sonnet-4-5", api_base=server.root).send(KEPT)
+        LiteLLMChat("openai/mine", api_base=server.url).send(KEPT)
+    marked, plain = (r.body for r in server.received)
+    mark = {"type": "ephemeral"}
+    assert marked["system"] == [{"type": "text", "text": "standing", "cache_control": mark}]
+    (user,) = marked["messages"]
+    assert [(part["text"], part.get("cache_control")) for part in user["content"]] == [
+        ("samples", mark),
+        (" and news", None),
+    ]
+    assert plain["messages"] == [
+        {"role": "system", "content": "standing"},
+        {"role": "user", "content": "samples and news"},
+    ]
+
+
+def test_tokens_that_were_kept_are_counted() -> None:
+    usage = {"prompt_tokens": 100, "completion_tokens": 20, "prompt_tokens_details": {"cached_tokens": 64}}
+    with serving(Step("a", usage=usage)) as server:
+        found = LiteLLMChat("openai/mine", api_base=server.url).send(KEPT).usage
+    assert (found.prompt_tokens, found.cached_tokens) == (100, 64)
+    assert (found + found).cached_tokens == 128
+
+
+def test_openai_is_told_which_questions_begin_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    with serving(Step("a"), Step("b")) as server:
+        monkeypatch.setenv("OPENAI_API_BASE", server.url)
+        monkeypatch.setenv("OPENAI_API_KEY", "sk-some-key")
+        for text in ("first", "second"):
+            news = Message(role="user", content=text)
+            LiteLLMChat("openai/gpt-5-mini").send(
+                KEPT.model_copy(update={"messages": (KEPT.messages[0], news)})
+            )
+    first, second = (r.body["prompt_cache_key"] for r in server.received)
+    assert first == second

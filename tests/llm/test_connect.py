@@ -7,9 +7,7 @@ import pytest
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.connect import check_llm, connect, preflight
-from falsifier.llm.usage import Price
-from tests.llm.server import Step, serving
+from falsifier.llm.connect import connect, preflight
 
 
 @pytest.mark.parametrize(
@@ -57,31 +55,6 @@ def test_the_nearest_provider_is_suggested() -> None:
 def test_a_cache_is_opt_in(tmp_path: Path) -> None:
     assert isinstance(connect("ollama_chat/x"), LiteLLMChat)
     assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
-
-
-def test_check_of_a_model() -> None:
-    with serving(Step("ready")) as server:
-        found = check_llm("openai/mine", api_base=server.url)
-        assert found.reply == "ready"
-        assert found.price is None
-        assert found.key == ""
-        assert found.usage.tokens == 120
-        assert len(server.received) == 1
-        assert "response_format" not in server.received[0].body
-    with serving(Step("ready")) as server:
-        price = Price(prompt=1.0, completion=2.0)
-        found = check_llm("openai/mine", api_base=server.url, price=price)
-        assert found.price == price
-        assert found.usage.cost == pytest.approx((100 * 1.0 + 20 * 2.0) / 1e6)
-
-
-def test_check_of_a_model_with_a_wrong_key(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-wrong-key-wrong")
-    with serving(Step(status=401, message="wrong key sk-wrong-key-wrong")) as server:
-        with pytest.raises(ChatError, match="check OPENAI_API_KEY") as caught:
-            check_llm("openai/mine", api_base=server.url)
-        assert "sk-wrong" not in str(caught.value)
-        assert len(server.received) == 1
 
 
 @pytest.mark.parametrize("model", ["openai/gpt-5-mini", "anthropic/claude-sonnet-4-5"])

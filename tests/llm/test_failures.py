@@ -7,6 +7,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import ContextExceededError, TransientChatError, classify
 from falsifier.llm.retry import Gate
+from tests.llm.server import Step, serving
 from tests.llm.test_client import REQUEST
 
 
@@ -131,3 +132,27 @@ def test_the_full_stop_of_a_server_is_left_out() -> None:
 
     assert told("Connection error.").endswith("Connection error")
     assert told("still loading ...").endswith("still loading ...")
+
+
+@pytest.mark.parametrize(
+    ("step", "cure"),
+    [
+        (Step(status=413, message="Payload Too Large"), "use a plainer prompt variant"),
+        (
+            Step(status=400, message="Unrecognized request argument supplied: top_k"),
+            "drop --llm-option top_k",
+        ),
+        (
+            Step(status=403, message="Your organization must be verified to use o3"),
+            "allowed for the organisation",
+        ),
+        (Step(raw='{"choices": [], "object": "chat.completion"}'), "without any choice"),
+        (Step(raw='{"error": "model not loaded"}'), "model not loaded"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_each_failure_names_its_cure(step: Step, cure: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-some-key")
+    with serving(step) as server, pytest.raises(ChatError) as caught:
+        LiteLLMChat("openai/m", api_base=server.url, options={"top_k": 3}).send(REQUEST)
+    assert cure in str(caught.value)
