@@ -12,15 +12,27 @@ from falsifier.cli.options import command, directory_argument, json_option, out_
 from falsifier.cli.output import say
 from falsifier.record import manifest
 from falsifier.views.coverage_text import coverage_json, coverage_text
-from falsifier.views.report import html_report, junit_report, markdown_report
+from falsifier.views.report import html_report, junit_report, markdown_report, write_evaluations
 from falsifier.views.terminal import warn
 
 
 @command()
-@directory_argument
-@out_option("Report to write; default: report.html in DIRECTORY.")
+@click.argument(
+    "directories", metavar="DIRECTORY...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@out_option("Report to write; default: report.html in the first DIRECTORY.")
 @click.option("--markdown", is_flag=True, help="Markdown instead of HTML; printed on stdout without --out.")
 @click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Also write JUnit XML.")
+@click.option(
+    "--csv",
+    "csv_file",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Also write every evaluation: inputs, robustness, critical time, status.",
+)
+@click.option(
+    "--parquet", type=click.Path(path_type=Path), metavar="FILE", help="The same as --csv in a Parquet file."
+)
 @click.option(
     "--arch-comp",
     type=click.Path(path_type=Path),
@@ -28,22 +40,37 @@ from falsifier.views.terminal import warn
     help="Also write a CSV file in the ARCH-COMP validation format.",
 )
 def report(
-    *, directory: Path, out: Path | None, markdown: bool, junit: Path | None, arch_comp: Path | None
+    *,
+    directories: tuple[Path, ...],
+    out: Path | None,
+    markdown: bool,
+    junit: Path | None,
+    csv_file: Path | None,
+    parquet: Path | None,
+    arch_comp: Path | None,
 ) -> None:
-    """Report on the run or campaign in DIRECTORY: one self-contained HTML page."""
+    """Report on the run or campaign in DIRECTORY: one self-contained HTML page.
+
+    Several are compared side by side: the same requirement before and after a change, or two engines.
+    """
+    first, *others = directories
+    if others and (junit is not None or arch_comp is not None):
+        raise click.UsageError("--junit and --arch-comp take one DIRECTORY")
     if junit is not None:
-        junit.write_text(junit_report(directory), encoding="utf-8")
-        warn(f"{junit} written")
+        junit.write_text(junit_report(first), encoding="utf-8")
     if arch_comp is not None:
-        arch_comp.write_text(export(directory), encoding="utf-8")
-        warn(f"{arch_comp} written")
+        arch_comp.write_text(export(first), encoding="utf-8")
+    write_evaluations(directories, csv_file=csv_file, parquet=parquet)
+    for written in filter(None, (junit, arch_comp, csv_file, parquet)):
+        warn(f"{written} written")
     if markdown and out is None:
-        say(markdown_report(directory), nl=False)
+        say(markdown_report(*directories), nl=False)
         return
-    path = out or directory / "report.html"
+    path = out or first / "report.html"
     if path.is_file():
         check_out(path, beginnings=(b"# ",) if markdown else (b"<!DOCTYPE html>",))
-    path.write_text(markdown_report(directory) if markdown else html_report(directory), encoding="utf-8")
+    made = markdown_report(*directories) if markdown else html_report(*directories)
+    path.write_text(made, encoding="utf-8")
     warn(f"{path} written")
 
 

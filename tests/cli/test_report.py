@@ -1,7 +1,11 @@
+import csv
 import json
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from falsifier.campaigns.analysis import load
 from tests.cli.support import bench
 from tests.command import falsifier
 from tests.fmu.fixtures import path as fixture
@@ -18,6 +22,31 @@ def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> N
     run = next((tmp_path / "c" / "runs").iterdir())
     command("report", str(run), "-o", "one.html")
     assert "1 of 1 requirement violated, 1 run," in (tmp_path / "one.html").read_text()
+
+
+def test_every_evaluation_is_written_as_a_table(command: Any, tmp_path: Path) -> None:
+    bench(command, "--out", "c", "--quiet")
+    assert command("report", "c", "--csv", "e.csv").exit_code == 0
+    with (tmp_path / "e.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["status"] for row in rows} == {"ok"}
+    for run in load(tmp_path / "c"):
+        own = [r for r in rows if (r["requirement"], r["seed"]) == (run.requirement, str(run.seed))]
+        assert [float(r["robustness"]) for r in own] == run.robustness.tolist()
+        assert all(r["critical_time"] and r["method"] == run.method.label for r in own)
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    assert command("report", "c", "--parquet", "e.parquet").exit_code == 0
+    assert len(pandas.read_parquet(tmp_path / "e.parquet")) == len(rows)
+
+
+def test_directories_are_compared_in_one_page(command: Any, tmp_path: Path) -> None:
+    bench(command, "--out", "c", "--quiet")
+    runs = sorted(map(str, (tmp_path / "c" / "runs").iterdir()))
+    assert command("report", *runs[:2], "-o", "both.html").exit_code == 0
+    assert "What differs" in (tmp_path / "both.html").read_text()
+    refused = command("report", *runs[:2], "--junit", "j.xml")
+    assert refused.exit_code == 2 and "one DIRECTORY" in refused.output
 
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:

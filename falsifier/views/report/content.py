@@ -173,6 +173,30 @@ def _side(directory: Path, published: Published | None) -> Side:
     )
 
 
+def differences(content: Content) -> Table:
+    """Return what the directories of a comparison differ in: files, formulas, engines, seeds and versions."""
+    columns: list[dict[str, list[str]]] = []
+    for side in content.sides:
+        told: dict[str, list[str]] = {}
+        for run in side.runs:
+            manifest = run.manifest
+            facts = {
+                "engine": run.method.label,
+                "seed": str(run.seed),
+                f"formula of {run.requirement}": manifest.requirement.formula,
+                **{Path(path).name: f"SHA-256 {digest[:12]}" for path, digest in manifest.hashes.items()},
+                "falsifier": manifest.falsifier,
+            }
+            for name, text in facts.items():
+                told.setdefault(name, [])
+                told[name] += [text] if text not in told[name] else []
+        columns.append(told)
+    names = dict.fromkeys(name for told in columns for name in told)
+    texts = {name: [", ".join(told.get(name, [])) for told in columns] for name in names}
+    differing = tuple((name, *cells) for name, cells in texts.items() if len(set(cells)) > 1)
+    return Table("What differs", ("", *(side.title for side in content.sides)), differing)
+
+
 def result_text(section: Section) -> str:
     """Return in words what came of a requirement, over all its runs."""
     runs = section.runs

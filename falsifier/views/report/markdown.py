@@ -10,6 +10,7 @@ from falsifier.views.report.content import (
     Shown,
     Side,
     advice,
+    differences,
     gather,
     input_table,
     limit_facts,
@@ -36,6 +37,8 @@ def markdown_report(*directories: Path) -> str:
                 parts.append(f"## {markdown_text(name)}{where}: not searched")
             else:
                 parts += _verdict(section, where)
+    if len(content.sides) > 1:
+        parts.append(differences(content).markdown().rstrip())
     parts += [side.table.markdown().rstrip() for side in content.sides if side.table is not None]
     return "\n\n".join([*parts, *map(_environment, content.sides)]) + "\n"
 

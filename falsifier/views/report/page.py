@@ -24,6 +24,7 @@ from falsifier.views.report.content import (
     Side,
     Status,
     advice,
+    differences,
     gather,
     input_table,
     level_facts,
@@ -86,6 +87,7 @@ def page(content: Content) -> str:
                 ),
                 id="verdicts",
             ),
+            _differences(content) if len(content.sides) > 1 else Html(""),
             *(_statistics(side) for side in content.sides),
             *(_environment(side) for side in content.sides),
         ),
@@ -341,6 +343,12 @@ def _questions(section: Section, most: int) -> Html:
     rest = "".join(f" {run_name(run)}: falsifier report {run.directory}." for run in asked[_MOST_TALKS:])
     note = el("p", f"Not shown here:{rest}", class_="note") if rest else Html("")
     return join(el("h3", "What was asked, and what came of it"), *parts, note)
+
+
+def _differences(content: Content) -> Html:
+    found = differences(content)
+    shown = table(found.header, found.rows, label=found.title) if found.rows else el("p", "Nothing.")
+    return el("section", el("h2", found.title), shown)
 
 
 def _statistics(side: Side) -> Html:

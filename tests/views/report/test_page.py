@@ -209,6 +209,9 @@ def test_runs_are_compared_side_by_side(tmp_path: Path) -> None:
     ]
     assert "Not searched here." in second.all("article")[0].content
     assert root.all("h1")[0].content == "before and after and other"
+    differing = root.all("main")[0].children[1]
+    assert "What differs" in differing.content and "seed" not in differing.content
+    assert "formula of HARDG[0,10] (x <= 0.6)G[0,10] (x <= 2)" in differing.content
 
 
 def test_pictures_are_images_with_a_text_in_their_place(page: Element) -> None:
