@@ -221,7 +221,7 @@ def _read(coding: Coding, values: Array, at: Array) -> Array:
     if coding.interpolation == "constant":
         return np.asarray(values[:, np.searchsorted(knots, at, side="right") - 1])
     if coding.interpolation == "linear":
-        return np.stack([np.interp(at, knots, row) for row in values])
+        return values @ np.stack([np.interp(at, knots, row) for row in np.eye(len(knots))])
     from scipy.interpolate import PchipInterpolator
 
     curves = PchipInterpolator(knots, values, axis=1)(at)

@@ -22,6 +22,9 @@ class Settings:
         ridge: relative regularisation of the dynamics, small because deviations are small.
         most_rows: maximum number of rows of a regression; limits the time per proposal.
         most_traces: maximum number of simulations from which dynamics are learnt, the best and the latest.
+        base_rank: mean rank, from 0, of the simulation from which deviations are learnt.
+        most_signals: number of inputs and outputs up to which a plan has all of its candidates; with more,
+            fewer, so that its time does not grow.
         pool: number of first candidates of a plan.
         children: number of new candidates per generation.
         parents: number of survivors per generation.
@@ -50,8 +53,10 @@ class Settings:
     ridge: float = 1e-7
     most_rows: int = 3000
     most_traces: int = 60
-    pool: int = 600
-    children: int = 300
+    base_rank: float = 1.0
+    most_signals: int = 8
+    pool: int = 500
+    children: int = 250
     parents: int = 30
     generations: int = 4
     bound_steps: int = 4
@@ -60,7 +65,7 @@ class Settings:
     at_bounds: float = 0.8
     memory: float = 0.9
     sharpness: float = 3.0
-    reserved: float = 0.06
+    reserved: float = 0.04
     trial: int = 8
     retries: int = 12
     risk_weight: float = 5.0

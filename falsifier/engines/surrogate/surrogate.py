@@ -1,7 +1,7 @@
 """The surrogate engine: arms that search in different ways on one history, rated by what they bring."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import zip_longest
 
@@ -308,19 +308,27 @@ class Surrogate:
             elites=np.concatenate([suggested, [e.point for e in elites]]),
             critical=np.array([*(1.0 for _ in suggested), *(e.critical for e in elites)]),
             seen=self._tried,
-            settings=settings,
+            settings=self._plan_settings(len(cost.outputs)),
             rng=rng,
         )
         forecast = self.forecaster.forecast(cost, point)
         why = f"the learnt dynamics predict a scaled robustness of {forecast.cost:.3g}"
         return self._made("dynamics", point, why, forecast)
 
+    def _plan_settings(self, outputs: int) -> Settings:
+        settings = self.settings
+        share = min(1.0, settings.most_signals / (outputs + len(self.layout.groups)))
+        pool, children = (max(round(share * n), settings.parents) for n in (settings.pool, settings.children))
+        return replace(settings, pool=pool, children=children)
+
     def _fitted(self, order: Sequence[int], rng: np.random.Generator) -> Forecaster:
-        """Return the forecaster fitted to the best and the latest simulations; the first is the very best."""
+        """Return the forecaster fitted to the best and the latest simulations."""
         samples, most = self.history.samples, self.settings.most_traces
         latest = range(max(0, len(samples) - most), len(samples))
         kept = list(dict.fromkeys([*order[: most // 3], *reversed(latest)]))[:most]
-        return self.forecaster.fitted([samples[i].trace for i in kept], 0, rng)
+        # Around the very best alone, a prediction that is wrong in the same way would be made again and again.
+        base = min(int(rng.exponential(self.settings.base_rank)), len(kept) - 1)
+        return self.forecaster.fitted([samples[i].trace for i in kept], base, rng)
 
     def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
         """Return predicted costs that also count the risk of a failure, if there has been one."""

@@ -152,18 +152,16 @@ def _crossed(layout: Layout, rng: np.random.Generator, children: Array, parents:
 def _changed(layout: Layout, rng: np.random.Generator, children: Array, until: Array | None) -> Array:
     """Change one group of each child, one to three times, in place."""
     times = rng.integers(1, 4, len(children))
+    group_of = np.repeat(np.arange(len(layout.groups)), [len(group) for group in layout.groups])
+    is_fine = np.array(layout.is_fine)
     for turn in range(3):
         which = np.where(turn < times, rng.integers(0, len(layout.groups), len(children)), -1)
-        for j, group in enumerate(layout.groups):
+        for j in np.unique(which[(which >= 0) & is_fine[which]]):
             rows = np.flatnonzero(which == j)
-            if not len(rows):
-                continue
-            values = children[np.ix_(rows, group)]
-            if layout.is_fine[j]:
-                ends = None if until is None else until[rows]
-                children[np.ix_(rows, group)] = _changed_pieces(values, ends, rng)
-            else:
-                children[np.ix_(rows, group)] = _changed_control_points(values, rng)
+            here = np.ix_(rows, layout.groups[j])
+            children[here] = _changed_pieces(children[here], None if until is None else until[rows], rng)
+        rows = np.flatnonzero((which >= 0) & ~is_fine[which])
+        children[rows] = _changed_control_points(children[rows], group_of == which[rows, None], rng)
     return layout.settled(children)
 
 
@@ -203,11 +201,12 @@ def _switch_moved(values: Array, shift: NDArray[np.int64], rng: np.random.Genera
     return np.where((start[:, None] <= cells) & (cells < stop[:, None]), level[:, None], values)
 
 
-def _changed_control_points(values: Array, rng: np.random.Generator) -> Array:
-    """Return control points, shape (m, k), of which some are changed in each row, at least one."""
+def _changed_control_points(values: Array, own: Bools, rng: np.random.Generator) -> Array:
+    """Return points, shape (m, d), in which some of the ``own`` control points changed, at least one a row."""
     count, size = values.shape
     moves = rng.random((count, size)) < np.where(rng.random((count, 1)) < 0.5, 0.2, 0.5)
-    moves[np.arange(count), rng.integers(0, size, count)] = True
+    moves[np.arange(count), np.argmax(own * rng.random((count, size)), axis=1)] = True
+    moves &= own
     kind = rng.random((count, size))
     stepped = np.clip(values + _steps(rng, (count, size)), 0.0, 1.0)
     level = _levels(rng, (count, size), at_bounds=kind < _POINT_TO_BOUND)
