@@ -326,7 +326,7 @@ class Surrogate:
         samples, most = self.history.samples, self.settings.most_traces
         latest = range(max(0, len(samples) - most), len(samples))
         kept = list(dict.fromkeys([*order[: most // 3], *reversed(latest)]))[:most]
-        # Around the very best alone, a prediction that is wrong in the same way would be made again and again.
+        # Around the very best alone, the same wrong prediction would be made again and again.
         base = min(int(rng.exponential(self.settings.base_rank)), len(kept) - 1)
         return self.forecaster.fitted([samples[i].trace for i in kept], base, rng)
 

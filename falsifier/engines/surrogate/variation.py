@@ -202,7 +202,7 @@ def _switch_moved(values: Array, shift: NDArray[np.int64], rng: np.random.Genera
 
 
 def _changed_control_points(values: Array, own: Bools, rng: np.random.Generator) -> Array:
-    """Return points, shape (m, d), in which some of the ``own`` control points changed, at least one a row."""
+    """Return points, shape (m, d), with some of the ``own`` control points changed, at least one a row."""
     count, size = values.shape
     moves = rng.random((count, size)) < np.where(rng.random((count, 1)) < 0.5, 0.2, 0.5)
     moves[np.arange(count), np.argmax(own * rng.random((count, size)), axis=1)] = True

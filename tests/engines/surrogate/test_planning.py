@@ -29,4 +29,4 @@ def test_a_plan_finds_the_best_point_that_has_not_been_simulated() -> None:
     best = planned(np.zeros((1, 20)))
     assert distance(best[None])[0] < 0.5
     other = planned(best[None])
-    assert not is_seen(other, best[None]) and distance(other[None])[0] < 5.0
+    assert not is_seen(other, best[None]) and distance(other[None])[0] < 7.0
