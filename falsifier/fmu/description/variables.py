@@ -38,6 +38,14 @@ _CAUSALITIES: Mapping[str, Causality] = {
     "calculatedParameter": "calculatedParameter",
     "independent": "independent",
 }
+# Why variables of these causalities cannot be set.
+_REFUSALS: Mapping[str, str] = {
+    "structuralParameter": "it is a structural parameter, which sets array sizes",
+    "calculatedParameter": (
+        "it is a calculated parameter; set the parameters from which the model calculates it"
+    ),
+    "independent": "it is the independent variable, time",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,32 +166,11 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
         declared = types.get(typed.get("declaredType", ""))
         definition = None if declared is None else next(iter(declared), None)
         attributes = {**({} if definition is None else definition.attrib), **typed.attrib}
-        causality, variability, refusal = _role(element, major, has_start=typed.get("start") is not None)
-        yield (
-            Variable(
-                name=element.attrib["name"],
-                kind=kind,
-                causality=causality,
-                variability=variability,
-                unit=_unit(attributes.get("unit")),
-                display_unit=_unit(attributes.get("displayUnit")),
-                low=_limit(attributes.get("min")),
-                high=_limit(attributes.get("max")),
-                nominal=finite(attributes.get("nominal")),
-                start=_start(kind, typed.get("start")),
-                settable=not refusal,
-                is_state=position in states,
-                literals=_literals(definition),
-                description=element.get("description", ""),
-                type=code,
-            ),
-            Slot(
-                reference=int(element.attrib["valueReference"]),
-                type=code,
-                negated=element.get("alias") == "negatedAlias",
-                refusal=refusal,
-            ),
-        )
+        role = _role(element, major, has_start=typed.get("start") is not None)
+        start, is_state = _start(kind, typed.get("start")), position in states
+        variable = _variable(element, (kind, code), role, attributes, definition, start, is_state=is_state)
+        reference, negated = int(element.attrib["valueReference"]), element.get("alias") == "negatedAlias"
+        yield variable, Slot(reference, code, negated=negated, refusal=role.refusal)
 
 
 def _states_2(root: Element, elements: list[Element]) -> set[int]:
@@ -212,10 +199,10 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         attributes = {**({} if definition is None else definition.attrib), **element.attrib}
         starts = _starts_3(kind, element)
         default = "continuous" if kind == "real" else "discrete"
-        causality, variability, refusal = _role(element, 3, default, has_start=bool(starts))
+        role = _role(element, 3, default, has_start=bool(starts))
         clocks = set(map(int, element.get("clocks", "").split()))
         if clocks:
-            refusal = "it belongs to a clock; only the FMU itself may change it"
+            role = replace(role, refusal="it belongs to a clock; only the FMU itself may change it")
         shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
         count = prod(shape)
         if not 0 <= count <= _MAX_ELEMENTS:
@@ -223,23 +210,10 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         starts = starts * count if len(starts) == 1 else starts
         if shape and kind != "string":
             arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
-        variable = Variable(
-            name=element.attrib["name"],
-            kind=kind,
-            causality=causality,
-            variability=variability,
-            unit=_unit(attributes.get("unit")),
-            display_unit=_unit(attributes.get("displayUnit")),
-            low=_limit(attributes.get("min")),
-            high=_limit(attributes.get("max")),
-            nominal=finite(attributes.get("nominal")),
-            settable=not refusal,
-            is_state=reference in states,
-            literals=_literals(definition),
-            description=element.get("description", ""),
-            type=code,
-            is_clocked=bool(clocks) and (clocks <= ticked or causality == "input"),
+        variable = _variable(
+            element, (kind, code), role, attributes, definition, is_state=reference in states
         )
+        is_clocked = bool(clocks) and (clocks <= ticked or role.causality == "input")
         names = [(variable.name, variable.description)]
         names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
         for name, description in names:
@@ -251,37 +225,67 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                         name=name + suffix,
                         description=description,
                         start=starts[offset] if starts else None,
+                        is_clocked=is_clocked,
                     ),
-                    Slot(reference, code, offset, count, refusal=refusal, declared=variable.name),
+                    Slot(reference, code, offset, count, refusal=role.refusal, declared=variable.name),
                 )
 
 
-def _role(
-    element: Element, major: int, default_variability: str = "continuous", *, has_start: bool
-) -> tuple[Causality, str, str]:
-    """Return causality, variability and why the variable cannot be set (empty if it can)."""
+@dataclass(frozen=True, slots=True)
+class _Role:
+    """Causality, variability, and why the variable cannot be set; empty if it can."""
+
+    causality: Causality
+    variability: str
+    refusal: str
+
+
+def _variable(
+    element: Element,
+    typed: tuple[Kind, str],
+    role: _Role,
+    attributes: Mapping[str, str],
+    definition: Element | None,
+    start: float | str | None = None,
+    *,
+    is_state: bool,
+) -> Variable:
+    """Return a variable, from its own attributes and those of its declared type."""
+    return Variable(
+        name=element.attrib["name"],
+        kind=typed[0],
+        causality=role.causality,
+        variability=role.variability,
+        unit=_unit(attributes.get("unit")),
+        display_unit=_unit(attributes.get("displayUnit")),
+        low=_limit(attributes.get("min")),
+        high=_limit(attributes.get("max")),
+        nominal=finite(attributes.get("nominal")),
+        start=start,
+        settable=not role.refusal,
+        is_state=is_state,
+        literals=_literals(definition),
+        description=element.get("description", ""),
+        type=typed[1],
+    )
+
+
+def _role(element: Element, major: int, default_variability: str = "continuous", *, has_start: bool) -> _Role:
     causality = element.get("causality", "local")
     variability = element.get("variability", default_variability)
+    refusal = _REFUSALS.get(causality, "")
     if major == 1:
         if variability == "parameter":
             causality, variability = "parameter", "fixed"
         refusal = "" if has_start or causality == "input" else "it has no start value; the model computes it"
-    elif causality in ("parameter", "input"):
-        if causality == "parameter":
-            variability = element.get("variability", "fixed")
-        refusal = ""
-    elif causality == "structuralParameter":
-        refusal = "it is a structural parameter, which sets array sizes"
-    elif causality == "calculatedParameter":
-        refusal = "it is a calculated parameter; set the parameters from which the model calculates it"
-    elif causality == "independent":
-        refusal = "it is the independent variable, time"
-    else:
+    elif causality == "parameter":
+        variability = element.get("variability", "fixed")
+    elif causality != "input" and not refusal:
         initial = element.get("initial", "exact" if has_start else "calculated")
         refusal = "" if initial in ("exact", "approx") else "the model computes its initial value"
     if variability == "constant":
         refusal = "it is a constant"
-    return _CAUSALITIES.get(causality, "local"), variability, refusal
+    return _Role(_CAUSALITIES.get(causality, "local"), variability, refusal)
 
 
 def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
