@@ -1,3 +1,4 @@
+import json
 import math
 from dataclasses import replace
 from typing import Any
@@ -6,11 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import PchipInterpolator
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.signals import Signal
+from falsifier.core.fitting import fit
+from falsifier.core.signals import Signal, even_times
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.errors import CandidateError, SpecError
+from falsifier.testing import START, lag_problem
 
 THROTTLE = InputRange("throttle", 0.0, 100.0, control_points=7, hold=0.05, unit="%")
 BRAKE = InputRange("brake", 0.0, 325.0, control_points=3, interpolation="constant")
@@ -154,3 +158,136 @@ def test_a_shortest_piece_frees_all_inputs_up_to_the_stop_time() -> None:
     for wrong in (0.0, -1.0, 11.0, math.nan):
         with pytest.raises(SpecError, match="shortest piece of an input must be positive"):
             space.freed(wrong)
+
+
+HELD = Signal((0.0, 1.0), (2.0, 3.0), "constant", hold=0.5)
+FREE = Signal((0.0,), (1.0,), "linear")
+
+
+def test_what_is_simulated_is_the_key_whoever_proposed_it() -> None:
+    one = Candidate({"a": HELD, "b": FREE}, {"p": 1.0, "q": 2.0}, "uniform", "random")
+    other = Candidate({"b": FREE, "a": HELD}, {"q": 2.0, "p": 1.0}, "somebody")
+    assert one.key == other.key
+    assert len({one.key, other.key}) == 1, "keys can be looked up"
+    assert one.key != Candidate({"a": HELD, "b": FREE}, {"p": 1.0, "q": 2.5}).key
+    assert one.key != Candidate({"a": FREE, "b": FREE}, {"p": 1.0, "q": 2.0}).key
+
+
+def test_it_goes_through_json_whole() -> None:
+    candidate = Candidate({"a": HELD, "b": FREE}, {"p": 0.1 + 0.2}, "llm MP5", "because of x < 1")
+    assert Candidate.from_json(json.loads(json.dumps(candidate.to_json()))) == candidate
+
+
+GRID = np.linspace(0, 50, 5001)
+
+
+def test_pchip_is_scipys() -> None:
+    values = [10.0, 80, 20, 60, 100, 0, 50]
+    expected = PchipInterpolator(np.linspace(0, 50, 7), values)(GRID)
+    np.testing.assert_allclose(Signal.evenly(values, stop_time=50).sample(GRID), expected, atol=1e-12)
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=9), st.data())
+def test_pchip_is_scipys_at_uneven_times(values: list[float], data: st.DataObject) -> None:
+    gaps = data.draw(st.lists(st.floats(0.1, 9), min_size=len(values) - 1, max_size=len(values) - 1))
+    times = np.concatenate([[0.0], np.cumsum(gaps)]).astype(np.float64)
+    at = np.linspace(0.0, float(times[-1]), 57)
+    got = Signal(tuple(times.tolist()), tuple(values)).sample(at)
+    np.testing.assert_allclose(got, PchipInterpolator(times, values)(at), atol=1e-9)
+
+
+def test_constant_pieces_are_equally_long_and_right_continuous() -> None:
+    signal = Signal.evenly([1, 2, 3, 4], stop_time=8, interpolation="constant")
+    assert signal.times == (0, 2, 4, 6)
+    assert signal.sample(np.array([0, 1.99, 2, 3.5, 4, 6, 8])).tolist() == [1, 1, 2, 2, 3, 4, 4]
+
+
+def test_linear_keeps_its_last_value() -> None:
+    signal = Signal((0.0, 1.0), (0.0, 10.0), "linear")
+    assert signal.sample(np.array([0.0, 0.25, 1.0, 7.0])).tolist() == [0, 2.5, 10, 10]
+
+
+def test_hold_samples_at_its_own_multiples_in_spite_of_rounding() -> None:
+    signal = Signal((0.0, 1.0), (0.0, 1.0), "linear", hold=0.05)
+    times = np.linspace(0.0, 0.2, 21)
+    expected = np.repeat([0.0, 0.05, 0.10, 0.15, 0.20], 5)[:21]
+    np.testing.assert_allclose(signal.sample(times), expected, atol=1e-12)
+
+
+def test_one_point_is_a_constant() -> None:
+    assert set(Signal.evenly([3.5], stop_time=10).sample(GRID)) == {3.5}
+    assert even_times(1, stop_time=10, interpolation="pchip") == (0.0,)
+
+
+@pytest.mark.parametrize(
+    ("times", "values", "message"),
+    [
+        ((0.0, 1.0), (1.0,), "equally many"),
+        ((1.0, 2.0), (1.0, 2.0), "strictly from 0"),
+        ((0.0, 0.0), (1.0, 2.0), "strictly from 0"),
+        ((0.0, 1.0), (1.0, float("nan")), "finite"),
+        ((), (), "one or more"),
+    ],
+)
+def test_bad_control_points_are_refused(
+    times: tuple[float, ...], values: tuple[float, ...], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        Signal(times, values)
+
+
+def test_switches_and_dwell() -> None:
+    signal = Signal((0.0, 1.0, 1.5, 4.0), (0.0, 1.0, 0.0, 0.0), "constant")
+    assert signal.switches == 2
+    assert signal.shortest_dwell == 0.5
+    assert Signal((0.0,), (1.0,)).shortest_dwell is None
+
+
+RAMP = Signal(tuple(i / 10 for i in range(101)), tuple(i / 100 for i in range(101)), "linear")
+
+
+def test_what_fits_stays_as_it_is() -> None:
+    space = lag_problem(points=3, parameters=[START]).space
+    candidate = space.decode([0.1, 0.2, 0.3, 0.5])
+    assert fit(space, candidate).candidate.key == candidate.key
+    assert fit(space, candidate).notes == ()
+
+
+def test_a_signal_is_sampled_at_the_control_points_of_the_spec() -> None:
+    fitted = fit(lag_problem(points=3).space, Candidate({"u": RAMP}))
+    assert fitted.candidate.signals["u"].values == pytest.approx((0, 0.5, 1))
+    assert "u is sampled at 3 control points with linear interpolation" in fitted.notes[0]
+
+
+def test_a_free_space_takes_as_many_control_points_as_it_allows() -> None:
+    space = lag_problem(free=Freedom(max_control_points=50, min_interval=0.5)).space
+    assert len(fit(space, Candidate({"u": RAMP})).candidate.signals["u"].times) == 21
+    steps = Signal((0.0, 0.1), (0.0, 1.0), "constant")
+    assert len(fit(space, Candidate({"u": steps})).candidate.signals["u"].times) == 20
+
+
+def test_inputs_that_are_not_searched_are_left_out_and_said() -> None:
+    fitted = fit(lag_problem().space, Candidate({"u": RAMP, "v": RAMP}))
+    assert list(fitted.candidate.signals) == ["u"]
+    assert any("v is not searched" in note for note in fitted.notes)
+
+
+def test_a_missing_parameter_has_its_nominal_value_and_needs_one() -> None:
+    space = lag_problem(points=1, parameters=[START]).space
+    fitted = fit(space, Candidate({"u": Signal((0.0,), (0.5,), "linear")}))
+    assert fitted.candidate.parameters == {"x0": 0.0}
+    assert "x0 is not given" in fitted.notes[0]
+    with pytest.raises(CandidateError, match="'x0' is searched and missing"):
+        fit(
+            replace(space, parameters=(replace(START, nominal=None),)),
+            fitted.candidate.__class__({"u": RAMP}),
+        )
+
+
+def test_values_outside_the_range_and_missing_inputs_are_refused() -> None:
+    space = lag_problem(points=2).space
+    peak = Signal((0.0, 4.0, 5.0, 10.0), (0.0, 0.0, 1.5, 0.0), "linear")
+    with pytest.raises(CandidateError, match=r"'u' at t = 5 s: 1.5 is outside its range \[-1, 1\]"):
+        fit(space, Candidate({"u": peak}))
+    with pytest.raises(CandidateError, match="'u' is searched and missing"):
+        fit(space, Candidate())

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import subprocess
 import tomllib
 import zipfile
 from pathlib import Path
@@ -11,7 +13,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from tests.modelica.conftest import ROOT, Build, run_exporter
+from tests.modelica.conftest import ROOT, Build, exporter_python, run_exporter
+from tests.patience import HANG
 
 FMUS = sorted((ROOT / "fmus").glob("*.fmu"))
 AT = ROOT / "fmus" / "AT.fmu"
@@ -86,3 +89,52 @@ def test_the_bundled_description_is_the_one_of_the_sources(build: Build) -> None
     rebuilt = build("ArchComp.AT", ROOT / "modelica" / "ArchComp")
     for name in ("modelDescription.xml", "sources/model.c"):
         assert zipfile.ZipFile(AT).read(name) == zipfile.ZipFile(rebuilt).read(name)
+
+
+FOLDER = Path(__file__).parent / "refused"
+CASES = sorted(path.stem for path in FOLDER.glob("*.mo"))
+
+PROGRAM = """
+import json, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from export.cli import translate
+from export.read.syntax import ExportError
+found = {}
+for path in sorted(Path(sys.argv[2]).glob("*.mo")):
+    try:
+        translate(path, "M")
+        found[path.stem] = "translated"
+    except ExportError as error:
+        found[path.stem] = str(error)
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def messages() -> dict[str, str]:
+    """The exporter's message for every model, from one process."""
+    command = [exporter_python(), "-c", PROGRAM, str(ROOT / "modelica"), str(FOLDER)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG)
+    assert done.returncode == 0, done.stderr
+    found: dict[str, str] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_refused_with_file_and_line(messages: dict[str, str], name: str) -> None:
+    lines = (FOLDER / f"{name}.mo").read_text().splitlines()
+    [(number, part)] = [
+        (k, line.split("// error: ")[1]) for k, line in enumerate(lines, 1) if "// error: " in line
+    ]
+    assert messages[name].startswith(f"{name}.mo:{number}: ")
+    assert part in messages[name]
+
+
+def test_a_missing_file_and_a_missing_model_are_named(tmp_path: Path) -> None:
+    done = run_exporter("M", "--source", str(tmp_path / "none.mo"))
+    assert done.returncode == 1
+    assert "none.mo does not exist" in done.stderr
+    done = run_exporter("Nothing")
+    assert done.returncode == 1
+    assert "there is no model 'Nothing'" in done.stderr

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import zipfile
 
 import numpy as np
 import pytest
 
+from falsifier.core.model import Experiment, Interface
+from falsifier.core.signals import Signal
+from falsifier.fmu import FmuModel, read_info
 from tests.modelica.conftest import Build
-from tests.modelica.support import opened, said_on_failure
+from tests.modelica.support import INTERFACES, Floats, opened, said_on_failure
 
 
 def final(
@@ -184,3 +188,95 @@ def test_elementary_functions(build: Build) -> None:
     names = [f"y[{k}]" for k in range(1, 20)]
     with opened(build("Elementary")) as [fmu]:
         assert fmu.start(u=u).row(names) == pytest.approx(expected, rel=1e-14)
+
+
+WAIT, UP, DOWN = 1.0, 2.0, 3.0
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_items_are_described(build: Build, fmi: int) -> None:
+    info = read_info(build("Enumerated", fmi=fmi))
+    variables = {v.name: v for v in info.variables}
+    for name, start in (("command", WAIT), ("counted", UP), ("before", DOWN)):
+        assert variables[name].kind == "enumeration"
+        assert variables[name].literals == {"Wait": 1, "Up": 2, "Down": 3}
+        assert variables[name].start == start
+    assert "kept[1]" not in variables
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_enumerations_as_inputs_parameters_and_states(build: Build, fmi: int, interface: Interface) -> None:
+    command = Signal((0.0, 0.2, 0.4, 0.6, 0.8), (WAIT, UP, DOWN, UP, UP), "constant")
+    outputs = ("count", "before", "code", "later", "gain[1]", "gain[2]", "gain[3]")
+    model = FmuModel(build("Enumerated", fmi=fmi), interface=interface)
+    for counted, expected in ((UP, [0, 1, 1, 2, 2]), (DOWN, [0, 0, 1, 1, 1])):
+        found = model.simulate({"command": command}, {"counted": counted}, Experiment(1.0, 0.1, outputs))
+        rows = np.column_stack([found[name] for name in outputs])[1::2]
+        assert rows[:, 0].tolist() == expected
+        assert rows[:, 1].tolist() == [DOWN, WAIT, UP, DOWN, DOWN]
+        assert rows[:, 2].tolist() == [13, 21, 32, 23, 23]
+        assert rows[:, 3].tolist() == [float(c > counted) for c in (WAIT, UP, DOWN, UP, UP)]
+        assert rows[:, 4].tolist() == [0, 1, 1, 1, 1]
+        # The algorithm keeps {Up, Down}, from the tick at 0.5 s on the command there and the item before it.
+        assert rows[:, 5].tolist() == [0.5] * 5
+        assert rows[:, 6].tolist() == [3, 3, 2, 2, 2]
+    model.close()
+
+
+def test_an_enumeration_without_a_start_value_begins_with_its_first_item(build: Build) -> None:
+    with opened(build("Enumerated")) as [fmu]:
+        assert fmu.variables["command"].start == "1"
+        assert fmu.fmu.getInteger([fmu.variables["command"].valueReference]) == [1]
+
+
+NAMES = ("follower", "level", "slow", "echo", "turns")
+TIMES = np.linspace(0, 6, 61)
+
+
+def simulated(
+    build: Build, tolerance: float, *, exchange: bool = False, **values: float
+) -> dict[str, Floats]:
+    fmu = FmuModel(build("Stiff"), interface="model-exchange" if exchange else "co-simulation")
+    found = fmu.simulate({}, values, Experiment(6.0, 0.1, NAMES, tolerance=tolerance))
+    fmu.close()
+    return {name: np.asarray(found[name]) for name in NAMES}
+
+
+def echo() -> Floats:
+    """Return what follows 1 until 0.5 s, then cos(t - 0.5), with a rate of 50 / s."""
+    late = np.maximum(TIMES - 0.5, 0)
+    start = 1 - np.exp(-50 * np.minimum(TIMES, 0.5))
+    # e' = 50 (cos(s) - e), e(0) = start: the stationary part is a sine and a cosine.
+    cosine, sine = 2500 / 2501, 50 / 2501
+    driven = cosine * np.cos(late) + sine * np.sin(late)
+    return np.asarray(np.where(TIMES < 0.5, start, driven + (start - cosine) * np.exp(-50 * late)))
+
+
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("rate", [1e3, 1e6])
+def test_stiff_equations(build: Build, tolerance: float, rate: float) -> None:
+    found = simulated(build, tolerance, rate=rate)
+    assert found["follower"] == pytest.approx(np.cos(TIMES), abs=20 * tolerance)
+    assert found["slow"] == pytest.approx(np.exp(-TIMES), abs=20 * tolerance)
+    assert np.array_equal(found["turns"], np.minimum(np.floor(TIMES / np.log(2)), 3))
+    assert found["echo"] == pytest.approx(echo(), abs=100 * tolerance)
+    if rate == 1e6:
+        # The level is where inflow and outflow balance, apart from the slow decay of the inflow.
+        assert found["level"][1:30] == pytest.approx((0.1 * np.exp(-TIMES[1:30])) ** 2, rel=1e-3)
+
+
+def test_the_other_interface_has_the_same_solution(build: Build) -> None:
+    one, other = simulated(build, 1e-9), simulated(build, 1e-9, exchange=True)
+    for name in NAMES:
+        assert one[name] == pytest.approx(other[name], abs=1e-4), name
+
+
+def test_slopes_are_moved_in_groups(build: Build) -> None:
+    with zipfile.ZipFile(build("Stiff")) as archive:
+        sizes = archive.read("sources/sizes.h").decode()
+        assert "sources/implicit.h" in archive.namelist()
+        assert "sources/explicit.h" not in archive.namelist()
+    assert "#define MODEL_STATES 4\n" in sizes
+    assert "#define MODEL_GROUPS 2\n" in sizes
+    assert "#define MODEL_SLOPES_OF_TIME 1\n" in sizes

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import read_info
-from falsifier.fmu.description import archive
-from tests.fmu import fixtures
+from falsifier.fmu.description import archive, xml
+from falsifier.fmu.description.xml import read_xml
 
 
 def write(path: Path, *entries: tuple[zipfile.ZipInfo | str, bytes]) -> Path:
@@ -112,14 +112,6 @@ def test_what_is_not_an_fmu_is_named(tmp_path: Path) -> None:
         read_info(write(tmp_path / "zip.fmu", ("a.txt", b"x")))
 
 
-def test_a_damaged_entry_is_named(tmp_path: Path) -> None:
-    data = bytearray(fixtures.path("Lag_2").read_bytes())
-    data[60:120] = bytes(60)
-    (tmp_path / "damaged.fmu").write_bytes(data)
-    with pytest.raises(ModelError, match=r"damaged|not well-formed|does not follow"):
-        read_info(tmp_path / "damaged.fmu")
-
-
 @pytest.mark.parametrize(("header", "name_at"), [(b"PK\x03\x04", 30), (b"PK\x01\x02", 46)])
 def test_a_name_in_no_encoding_is_damage(tmp_path: Path, header: bytes, name_at: int) -> None:
     path = write(tmp_path / "named.fmu", ("modelDescription.xmlü", b"<a/>"))
@@ -129,3 +121,30 @@ def test_a_name_in_no_encoding_is_damage(tmp_path: Path, header: bytes, name_at:
     path.write_bytes(data)
     with pytest.raises(ModelError, match=r"named\.fmu: .*(damaged|not a readable FMU)"):
         archive.read_entry(path, "modelDescription.xmlü")
+
+
+LAUGHS = b"""<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><x>&b;</x>"""
+OUTSIDE = b"""<!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>"""
+
+
+@pytest.mark.parametrize("text", [LAUGHS, OUTSIDE, OUTSIDE.decode().encode("utf-16")])
+def test_document_types_are_refused(text: bytes) -> None:
+    with pytest.raises(SpecError, match=r"part: refused because it declares a document type \(x\)"):
+        read_xml(text, "part", SpecError)
+
+
+@pytest.mark.parametrize(
+    "text", [b"<a><b></a>", b"", b"<?xml version='1.0' encoding='no'?><a/>", b"<a>&x;</a>"]
+)
+def test_what_is_not_well_formed_is_named(text: bytes) -> None:
+    with pytest.raises(SpecError, match="part: not well-formed XML"):
+        read_xml(text, "part", SpecError)
+
+
+def test_depth_and_size_have_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(SpecError, match="nested more than 400 deep"):
+        read_xml(b"<a>" * 500 + b"</a>" * 500, "part", SpecError)
+    assert read_xml(b"<a>" * 300 + b"</a>" * 300, "part", SpecError).tag == "a"
+    monkeypatch.setattr(xml, "_MAX_SIGNS", 3)
+    with pytest.raises(ModelError, match="more than 3 tags"):
+        read_xml(b"<a><b/><b/><b/></a>", "part", ModelError)

@@ -9,9 +9,7 @@ import pytest
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import System, read_package
-from falsifier.fmu.description import archive
 from falsifier.fmu.ssp import reader as ssp
-from tests.fmu import packages
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import run, sampled_loop
 
@@ -199,27 +197,6 @@ def test_descriptions_that_grow_like_powers_are_refused(
         read_package(file)
 
 
-def test_an_algebraic_loop_of_a_package_is_refused(tmp_path: Path) -> None:
-    both = PI + PI.replace('name="pi"', 'name="pj"')
-    wires = "".join(
-        f'<ssd:Connection startElement="{a}" startConnector="y" endElement="{b}" endConnector="measured"/>'
-        for a, b in (("pi", "pj"), ("pj", "pi"))
-    )
-    file = write(tmp_path / "loop.ssp", structure(system(both, wires)), "Gain_2")
-    with pytest.raises(Exception, match=r"loop\.ssp: connections: .* algebraic loop"):
-        read_package(file)
-
-
-def test_entities_are_not_expanded(tmp_path: Path) -> None:
-    bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">' + "".join(
-        f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in zip("abcdefgh", "bcdefghi", strict=True)
-    )
-    text = packages.structure(system(PLANT)).replace("<ssd:SystemS", f"{bomb}]><ssd:SystemS", 1)
-    file = write(tmp_path / "bomb.ssp", text.replace('name="test"', 'name="&i;"'), "Plant_2")
-    with pytest.raises(Exception, match=r"bomb\.ssp: .*declares a document type \(x\)"):
-        read_package(file)
-
-
 @pytest.mark.parametrize("times", ['stopTime="-1"', 'stopTime="0"', 'startTime="5" stopTime="2"'])
 def test_a_default_experiment_that_ends_before_it_starts_is_refused(tmp_path: Path, times: str) -> None:
     ssd = structure(system(PLANT + PI, FEEDBACK), after=f"<ssd:DefaultExperiment {times}/>")
@@ -241,18 +218,6 @@ def test_what_is_no_archive_or_has_no_description_is_said(tmp_path: Path) -> Non
     with zipfile.ZipFile(file, "w") as package:
         package.writestr("readme.txt", "")
     with pytest.raises(SpecError, match=r"a\.ssp: the package contains no SystemStructure\.ssd"):
-        read_package(file)
-
-
-def test_a_zip_bomb_is_rejected_before_it_is_unpacked(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(archive, "_DENSE_FROM_BYTES", 1 << 20)
-    file = tmp_path / "bomb.ssp"
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as package:
-        package.writestr("SystemStructure.ssd", structure(system(PLANT)))
-        package.writestr("resources/Plant_2.fmu", bytes(2 << 20))
-    with pytest.raises(SpecError, match=r"bomb\.ssp: rejected because .* like a zip bomb"):
         read_package(file)
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Component, Connection, Coupling
@@ -73,14 +72,6 @@ def test_a_component_that_hangs_is_named_and_ended() -> None:
     run(model, "plant.y")
     with pytest.raises(SimulationError, match=r"in component bad .*time limit"):
         run(model, "plant.y", parameters={"bad.misdeed": HANG}, time_limit=0.5)
-    model.close()
-
-
-def test_strings_are_set(tmp_path: Path) -> None:
-    (tmp_path / "gain.txt").write_text("2.5")
-    model = system({"table": "Table_3", "pi": "Gain_2"}, {"pi.r": "table.y"}, EACH)
-    experiment = Experiment(1.0, 0.5, ("table.y",), strings=(("table.fileName", str(tmp_path / "gain.txt")),))
-    assert model.simulate({"table.u": Signal((0.0,), (1.0,))}, {}, experiment)["table.y"][-1] == 2.5
     model.close()
 
 

@@ -44,15 +44,6 @@ def test_what_is_not_a_system_is_refused() -> None:
         System({"a": "nowhere.fmu"})
 
 
-def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:
-    copy = tmp_path / "model.fmu"
-    copy.write_bytes(path("Plant_2").read_bytes())
-    model = System({"a": copy}, name="changed")
-    copy.write_bytes(path("Gain_2").read_bytes())
-    with pytest.raises(ModelError, match=r"model\.fmu: the file has changed since the model was loaded"):
-        run(model, "a.y")
-
-
 def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named() -> None:
     model = system({"plant": "Plant_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, LOOP)
     found = []

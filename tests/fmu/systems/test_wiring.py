@@ -4,9 +4,13 @@ import re
 
 import pytest
 
-from falsifier.errors import SpecError
+from falsifier.core.model import Experiment
+from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Connection, Coupling, System
 from falsifier.fmu.description import wine
+from falsifier.fmu.process import Policy, Reply, Where
+from falsifier.fmu.process.plan import make_plan
+from falsifier.fmu.systems.order import SystemOrder
 from tests.fmu import fixtures
 from tests.fmu.small_systems import LOOP, solved, system
 
@@ -101,3 +105,113 @@ def test_components_with_a_windows_library_only_are_refused() -> None:
         pytest.skip("on this machine it is refused as an FMU without a library")
     with pytest.raises(SpecError, match=r"its only library is for Windows; .* not as a component"):
         System({"lag": path}, {})
+
+
+def order(model: System) -> list[str]:
+    network = model.network
+    return [network.members[k].name for k in network.order]
+
+
+@pytest.mark.parametrize(
+    "components", [{"plant": "Plant_2", "pi": "Gain_3"}, {"pi": "Gain_2", "plant": "Plant_3"}]
+)
+def test_a_component_whose_output_depends_directly_steps_after_what_feeds_it(
+    components: dict[str, str],
+) -> None:
+    found = system(components, LOOP)
+    assert order(found) == ["plant", "pi"]
+    assert "in the order plant, pi; plant.u uses the values of the previous" in found.info.notes[0]
+
+
+def test_a_chain_of_direct_dependencies_has_no_delay() -> None:
+    chain = {"a": "Gain_2", "b": "Gain_2", "c": "Plant_2"}
+    found = system(chain, {"a.measured": "b.y", "b.measured": "c.y"})
+    assert order(found) == ["c", "b", "a"]
+    assert found.info.notes[0] == "components step in the order c, b, a"
+
+
+def test_what_declares_nothing_may_depend_on_everything_unless_that_forbids_any_order() -> None:
+    found = system({"last": "Lag_2", "first": "Plant_2"}, {"last.u": "first.y"})
+    assert order(found) == ["first", "last"]
+    both = system({"a": "Lag_2", "b": "Lag_2"}, {"a.u": "b.y", "b.u": "a.y"})
+    assert order(both) == ["a", "b"], "neither declares anything: the order is the given one"
+
+
+def test_a_loop_of_direct_dependencies_is_refused_with_its_variables() -> None:
+    loop = {"a.measured": "b.y", "b.measured": "a.y"}
+    gains = {"a": "Gain_2", "b": "Gain_3"}
+    with pytest.raises(
+        SpecError,
+        match=r"connections: (a\.y -> b\.measured -> b\.y -> a\.measured -> a\.y|"
+        r"b\.y -> a\.measured -> a\.y -> b\.measured -> b\.y): .*algebraic loop.* loops = \"delay\"",
+    ):
+        system(gains, loop)
+    assert order(system(gains, loop, Coupling(loops="delay"))) == ["a", "b"]
+
+
+def test_only_the_components_of_a_loop_iterate_and_stand_together() -> None:
+    links = {"a.u": "b.y", "b.u": "a.y", "c.u": "a.y", "d.measured": "d.y", "b2.u": "c.y"}
+    fmus = {"c": "Plant_2", "b": "Lead_2", "b2": "Lead_3", "d": "Gain_2", "a": "Lead_2"}
+    found = system(fmus, links, Coupling(loops="iterate"))
+    assert order(found) == ["c", "b2", "d", "b", "a"]
+    assert found.network.loops == ((2, 3), (3, 5))
+    notes = found.info.notes[:3]
+    assert "c.u uses the values of the previous communication point" in notes[0], "it has no direct output"
+    assert notes[1:] == (
+        "d repeats its steps until the outputs no longer change",
+        "b, a repeat their steps until the outputs no longer change",
+    )
+
+
+def test_an_output_that_feeds_its_own_component_directly_is_a_loop() -> None:
+    with pytest.raises(SpecError, match=r"a\.y -> a\.measured -> a\.y: these depend directly"):
+        system({"a": "Gain_2"}, {"a.measured": "a.y"})
+    assert system({"a": "Plant_2"}, {"a.u": "a.y"}).info.inputs == ()
+
+
+MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
+ORDER = SystemOrder.of(MODEL.network, MODEL.key, logging=False, policy=Policy())
+STRINGS = (("table.fileName", "a.txt"),)
+PLAN = make_plan(
+    MODEL.network.description, Experiment(1.0, 0.1, ("plant.y",), strings=STRINGS), (), (), pieces=1
+)
+# Signals are plant.y and pi.y, in the order of stepping.
+NAMES = [ORDER.component(k) for k in range(3)]
+
+
+def told(reply: Reply) -> str:
+    error = ORDER.failure(PLAN, reply, "", ("slow",))
+    assert isinstance(error, SimulationError | ModelError)
+    return str(error)
+
+
+@pytest.mark.parametrize(
+    ("where", "text", "said"),
+    [
+        (Where.NOT_A_NUMBER, "1", "pi: pi.y became nan at t = 0.5 s, before the stop time 1 s"),
+        (Where.MISSING_AT_FIRST, " 0 1", "pi: plant.y, pi.y is nan at t = 0 s, in the initialisation"),
+        (Where.MISSING_AFTER_START, "0", "pi: plant.y is nan at t = 0 s, after the initialisation"),
+        (Where.RESTORING, "", "pi: saving or restoring the state returned error at t = 0.5 s"),
+        (Where.STEPPING, "", "pi: the step returned error at t = 0.5 s"),
+        (Where.TIMEOUT, "", "system: stopped at t = 0.5 s"),
+        (Where.IMPOSSIBLE, "it lacks fmi2DoStep", "pi: it lacks fmi2DoStep"),
+    ],
+)
+def test_the_component_and_its_outputs_are_named(where: Where, text: str, said: str) -> None:
+    assert told(Reply(where, 3, text, 0.5, component=NAMES.index("pi"))).startswith(said)
+
+
+def test_outputs_that_still_change_are_named_with_their_changes() -> None:
+    moving = "9 0 0.25 1 1e-5"
+    found = told(Reply(Where.NOT_CONVERGED, 0, moving, 0.5, component=NAMES.index("pi")))
+    assert "the loop of pi, plant does not converge" in found
+    assert "plant.y (by 0.25), pi.y (by 1e-05) and 7 more" in found
+    found = told(Reply(Where.UNSETTLED, 0, moving, 0.0))
+    assert "after 100 rounds" in found and "pi.y (by 1e-05) and 7 more" in found
+
+
+@pytest.mark.parametrize("where", [*Where, 77])
+@pytest.mark.parametrize("text", ["", "x", "1 99 y -1 ٣ 1e999 nan", "9" * 5000])
+@pytest.mark.parametrize("component", [-1, 2, 10**8])
+def test_nonsense_is_no_defect(where: int, text: str, component: int) -> None:
+    assert told(Reply(where, 1 << 31, text, 0.5, component=component))
