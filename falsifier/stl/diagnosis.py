@@ -229,8 +229,7 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
                 chain = []
         else:
             decided_at = float(times[following.sample])
-            text = _words(formula, following.part.formula, window, decided_at, here.value)
-            plain = _plain(formula, following.part.formula, window, decided_at, here.value) or text
+            text, plain = _words(formula, following.part.formula, window, decided_at, here.value)
         steps.append(Step(formula, time, here.value, window, text, plain))
     vacuities = {
         v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
@@ -267,47 +266,33 @@ def _of_chain(formula: Formula, chain: list[Formula], decider: Formula) -> str:
 
 def _words(
     formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
-) -> str:
+) -> tuple[str, str]:
+    """Say what happened at an operator: with its name, and for readers who do not know it."""
+    at, (start, end) = seconds(time), window or (0.0, 0.0)
+    during = f"from {number(start)} to {seconds(end)}"
+    is_left = bool(formula.children) and decider is formula.children[0]
+    side, came = "left" if is_left else "right", "decided" if value >= 0 else "failed"
     match formula:
         case Always():
-            return f"G {_over(window)} was lowest at {seconds(time)}"
+            return f"G {_over(window)} was lowest at {at}", f"{during}, the worst moment is {at}"
         case Eventually():
-            return f"F {_over(window)} was highest at {seconds(time)}"
-        case Until(left, _):
-            side = "left" if decider is left else "right"
-            return f"U {_over(window)} was decided by its {side} side at {seconds(time)}"
+            return f"F {_over(window)} was highest at {at}", f"{during}, the best moment is {at}"
+        case Until():
+            what = "what must hold until then" if is_left else "what must happen"
+            text = f"U {_over(window)} was decided by its {side} side at {at}"
+            return text, f"{during}, {what} decided at {at}"
+        case Implies() if is_left:
+            return "the condition of -> decided", "the condition (the part after 'if') decided"
+        case Implies():
+            return f"the consequence of -> {came}", f"the condition was met, and what must follow {came}"
         case Next():
-            return f"the next recorded time is {seconds(time)}"
+            text = f"the next recorded time is {at}"
         case Not():
-            return f"'not' {'holds' if value >= 0 else 'fails'}"
-        case Implies(left, _):
-            if decider is left:
-                return "the condition of -> decided"
-            return f"the consequence of -> {'decided' if value >= 0 else 'failed'}"
-        case And(left, _) | Or(left, _) | Iff(left, _):
-            name = {And: "and", Or: "or", Iff: "<->"}[type(formula)]
-            return f"the {'left' if decider is left else 'right'} side of '{name}' decided"
-    return ""
-
-
-def _plain(
-    formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
-) -> str:
-    """Say what happened without the name of the operator; empty if that has no name of its own."""
-    start, end = window or (0.0, 0.0)
-    match formula:
-        case Always():
-            return f"from {number(start)} to {seconds(end)}, the worst moment is {seconds(time)}"
-        case Eventually():
-            return f"from {number(start)} to {seconds(end)}, the best moment is {seconds(time)}"
-        case Until(left, _):
-            what = "what must hold until then" if decider is left else "what must happen"
-            return f"from {number(start)} to {seconds(end)}, {what} decided at {seconds(time)}"
-        case Implies(left, _):
-            if decider is left:
-                return "the condition (the part after 'if') decided"
-            return f"the condition was met, and what must follow {'decided' if value >= 0 else 'failed'}"
-    return ""
+            text = f"'not' {'holds' if value >= 0 else 'fails'}"
+        case _:
+            name = "and" if isinstance(formula, And) else "or" if isinstance(formula, Or) else "<->"
+            text = f"the {side} side of '{name}' decided"
+    return text, text
 
 
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:

@@ -14,8 +14,12 @@ Comparison = Literal["<", "<=", ">", ">=", "==", "!="]
 
 # Precedence levels, lowest first; those of expressions (expression.py) follow.
 EQUIVALENCE, IMPLICATION, DISJUNCTION, CONJUNCTION, UNTIL, PREFIX, COMPARISON = range(7)
+# What holds if a comparison does not; and what holds if its sides are exchanged.
 OPPOSITE: dict[Comparison, Comparison] = {
     "<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "==",
+}  # fmt: skip
+MIRRORED: dict[Comparison, Comparison] = {
+    "<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!=",
 }  # fmt: skip
 T = TypeVar("T")
 

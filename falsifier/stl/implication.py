@@ -4,6 +4,7 @@ from functools import lru_cache
 
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.formula import (
+    MIRRORED,
     OPPOSITE,
     Always,
     And,
@@ -19,7 +20,8 @@ from falsifier.stl.formula import (
     Window,
 )
 
-_MIRRORED: dict[Comparison, Comparison] = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
+# Comparisons that bound an expression from one side.
+_BOUNDING = ("<", "<=", ">", ">=")
 
 
 @lru_cache(maxsize=10_000)  # the same parts are compared again and again
@@ -79,7 +81,7 @@ def _plain(formula: Formula) -> Formula:
     match formula:
         case Not(Not(operand)):
             return _plain(operand)
-        case Not(Predicate(operator, left, right)) if operator in _MIRRORED:
+        case Not(Predicate(operator, left, right)) if operator in _BOUNDING:
             return Predicate(OPPOSITE[operator], left, right)
         case Not(Always(operand, window)):
             return Eventually(Not(operand), window)
@@ -102,12 +104,12 @@ def _stricter(first: Predicate, second: Predicate) -> bool:
 
 
 def _bounded(predicate: Predicate) -> tuple[Expression, Comparison, float] | None:
-    if predicate.operator not in _MIRRORED:
+    if predicate.operator not in _BOUNDING:
         return None
     if isinstance(predicate.right, Number):
         return predicate.left, predicate.operator, predicate.right.value
     if isinstance(predicate.left, Number):
-        return predicate.right, _MIRRORED[predicate.operator], predicate.left.value
+        return predicate.right, MIRRORED[predicate.operator], predicate.left.value
     return None
 
 

@@ -1,11 +1,13 @@
-"""Tokens of a formula's text, and errors that point to a position in it."""
+"""Tokens of a formula's text, and errors that point to a position in it and say what to write."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Literal
 
 from falsifier.errors import FormulaError
-from falsifier.stl.names import scan_name, scan_word
+from falsifier.stl.names import RESERVED, scan_name, scan_word
 
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
@@ -22,8 +24,21 @@ _HINTS = {
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
     "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
 }  # fmt: skip
+# Units of the bounds of windows, in s.
+UNITS = {
+    "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
+}  # fmt: skip
+_INSTEAD = {  # what was meant by a name
 
+    "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
+    "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
+    "u": "operators are capital letters: write U",
+    "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
+    "pow": "write x^y", "ln": "the natural logarithm is log",
+}  # fmt: skip
 
+_BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
+JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /"
 # Maximum number of characters of a line that errors show.
 _SHOWN_LINE = 160
 
@@ -79,6 +94,46 @@ def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaEr
         line, column = line[first : first + _SHOWN_LINE], column - first
     caret = " " * column + "^"
     return FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
+
+
+def hint_for(token: Token) -> str:
+    """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
+    word = token.text.partition("[")[0].lower()
+    if token.kind != "name":
+        return ""
+    return _INSTEAD.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")
+
+
+def hint_at(tokens: Sequence[Token], index: int) -> str:
+    """Return what to do if this token stands where a formula, a signal or a number is expected."""
+    token, previous = tokens[index], tokens[index - 1] if index else None
+    if token.text == "U":
+        return f'it belongs between two formulas; write a signal of that name as "{token.written}"'
+    if (box := "".join(t.text for t in tokens[index : index + 2])) in _BOXES:
+        return _BOXES[box]
+    if token.text in ("[", "]"):
+        return "write windows directly after G, F or U"
+    if token.text == ")":
+        return "there is nothing between the parentheses, or one parenthesis too many"
+    if token.text == "*":
+        return "write powers as x^y"
+    if token.kind == "symbol" and previous and previous.written in RESERVED:
+        word = previous.written
+        return f'{word} is a reserved word; write a signal of that name as "{word}"'
+    return "something is missing before it"
+
+
+def hint_after(token: Token, previous: Token) -> str:
+    """Return what to do if a token stands behind a complete formula."""
+    if known := hint_for(token) or hint_for(previous):
+        return known
+    if token.text in UNITS and previous.kind == "number":
+        return "only the bounds of windows have units; convert the number to the signal's own unit"
+    if token.text == ")":
+        return "there is one ')' too many"
+    if token.text == "[":
+        return "write windows directly after G, F or U, indices directly after a name"
+    return JOIN
 
 
 def _token(text: str, position: int) -> Token:

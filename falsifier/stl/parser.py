@@ -64,16 +64,13 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.stl.lexer import Token, syntax_error, tokenize
-from falsifier.stl.names import FUNCTIONS, RESERVED
+from falsifier.stl.lexer import JOIN, UNITS, Token, hint_after, hint_at, hint_for, syntax_error, tokenize
+from falsifier.stl.names import FUNCTIONS
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
 # Maximum number of characters of a formula.
 MAX_LENGTH = 20_000
-UNITS = {
-    "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
-}  # fmt: skip
 # Bounds in different units that differ relatively by less are equal but for rounding.
 _ROUNDED = 1e-5
 
@@ -87,16 +84,6 @@ _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
     "<->": Iff, "->": Implies, "or": Or, "and": And,
 }  # fmt: skip
 _CLOSED = "only closed windows in seconds are supported: [a,b]"
-_HINTS = {
-    "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
-    "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
-    "u": "operators are capital letters: write U",
-    "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
-    "pow": "write x^y", "ln": "the natural logarithm is log",
-}  # fmt: skip
-
-_BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
-
 Node = Formula | Expression
 
 
@@ -243,13 +230,13 @@ class _Parser:
     def _named(self, token: Token) -> Name:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
-                hint = _hint_for(token) or did_you_mean(token.text, FUNCTIONS)
+                hint = hint_for(token) or did_you_mean(token.text, FUNCTIONS)
                 self._fail(f"unknown function {token.text!r}", token.position, hint)
             if self._next.text == "[":
                 self._fail(
                     f"the index of {token.text!r} cannot be read",
                     self._next.position,
-                    _hint_for(token)
+                    hint_for(token)
                     or "indices are integers, as in x[1,2]; put any other name in double quotes",
                 )
         return Name(token.text)
@@ -275,7 +262,7 @@ class _Parser:
                 self._next.position,
                 f"it closes the '(' at position {opening.position + 1}"
                 if self._next.kind in ("end", "symbol")
-                else "join two formulas with and, or, ->; numbers and signals with + - * /",
+                else JOIN,
             )
 
     # -- windows -----------------------------------------------------------------------------------------
@@ -361,34 +348,10 @@ class _Parser:
         problem = f"expected a formula, a signal or a number, not {token.shown}"
         if token.kind == "end":
             problem = "the formula ends too early"
-        hint = "something is missing before it"
-        previous = self.tokens[self.index - 2] if self.index > 1 else None
-        if token.text == "U":
-            hint = f'it belongs between two formulas; write a signal of that name as "{token.written}"'
-        elif (box := "".join(t.text for t in self.tokens[self.index - 1 : self.index + 1])) in _BOXES:
-            hint = _BOXES[box]
-        elif token.text in ("[", "]"):
-            hint = "write windows directly after G, F or U"
-        elif token.text == ")":
-            hint = "there is nothing between the parentheses, or one parenthesis too many"
-        elif token.text == "*":
-            hint = "write powers as x^y"
-        elif token.kind == "symbol" and previous and previous.written in RESERVED:
-            word = previous.written
-            hint = f'{word} is a reserved word; write a signal of that name as "{word}"'
-        self._fail(problem, token.position, hint)
+        self._fail(problem, token.position, hint_at(self.tokens, self.index - 1))
 
     def _fail_after(self, token: Token) -> NoReturn:
-        previous = self.tokens[self.index - 1]
-        hint = "join two formulas with and, or, ->; numbers and signals with + - * /"
-        if known := _hint_for(token) or _hint_for(previous):
-            hint = known
-        elif token.text in UNITS and previous.kind == "number":
-            hint = "only the bounds of windows have units; convert the number to the signal's own unit"
-        elif token.text == ")":
-            hint = "there is one ')' too many"
-        elif token.text == "[":
-            hint = "write windows directly after G, F or U, indices directly after a name"
+        hint = hint_after(token, self.tokens[self.index - 1])
         self._fail(f"unexpected {token.shown} after a complete formula", token.position, hint)
 
     def _fail_depth(self, position: int) -> NoReturn:
@@ -398,14 +361,6 @@ class _Parser:
 
     def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
         raise syntax_error(self.text, problem, position, hint)
-
-
-def _hint_for(token: Token) -> str:
-    """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
-    word = token.text.partition("[")[0].lower()
-    if token.kind != "name":
-        return ""
-    return _HINTS.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")
 
 
 def _factor(unit: str) -> Decimal:

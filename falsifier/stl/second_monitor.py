@@ -80,27 +80,13 @@ class _Translation:
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
 
-    def at_start(self, f: Formula) -> str:
-        """Return the text of a formula of which only the value at time 0 counts, in parentheses."""
-        match f:
-            case Not(operand):
-                return f"(not {self.at_start(operand)})"
-            case And(left, right):
-                return f"({self.at_start(left)} and {self.at_start(right)})"
-            case Or(left, right):
-                return f"({self.at_start(left)} or {self.at_start(right)})"
-            case Implies(left, right):
-                return f"({self.at_start(left)} -> {self.at_start(right)})"
-            case Iff(left, right):
-                return self.at_start(And(Implies(left, right), Implies(right, left)))
-            case Always(operand, window) if window is not None:
-                return f"(always ((0 >= {self.inside(window)}) or {self.formula(operand)}))"
-            case Eventually(operand, window) if window is not None:
-                return f"(eventually (({self.inside(window)} >= 0) and {self.formula(operand)}))"
-        return self.formula(f)
+    def text(self, f: Formula, *, at_start: bool = False) -> str:
+        """Return the text of a formula, in parentheses.
 
-    def formula(self, f: Formula) -> str:
-        """Return the text of a formula, in parentheses."""
+        Args:
+            f: the formula.
+            at_start: whether only its value at time 0 counts.
+        """
         match f:
             case Predicate() if self.of_truth:
                 return f"({self.truth(f)} >= 0)"
@@ -109,28 +95,29 @@ class _Translation:
             case Predicate(operator, left, right):
                 return f"({self.side(left)} {operator} {self.side(right)})"
             case Not(operand):
-                return f"(not {self.formula(operand)})"
-            case Next(operand):
-                return f"(next {self.formula(operand)})"
-            case And(left, right):
-                return f"({self.formula(left)} and {self.formula(right)})"
-            case Or(left, right):
-                return f"({self.formula(left)} or {self.formula(right)})"
-            case Implies(left, right):
-                return f"({self.formula(left)} -> {self.formula(right)})"
+                return f"(not {self.text(operand, at_start=at_start)})"
+            case And(left, right) | Or(left, right) | Implies(left, right):
+                sign = {And: "and", Or: "or", Implies: "->"}[type(f)]
+                return f"({self.text(left, at_start=at_start)} {sign} {self.text(right, at_start=at_start)})"
             case Iff(left, right):
-                return self.formula(And(Implies(left, right), Implies(right, left)))
+                return self.text(And(Implies(left, right), Implies(right, left)), at_start=at_start)
+            case Always(operand, window) if window is not None and at_start:
+                return f"(always ((0 >= {self.inside(window)}) or {self.text(operand)}))"
+            case Eventually(operand, window) if window is not None and at_start:
+                return f"(eventually (({self.inside(window)} >= 0) and {self.text(operand)}))"
+            case Next(operand):
+                return f"(next {self.text(operand)})"
             case Always(operand, window):
-                return f"(always{self.window(window)} {self.formula(operand)})"
+                return f"(always{self.window(window)} {self.text(operand)})"
             case Eventually(operand, window):
-                return f"(eventually{self.window(window)} {self.formula(operand)})"
+                return f"(eventually{self.window(window)} {self.text(operand)})"
             case Until(left, right, window):
                 return self.until(left, right, window)
         raise TypeError(f"not a formula: {f!r}")
 
     def until(self, left: Formula, right: Formula, window: Window | None) -> str:
         """Return the text of an until whose left operand includes the last sample."""
-        text, both = self.formula(left), self.formula(And(left, right))
+        text, both = self.text(left), self.text(And(left, right))
         until = f"({text} until {both})"
         if window is None:
             return until
@@ -179,7 +166,7 @@ class _Translation:
 
 
 def _evaluate(formula: Formula, translation: _Translation) -> float:
-    text = translation.at_start(formula)
+    text = translation.text(formula, at_start=True)
     length = len(translation.trajectory)
     columns = translation.columns or {"v0": [0.0] * length}
     if length == 1:  # rtamt fails on one sample; repeating it does not change the value at time 0

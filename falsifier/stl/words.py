@@ -2,6 +2,7 @@
 
 from falsifier.stl.expression import Arithmetic, Call, Number
 from falsifier.stl.formula import (
+    MIRRORED,
     OPPOSITE,
     Always,
     And,
@@ -27,9 +28,6 @@ _IS: dict[Comparison, str] = {
     "==": "equals",
     "!=": "differs from",
 }
-_MIRRORED: dict[Comparison, Comparison] = {
-    "<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!=",
-}  # fmt: skip
 
 
 def in_words(formula: Formula) -> str:
@@ -102,7 +100,7 @@ def _predicate(predicate: Predicate) -> str:
     if isinstance(predicate, Flag):
         return f"{left} is true"
     if isinstance(left, Number) and not isinstance(right, Number):
-        left, operator, right = right, _MIRRORED[operator], left
+        left, operator, right = right, MIRRORED[operator], left
     match left, operator:
         case Call("abs", (Arithmetic("-", a, b),)), "<" | "<=":
             return f"{a} is within {right} of {b}"
