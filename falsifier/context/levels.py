@@ -1,8 +1,6 @@
 """Levels of inputs and parameters at which a comparison in a file changes: solved for them where possible."""
 
-import ast
-import operator
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice, product
@@ -12,6 +10,10 @@ from numpy.typing import NDArray
 
 from falsifier.context.thresholds import Threshold, number_in, tokens_of
 from falsifier.context.values import Level
+from falsifier.errors import FormulaError
+from falsifier.stl import parse
+from falsifier.stl.expression import Expression
+from falsifier.stl.formula import Predicate
 
 Array = NDArray[np.float64]
 
@@ -23,22 +25,10 @@ _MAX_DEPTH = 12
 _MAX_LEVELS = 24
 _MAX_THRESHOLDS = 2000
 _MAX_LENGTH = 400
-_BINARY: Mapping[type[ast.operator], Callable[[Array, Array], Array]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
-# The last value of a signal, or its value in another type, is the signal itself here.
-_UNCHANGED = frozenset(("pre", "noEvent", "smooth", "real", "double", "single", "float", "Real"))
-_FUNCTIONS: Mapping[str, Callable[..., Array]] = {
-    "abs": np.abs,
-    "fabs": np.abs,
-    "fabsf": np.abs,
-    "sqrt": np.sqrt,
-    "min": np.minimum,
-    "max": np.maximum,
-}
+# Functions by the name that formulas have. The last value of a signal, or its value in another type, is the
+# signal itself here.
+_FUNCTIONS = {name: name for name in ("abs", "sqrt", "min", "max")} | {"fabs": "abs", "fabsf": "abs"}
+_FUNCTIONS |= dict.fromkeys(("pre", "noEvent", "real", "double", "single", "float", "Real"), "")
 
 
 class _UnknownError(ValueError):
@@ -145,37 +135,11 @@ class _Scope:
         Raises:
             _UnknownError: if it has something else than arithmetic, or a variable of unknown value.
         """
-        if depth > _MAX_DEPTH or len(text) > _MAX_LENGTH:
+        expression, names = _parsed(text)
+        if depth > _MAX_DEPTH or expression is None:
             raise _UnknownError(text)
-        tree, names = _parsed(text)
-        if tree is None:
-            raise _UnknownError(text)
-        try:
-            return self._of(tree, names, depth)
-        except (RecursionError, ArithmeticError):
-            raise _UnknownError(text) from None
-
-    def _of(self, node: ast.expr, names: Sequence[str], depth: int) -> Array:
-        match node:
-            case ast.Constant(value=int() | float() as number):
-                return np.asarray(float(number))
-            case ast.Name(id=placeholder):
-                return self._kept_value(names[int(placeholder[1:])], depth)
-            case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -self._of(operand, names, depth)
-            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
-                return self._of(operand, names, depth)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-                sides = (self._of(side, names, depth) for side in (left, right))
-                return _BINARY[type(op)](*sides)
-            case ast.Call(func=ast.Name(id=placeholder), args=[_, *_] as args, keywords=[]):
-                function = names[int(placeholder[1:])].rpartition(".")[2]
-                values = [self._of(a, names, depth) for a in args]
-                if function in _UNCHANGED:
-                    return values[-1]
-                if function in _FUNCTIONS and len(values) == 1 + (function in ("min", "max")):
-                    return _FUNCTIONS[function](*values)
-        raise _UnknownError(ast.dump(node))
+        columns = {v: self._kept_value(names[int(v[1:])], depth) for v in expression.signals}
+        return expression.evaluate(columns)
 
     def _kept_value(self, name: str, depth: int) -> Array:
         if (name, depth) not in self._kept:
@@ -206,34 +170,34 @@ class _Scope:
 
 
 @lru_cache(maxsize=10_000)
-def _parsed(text: str) -> tuple[ast.expr | None, tuple[str, ...]]:
-    """Return an expression, or None if it is not understood, with placeholders for its names."""
+def _parsed(text: str) -> tuple[Expression | None, tuple[str, ...]]:
+    """Return an expression of v0, v1, ..., and what these names stand for; None if it is not understood."""
     names: list[str] = []
     try:
-        return ast.parse(_as_python(text, names), mode="eval").body, tuple(names)
-    except (SyntaxError, MemoryError, RecursionError, ValueError):
-        return None, ()
+        formula = parse(f"({_as_term(text, names)}) <= 0") if len(text) <= _MAX_LENGTH else None
+    except FormulaError:
+        formula = None
+    return (formula.left if isinstance(formula, Predicate) else None), tuple(names)
 
 
-def _as_python(text: str, names: list[str]) -> str:
-    """Return an expression with placeholders for its names; of ``a->b`` only the last one counts."""
+def _as_term(text: str, names: list[str]) -> str:
+    """Return an expression as formulas have it, with other names; of ``a->b`` only the last one counts."""
     words: list[str] = []
-    is_member = False
-    for token in tokens_of(text):
+    tokens = list(tokens_of(text))
+    for i, token in enumerate(tokens):
+        before, after = tokens[i - 1].text if i else "", tokens[i + 1].text if i + 1 < len(tokens) else ""
+        number = number_in(token.text) if token.kind == "number" else None
         if token.text == "->" and words:
             words.pop()
-        elif token.text == "." and words and words[-1].startswith("_"):
-            is_member = True
-            continue
-        elif token.kind == "name" and is_member:
+        elif token.kind == "name" and after == "(":
+            words.append(_FUNCTIONS.get(token.text, "?"))
+        elif token.kind == "name" and before == "." and names:
             names[-1] += f".{token.text}"
         elif token.kind == "name":
-            words.append(f"_{len(names)}")
+            words.append(f"v{len(names)}")
             names.append(token.text.strip("'"))
-        elif token.kind == "number":
-            number = number_in(token.text)
-            words.append(token.text if number is None else f"{number:.17g}")
-        else:
+        elif number is not None:
+            words.append(f"{number:.17g}")
+        elif token.text != ".":
             words.append(token.text)
-        is_member = False
     return " ".join(words)

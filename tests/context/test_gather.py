@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.context.gather import MAX_CHARACTERS, MAX_TOTAL, gather
-from falsifier.context.values import Compared, Context, Named
+from falsifier.context.values import Compared, Context
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from tests.fixtures import simulink
@@ -203,14 +203,3 @@ def test_what_is_known_of_a_signal() -> None:
     context = Context(comparisons=(Compared(("u",), "u > 3", "a.mo:1"), Compared((), "x > 1", "a.mo:2")))
     assert context.of("u") == ("u > 3",)
     assert context.of("x") == ()
-
-
-def test_nothing_named_is_false() -> None:
-    assert not Named()
-    assert Named(("a.md",))
-    assert Named(fmu=True)
-
-
-def test_a_checked_file_alone_is_not_overlooked() -> None:
-    assert Named.of(["checked:a.md"])
-    assert not Named.of(["none"])

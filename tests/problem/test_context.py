@@ -31,11 +31,6 @@ def test_the_spec_and_the_options_name_context(tmp_path: Path) -> None:
     assert named_context(plain.model_copy(update={"context": ("none", "fmu")}), spec, path) == Named(fmu=True)
 
 
-def test_unknown_keys_are_errors() -> None:
-    with pytest.raises(SpecError, match=r"context\.file: unknown key; .*files"):
-        parse_spec(SPEC | {"context": {"file": []}}, file="a.toml")
-
-
 def test_files_are_read_only_when_asked_for() -> None:
     problem = load_source(ProblemSource(target="HeaterLimpHome", context=("no such file",)))
     assert problem.context == Context()

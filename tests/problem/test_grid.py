@@ -5,16 +5,13 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.problem.grid import (
-    MAX_STEPS,
     check_steps,
     choose_grid,
     default_freedom,
     exact,
     formula_times,
-    smallest_window,
 )
 from falsifier.problem.problem import Problem
-from falsifier.stl import parse
 from tests.fmu.fixtures import path as fmu_path
 
 
@@ -43,10 +40,6 @@ def test_the_grid_divides_all_times(
             exact(time) % exact(grid.interval) == 0
             or abs(time / grid.interval - round(time / grid.interval)) < 1e-9
         )
-
-
-def test_the_grid_is_a_multiple_of_a_stated_step() -> None:
-    assert choose_grid(3.0, times=[1.0], step_size=0.001).interval == 0.002
 
 
 def test_the_reason_names_what_did_not_fit() -> None:
@@ -93,11 +86,6 @@ def test_a_stated_interval_that_does_not_fit_names_one_that_does(tmp_path: Path)
         )
 
 
-def test_steps_up_to_the_limit_are_taken() -> None:
-    check_steps(10.0, None, file="a.toml", key="k")
-    check_steps(10.0, 10.0 / MAX_STEPS, file="a.toml", key="k")
-
-
 @pytest.mark.parametrize(("stop_time", "period"), [(10.0, 1e-7), (1e18, 0.01), (1e308, 1e-300)])
 def test_more_steps_are_refused_with_the_smallest_period(stop_time: float, period: float) -> None:
     with pytest.raises(
@@ -124,11 +112,6 @@ def test_the_limits_follow_from_windows_step_and_stop_time(
 ) -> None:
     free = default_freedom([formula], stop_time=stop_time, step=step)
     assert (free.max_control_points, free.min_interval) == (count, shortest)
-
-
-def test_the_smallest_window_of_several_formulas_counts() -> None:
-    assert smallest_window([parse("G[0,5] (F[1,3] (y <= 1))"), "G[0,1] (y <= 1)"]) == 1.0
-    assert smallest_window(["G (y <= 1)"]) is None
 
 
 def lag(**inputs: object) -> Problem:

@@ -65,11 +65,6 @@ def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
     assert found.requirement.formula.signals == ("rpm",)
 
 
-def test_internal_signals_that_a_formula_names_are_recorded_beside_the_outputs() -> None:
-    found = joined(stl="G[0,20] (speed <= 120 and finalDrive > 0 and throttle >= 0)")
-    assert found.experiment.outputs == ("speed", "rpm", "gear", "finalDrive")
-
-
 @pytest.mark.parametrize(
     ("more", "named"),
     [
@@ -95,17 +90,6 @@ def test_signals_to_record_must_be_there() -> None:
     spec = SPEC | {"model": SPEC["model"] | {"record": ["sped"]}}
     with pytest.raises(SpecError, match=r"model\.record: .*'speed'"):
         join(parse_spec(spec, file="my.toml"), "R", path=FILE)
-
-
-def test_an_fmu_alone_is_searched_over_its_bounded_inputs() -> None:
-    found = join_formula(bundled("fmus") / "AT.fmu", "G[0,20] (speed <= 120)", changes=changes_from_options())
-    assert [r.name for r in found.space.inputs] == ["throttle", "brake"]
-    fixed = join_formula(
-        bundled("fmus") / "AT.fmu",
-        "G[0,20] (speed <= 120)",
-        changes=changes_from_options(values=["brake=3"], ranges=["finalDrive=3:3.5"]),
-    )
-    assert (fixed.space.inputs, fixed.parameters) == ((), {"brake": 3.0})
 
 
 def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(

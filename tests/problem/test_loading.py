@@ -137,6 +137,9 @@ def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:
          r"exceeds the items .* 1 = first, 2 = second, 3 = third"),
         ("in_Int8 = {value = 2.5}", r"in_Int8.value: 2.5: expected an integer"),
         ("in_Int8 = {range = [0.2, 0.8], control_points = 1}", r"contains no integer; widen the range"),
+        ("in_Float64 = {control_points = 1}", r"range: the FMU specifies no min .*--search in_Float64="),
+        ("in_Int8 = {range = [0, 1], control_points = 2, interpolation = 'linear'}", r"integer cannot be"),
+        ("in_Enumeration = {value = 0}", r"in_Enumeration.value: 0 exceeds the items"),
     ],
 )  # fmt: skip
 def test_numbers_that_a_type_cannot_hold_are_refused_when_loaded(

@@ -155,13 +155,6 @@ def test_what_an_fmu_may_do_comes_from_spec_requirement_and_options(tmp_path: Pa
     assert any("may also: write:" in note and "programs" in note for note in problem.notes)
 
 
-def test_a_system_gets_the_same(tmp_path: Path) -> None:
-    text = '[model]\ndeny = ["network"]\n' + COMPONENTS + CONNECTIONS + REST
-    problem = load_problem(write(tmp_path, text), allow=["programs"])
-    assert isinstance(problem.model, System)
-    assert (problem.model.allow, problem.model.deny) == (("programs",), ("network",))
-
-
 @pytest.mark.parametrize(
     ("allow", "deny", "message"),
     [

@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.spec import parse_spec
-from falsifier.problem.template_arguments import template_arguments, term
+from falsifier.problem.template_arguments import template_arguments
 
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
@@ -32,13 +32,6 @@ def test_quotes_and_lists_are_those_of_toml() -> None:
 def test_what_is_no_template_says_how_to_write_one(text: str) -> None:
     with pytest.raises(FormulaError, match=r"--template: .*(key=value|write a template)"):
         template_arguments(text)
-
-
-def test_a_term_is_an_expression_or_a_number() -> None:
-    assert str(term("y2 - y1")) == "y2 - y1"
-    assert str(term(3)) == "3"
-    with pytest.raises(FormulaError, match="got the formula"):
-        term("x) <= 1 and (y")
 
 
 @pytest.mark.parametrize(

@@ -56,17 +56,6 @@ def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> 
     assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
 
 
-def test_an_fmu_that_computes_nothing_has_nothing_to_require() -> None:
-    info = read_info(fmu_path("Lag_2"))
-    with pytest.raises(SpecError, match="computes no variable that a requirement could be about"):
-        starter_spec(fmu_path("Lag_2"), replace(info, variables=info.inputs))
-
-
-def test_names_that_toml_cannot_have_bare_are_quoted() -> None:
-    text = starter_spec(fmu_path("Arrays_3"), read_info(fmu_path("Arrays_3")))
-    assert set(tomllib.loads(text)["inputs"]) == {"u[1]", "u[2]"}
-
-
 def written(name: str, folder: Path) -> Path:
     spec = folder / "my.toml"
     spec.write_text(starter_spec(fmu_path(name), read_info(fmu_path(name))), encoding="utf-8")
@@ -90,11 +79,6 @@ def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
     spec = written("NoOutputs_2dymola", tmp_path)
     assert "# The FMU declares no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")
     assert loaded(spec).requirement.formula.signals == ("x",)
-
-
-def test_unbounded_inputs_are_said_to_be_so(tmp_path: Path) -> None:
-    text = written("HugeLimits_2", tmp_path).read_text("utf-8")
-    assert "range = [0.0, 1.0]  # unbounded: the FMU specifies no min and max" in text
 
 
 @pytest.mark.parametrize("name", ["Lag_1cs", "Lag_2", "Lag_3", "Arrays_3", "Aliases_3", "ClocksAndBinary_3"])
@@ -168,12 +152,3 @@ def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
         fixed.parsed("G[0,0.125] (speed <= 1)")
     with pytest.raises(SpecError, match="position"):
         subject.parsed("G[0,1] (speed <=")
-
-
-def test_bundled_specs_stay_as_they_are() -> None:
-    assert subject_of("AT1").spec is None
-
-
-def test_what_is_no_file_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="no such file"):
-        subject_of(str(tmp_path / "no.fmu"))

@@ -13,27 +13,6 @@ from falsifier.context.simulink.diagram import (
 from falsifier.context.simulink.reader import read_diagram
 from tests.fixtures import simulink
 
-INNER = BlockSystem((Block("Gain", "k", (("Gain", "2"),)),))
-SYSTEM = BlockSystem(
-    (
-        Block("Inport", "b", number=2),
-        Block("Inport", "a", number=1),
-        Block("Inport", "off", number=3, is_off=True),
-        Block("SubSystem", "s", system=INNER),
-    )
-)
-
-
-def test_ports_are_in_the_order_of_their_numbers() -> None:
-    assert SYSTEM.ports("Inport") == ("a", "b")
-    assert SYSTEM.ports("Outport") == ()
-
-
-def test_systems_are_walked_with_their_paths() -> None:
-    assert list(SYSTEM.walk()) == [((), SYSTEM), (("s",), INNER)]
-    assert INNER.blocks[0].parameter("Gain") == "2"
-    assert INNER.blocks[0].parameter("none") == ""
-
 
 def test_blocks_behind_a_signal_are_left_out(tmp_path: Path) -> None:
     diagram = read_diagram(simulink.write_slx(tmp_path / "a.slx"))

@@ -5,7 +5,6 @@ import pytest
 
 from falsifier.context.simulink import sections
 from falsifier.context.simulink.sections import (
-    Node,
     as_tree,
     is_text_package,
     parse_mdl,
@@ -14,20 +13,6 @@ from falsifier.context.simulink.sections import (
 )
 from falsifier.errors import FalsifierError, ModelError, SpecError
 from tests.fixtures import simulink
-
-LEAF = Node("P", {"Name": "x"})
-TREE = Node("Block", {"SID": "1"}, (Node("System", {}, (LEAF,)), Node("Line")))
-
-
-def test_values_are_found_under_the_first_name_that_is_there() -> None:
-    assert TREE.get("SSID", "SID") == "1"
-    assert TREE.get("id") == ""
-
-
-def test_sections_are_found_by_kind_and_walked_from_outside() -> None:
-    assert TREE.first("System") is TREE.all("System")[0]
-    assert TREE.first("Chart") is None
-    assert [node.kind for node in TREE.walk()] == ["Block", "System", "P", "Line"]
 
 
 def test_sections_values_and_pieces_of_text() -> None:
