@@ -64,7 +64,8 @@ from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search import DEFAULT_SIMULATIONS
+from falsifier.search.budget import Budget
 from falsifier.search.make_engines import price_of
 from falsifier.search.request import LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line

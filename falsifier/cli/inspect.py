@@ -27,7 +27,6 @@ from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.spec import read_spec
-from falsifier.problem.writing import DEFAULT_STOP_TIME, problem_of_starter, starter_spec
 from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
 
 if TYPE_CHECKING:
@@ -149,6 +148,8 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
     spec.
     """
+    from falsifier.problem.writing import problem_of_starter
+
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     if path.exists():
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
@@ -161,6 +162,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
 
 def _starter(fmus: tuple[Path, ...], path: Path) -> str:
     from falsifier.fmu import FmuModel, System, read_info
+    from falsifier.problem.writing import starter_spec
 
     if len(fmus) > 1:
         parts: dict[str, Path] = {}
@@ -185,6 +187,7 @@ def _print_convergence(
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
     from falsifier.evaluation.step_effect import step_convergence
     from falsifier.fmu import FmuModel, System
+    from falsifier.problem.writing import DEFAULT_STOP_TIME
 
     interface = default_interface(found)
     if interface is None:

@@ -115,7 +115,7 @@ def prompt(
 def _limit(directory: Path | None) -> int | None:
     """Maximum number of simulations of a run, or of one with the usual budget."""
     from falsifier.record import manifest
-    from falsifier.search.budget import DEFAULT_SIMULATIONS
+    from falsifier.search import DEFAULT_SIMULATIONS
 
     return manifest.read(directory).request.budget.simulations if directory else DEFAULT_SIMULATIONS
 

@@ -11,8 +11,7 @@ from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.errors import did_you_mean
-from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
-from falsifier.llm.messages import Effort, ReplyKind
+from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT, Effort, ReplyKind
 
 if TYPE_CHECKING:
     from falsifier.search.request import LLMSettings

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
     from falsifier.problem.sections import ModelChanges
     from falsifier.problem.source import Parameterization, ProblemSource
+    from falsifier.search.budget import Budget
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
@@ -373,7 +374,7 @@ def total_option(command: Function) -> Function:
     )(command)
 
 
-def _total(given: Iterable[str]) -> Budget | None:
+def _total(given: Iterable[str]) -> "Budget | None":
     limits: dict[str, float] = {}
     for text in given:
         name, _, number = text.partition("=")
@@ -383,7 +384,11 @@ def _total(given: Iterable[str]) -> Budget | None:
             raise click.UsageError(
                 f"--total {text}: expected {', '.join(f'{name}=N' for name in _TOTALS)}, for example cost=5"
             ) from None
-    return Budget(**limits) if limits else None  # type: ignore[arg-type]
+    if not limits:
+        return None
+    from falsifier.search.budget import Budget
+
+    return Budget(**limits)  # type: ignore[arg-type]
 
 
 def seed_option(text: str = "Random seed.") -> Decorator:

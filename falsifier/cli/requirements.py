@@ -34,11 +34,11 @@ from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.writing import Subject, subject_of, with_requirement
 from falsifier.views.terminal import warn
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # writing specs takes a package that check does not need
     from falsifier.analyses.formalize import Formalized
+    from falsifier.problem.writing import Subject
 
 
 @command()
@@ -129,6 +129,7 @@ def formalize(
     checked, said back in words, told apart from the others by an example and judged on one simulation.
     Without --llm, templates that fit an English sentence are shown, and nothing is written.
     """
+    from falsifier.problem.writing import subject_of, with_requirement
     from falsifier.views.readings_text import advice_json, advice_text, formalized_json, formalized_text
 
     settings = connection_settings(options)
@@ -186,6 +187,8 @@ def _asked(count: int) -> int | None:
 
 def _write(found: "Formalized", number: int, name: str | None, out: Path | None) -> tuple[str, str]:
     """Write a reading into the spec; return the file and the requirement's name."""
+    from falsifier.problem.writing import with_requirement
+
     if number > len(found.readings):
         raise SpecError(f"--choose {number}: there {_are(len(found.readings))} only")
     file = _file(found.subject, out)
@@ -200,7 +203,7 @@ def _write(found: "Formalized", number: int, name: str | None, out: Path | None)
     return str(file), given
 
 
-def _file(subject: Subject, out: Path | None) -> Path:
+def _file(subject: "Subject", out: Path | None) -> Path:
     if out is None and subject.spec is None:
         raise SpecError("a bundled spec stays as it is: give another file with --out")
     file = out or subject.spec or Path()
@@ -215,7 +218,7 @@ def _file(subject: Subject, out: Path | None) -> Path:
     return file
 
 
-def _can_write(subject: Subject, out: Path | None) -> bool:
+def _can_write(subject: "Subject", out: Path | None) -> bool:
     try:
         _file(subject, out)
     except SpecError:

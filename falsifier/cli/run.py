@@ -36,13 +36,13 @@ from falsifier.cli.options import (
 from falsifier.cli.output import conclude
 from falsifier.core.files import file_name
 from falsifier.errors import FalsifierError, JournalError
-from falsifier.search.budget import Budget
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # imported where used, so that --help prints at once
     from falsifier.core.candidate import Candidate
     from falsifier.problem.problem import Problem
     from falsifier.problem.source import ProblemSource
+    from falsifier.search.budget import Budget
     from falsifier.search.result import Result
 
 # If several requirements end differently, the first of these that occurs decides.
@@ -118,6 +118,7 @@ def run(
     from falsifier.problem.loading import load_source
     from falsifier.problem.refinement import widened
     from falsifier.record.run import falsify
+    from falsifier.search.budget import Budget
     from falsifier.views.fmu_log import FmuLog
     from falsifier.views.progress import make_display
 
@@ -168,7 +169,7 @@ def resume(
     jobs: int,
     executor: str | None,
     budget: int | None,
-    totals: Budget | None,
+    totals: "Budget | None",
     quiet: bool,
     as_json: bool,
 ) -> None:

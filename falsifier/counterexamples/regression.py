@@ -9,7 +9,8 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search import DEFAULT_SIMULATIONS
+from falsifier.search.budget import Budget
 from falsifier.search.result import Result
 
 

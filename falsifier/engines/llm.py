@@ -17,9 +17,10 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
+from falsifier.llm import ReplyKind
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.messages import Chat, ChatRequest, Exchange, ReplyKind
+from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
     Questions,

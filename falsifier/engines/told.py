@@ -6,9 +6,8 @@ from dataclasses import replace
 from falsifier.context.values import NOTHING
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.llm import CONTEXT_VARIANT
+from falsifier.llm import CONTEXT_VARIANT, ReplyKind
 from falsifier.llm.disguise import Disguise
-from falsifier.llm.messages import ReplyKind
 from falsifier.llm.prompts import Variant, View, variant_named
 from falsifier.llm.replies import ReplyForm
 from falsifier.problem.context import with_context

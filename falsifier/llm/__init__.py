@@ -8,6 +8,11 @@ disk. A run wraps it in ``RecordedChat``, which plays back a journal's replies f
 the engines or the search.
 """
 
-# Names of the prompt variants that are used if none is named, without and with context files. They stand here
-# because options of the command line need nothing else of the prompts.
+from typing import Literal
+
+# Names of the prompt variants that are used if none is named, without and with context files. What stands
+# here is all that options of the command line need, so that --help imports nothing else.
 DEFAULT_VARIANT, CONTEXT_VARIANT = "MP5", "MP6"
+Effort = Literal["none", "minimal", "low", "medium", "high"]
+# What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
+ReplyKind = Literal["json", "points"]

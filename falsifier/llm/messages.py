@@ -19,13 +19,10 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 _LIMITS = frozenset({"minItems", "maxItems", "minimum", "maximum"})
 # Finish reason of a reply that the server could not parse in the form that was asked for.
 UNREADABLE = "unreadable"
-# What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
-ReplyKind = Literal["json", "points"]
 # Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
 LONGEST_REPLY = 1_000_000
 # Each call is answered with a message; no LLM makes more than a few at a time.
 _MOST_CALLS = 100
-Effort = Literal["none", "minimal", "low", "medium", "high"]
 
 
 class _Value(BaseModel):

@@ -26,7 +26,8 @@ from falsifier.record import manifest
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal
 from falsifier.record.manifest import Manifest
 from falsifier.record.replay import replayed
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search import DEFAULT_SIMULATIONS
+from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.levels import level_starts, levels_of
 from falsifier.search.loop import search

@@ -9,9 +9,7 @@ from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError, SpecError
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
-
-# Maximum number of simulations of a run if nothing else is said.
-DEFAULT_SIMULATIONS = 100
+from falsifier.search import DEFAULT_SIMULATIONS
 
 
 class LimitReached(FalsifierError):

@@ -7,7 +7,8 @@ from math import isnan
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.problem.refinement import level_spaces
-from falsifier.search.budget import DEFAULT_SIMULATIONS, Budget
+from falsifier.search import DEFAULT_SIMULATIONS
+from falsifier.search.budget import Budget
 from falsifier.search.parameterization import engine_parameterization, searched_space
 from falsifier.search.request import LLMSettings, RunRequest
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from falsifier.core.secrets import holds_credentials, is_secret_option
-from falsifier.llm.messages import Effort, ReplyKind
+from falsifier.llm import Effort, ReplyKind
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource

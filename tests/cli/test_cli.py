@@ -1,10 +1,13 @@
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 
+from falsifier.cli import cli
 from tests.command import ROOT, falsifier
 
 
@@ -47,7 +50,7 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert done.out == ""
 
 
-HELP = """
+IMPORTED = """
 import sys
 
 before = set(sys.modules)  # what an environment's own .pth files import
@@ -59,14 +62,65 @@ finally:
     packages = {name.partition(".")[0] for name in set(sys.modules) - before} - sys.stdlib_module_names
     print(*sorted(packages), file=sys.stderr)
 """
+# What takes long to import, and not all commands need.
+SLOW = {"litellm", "matplotlib", "openai", "pandas", "pint", "rich", "rtamt", "scipy", "tomlkit"}
 
 
-def test_help_needs_no_package_but_clicks() -> None:
+@pytest.mark.parametrize(
+    ("arguments", "allowed"),
+    [
+        ("--help", {"click", "falsifier"}),
+        ("run --help", {"click", "falsifier"}),
+        ("bench --help", None),
+        ("check AT1", None),
+        ("info AT.fmu", None),
+    ],
+)
+def test_commands_start_with_few_packages(arguments: str, allowed: set[str] | None) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", HELP, "--help"], env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+        [sys.executable, "-c", IMPORTED, *arguments.split()],
+        env={"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
     )
-    assert done.returncode == 0
-    assert done.stderr.split() == ["click", "falsifier"]
+    imported = set(done.stderr.split())
+    assert imported <= allowed if allowed else not imported & SLOW
+
+
+def test_options_are_few_and_mean_the_same_everywhere() -> None:
+    options: dict[str, set[str]] = {}
+    for command in commands(cli):
+        for option in (p for p in command.params if isinstance(p, click.Option)):
+            options.setdefault(option.opts[-1], set()).add(option.type.name)
+    assert 40 < len(options) <= 60
+    # Only two engines write prompts.
+    assert [name for name, types in options.items() if len(types) > 1] == ["--engine"]
+
+
+def commands(group: click.Group) -> Iterator[click.Command]:
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        assert command is not None
+        yield from commands(command) if isinstance(command, click.Group) else (command,)
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"),
+    [("ru", "plain,run"), ("tools s", "plain,schema"), ("run --se", "plain,--seed"), ("run my", "file,my")],
+)
+def test_a_shell_completes_what_is_typed(typed: str, completed: str, tmp_path: Path) -> None:
+    asked = {"_FALSIFIER_COMPLETE": "bash_complete", "COMP_WORDS": f"falsifier {typed}"}
+    done = falsifier(cwd=tmp_path, env=asked | {"COMP_CWORD": str(len(typed.split()))})
+    assert (done.code, completed in done.out.splitlines()) == (0, True)
+
+
+def test_help_of_run_has_headings(tmp_path: Path) -> None:
+    text = falsifier("run", "--help", cwd=tmp_path).out
+    headings = ("What is searched:", "Search:", "Budget:", "Language model:", "Output:")
+    assert [text.count(f"\n{heading}\n") for heading in headings] == [1] * len(headings)
+    assert "\nOptions:" not in text, "each option has a heading"
 
 
 def test_help_names_the_commands(tmp_path: Path) -> None:

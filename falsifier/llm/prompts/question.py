@@ -13,7 +13,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.messages import Message, ReplyKind
+from falsifier.llm import ReplyKind
+from falsifier.llm.messages import Message
 from falsifier.llm.prompts import choices
 from falsifier.llm.prompts.advice import advice_on_first, advice_on_samples
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Observed, observed

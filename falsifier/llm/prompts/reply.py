@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import counted
-from falsifier.llm.messages import ReplyKind
+from falsifier.llm import ReplyKind
 from falsifier.llm.prompts.variants import Variant
 from falsifier.llm.prompts.view import View
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.words import counted
-from falsifier.llm.messages import ReplyKind
+from falsifier.llm import ReplyKind
 from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.published import clock
