@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import reduce
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from falsifier.campaigns.directory import (
     run_directories,
     run_directory,
 )
-from falsifier.campaigns.request import Method, method_of
+from falsifier.campaigns.request import Method, method_of, method_of_run
 from falsifier.record import manifest
 from falsifier.record.journal import JournalReader
 from falsifier.record.summary import FINISHED, RunStatus, Summary
@@ -153,11 +153,7 @@ class Follower:
         self._runs = []
         for place in self._places:
             described = manifest.read(place)
-            method = replace(
-                method_of(described.request),
-                parameterization=described.parameterization,
-                together=described.shared,
-            )
+            method = method_of_run(described)
             self._runs += [
                 _Followed(str(place), described.request, place, method, n) for n in described.names
             ]

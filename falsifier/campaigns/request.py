@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
+from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
@@ -148,6 +149,15 @@ def method_of(request: RunRequest) -> Method:
         anonymous=llm.anonymous,
         fallback=llm.fallback or "",
         together=len(request.problems) > 1,
+    )
+
+
+def method_of_run(described: Manifest) -> Method:
+    """Method of a run that has begun: with the parameterization that was really searched."""
+    return replace(
+        method_of(described.request),
+        parameterization=described.parameterization,
+        together=described.shared,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.campaigns.directory import run_directories
-from falsifier.campaigns.request import Method, method_of
+from falsifier.campaigns.request import Method, method_of_run
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.table import Columns, evaluation_columns
@@ -187,7 +187,7 @@ def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: boo
         summary: numbers of that requirement in its journal.
         shared: whether several requirements share the search.
     """
-    method = replace(method_of(manifest.request), parameterization=manifest.parameterization, together=shared)
+    method = replace(method_of_run(manifest), together=shared)
     return Run(
         directory=directory,
         manifest=manifest,
