@@ -253,7 +253,7 @@ def keep_recorded(directory: Path) -> None:
         if file.exists():
             continue
         if name not in evaluations:
-            evaluations[name] = recorded_evaluations(directory, records, name)
+            evaluations[name] = recorded_evaluations(directory, records, name, with_trajectories=False)
         evaluation, alone = evaluations[name][record.index], described.of(name)
         if evaluation.verdict is None:
             raise JournalError(
