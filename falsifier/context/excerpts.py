@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from types import MappingProxyType
 
+from falsifier.context.c import c_comparisons
 from falsifier.context.levels import Definitions
-from falsifier.context.modelica import definitions_of, modelica_comparisons
+from falsifier.context.modelica import modelica_comparisons, roots_of
 from falsifier.context.simulink import Diagram, names_text, structure_text
 from falsifier.context.simulink.diagram import upstream
 from falsifier.context.simulink.expressions import definitions, diagram_thresholds
-from falsifier.context.sources import Source, constants_of, read_source, without_annotations
-from falsifier.context.thresholds import Threshold, thresholds, within
+from falsifier.context.sources import Source, read_source, without_annotations
+from falsifier.context.thresholds import Threshold
 from falsifier.core.words import counted
 
 _C = (".c", ".h", ".cpp", ".hpp")
@@ -37,7 +38,6 @@ _SKIPPED_TO = {
 }
 _BLOCK_TAGS = ("p", "br", "li", "tr", "div", "h1", "h2", "h3", "h4", "h5", "h6", "table", "pre")
 _ENTITY = re.compile(r"&#?\w{1,32};?")
-_MEMBER = re.compile(r"(?:->|\.)\s*(\w+)")
 _HEADING = re.compile(r"(#{1,6}\s|=+\s|\d+(\.\d+)*\s+[A-Z])")
 _SHOWN_NAMES = 60
 _LONGEST_NAME = 200
@@ -120,7 +120,7 @@ def of_text(
     if source is not None:
         others = [s for s in library.values() if s.is_modelica == source.is_modelica] or [source]
         found = _of_source(source, others, seeds, signals)
-        is_met = is_named or not _roots(seeds).isdisjoint(source.names_set)
+        is_met = is_named or not roots_of(seeds).isdisjoint(source.names_set)
         return found if is_met else Readable(found.forms[-1:])
     suffix = PurePosixPath(shown).suffix.lower()
     if suffix in _HTML:
@@ -133,26 +133,15 @@ def of_text(
 def _of_source(
     source: Source, library: Sequence[Source], seeds: Collection[str], signals: Collection[str]
 ) -> Readable:
-    names = [name for name in source.scopes if name]
-    if source.is_modelica:
-        limits, constants, known = modelica_comparisons(source, library, _roots(signals))
-        kind = "class"
-    else:
-        constants = constants_of(library, signals)
-        inner = [
-            _of_function(limit, scope.own)
-            for scope in source.scopes.values()
-            for limit in thresholds(scope.texts, constants, source.shown)
-        ]
-        limits = list({limit.text: limit for limit in reversed(inner)}.values())[::-1]
-        known = definitions_of(source.scopes.values())
-        kind = "function"
+    compared = modelica_comparisons if source.is_modelica else c_comparisons
+    limits, constants, known = compared(source, library, signals)
+    kind, count = "class" if source.is_modelica else "function", sum(map(bool, source.scopes))
     forms = (
         Form("whole", lambda: _whole(source)),
         Form("parameters and comparisons", lambda: _listed(constants, limits)),
         Form("comparisons", lambda: _listed({}, limits)),
         Form("lines with the requirement's signals", lambda: "\n".join(_naming(source.text, "\n", seeds))),
-        Form("size only", lambda: counted(len(names), kind)),
+        Form("size only", lambda: counted(count, kind)),
     )
     return Readable(forms, tuple(limits), known=known)
 
@@ -164,17 +153,6 @@ def _whole(source: Source) -> str:
 def _listed(values: Mapping[str, str], limits: Iterable[Threshold]) -> str:
     stated = [f"{name} = {value}" for name, value in values.items()]
     return "\n".join([*stated, *(f"{t.text}  [{t.place}]" for t in limits)])
-
-
-def _roots(names: Collection[str]) -> set[str]:
-    """Names under which a source may declare signals: those of components or members, and the last ones."""
-    return {part for name in names for part in (name.partition(".")[0], name.rpartition(".")[2])}
-
-
-def _of_function(limit: Threshold, own: Collection[str]) -> Threshold:
-    """Return a comparison as it is seen from outside a function that declares some variables."""
-    inner = limit.names.intersection(own).difference(_MEMBER.findall(limit.text))
-    return within(limit, dict.fromkeys(inner, ""))
 
 
 def _of_document(text: str, signals: Collection[str]) -> Readable:

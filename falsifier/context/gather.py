@@ -1,19 +1,18 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 
-from falsifier.context.excerpts import Form, Readable, of_diagram, of_text, parsed
+from falsifier.context.excerpts import Readable, of_diagram, of_text, parsed
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.levels import levels_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
-from falsifier.context.sources import Source
 from falsifier.context.thresholds import Threshold
-from falsifier.context.values import SIMULINK, Compared, Context, Excerpt, Level
+from falsifier.context.values import SIMULINK, Compared, Context, Excerpt
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
@@ -49,12 +48,8 @@ class _File:
         return _LEAVE_OUT if self.is_named else NAME_THEM
 
 
-@dataclass(frozen=True, slots=True)
-class _Source:
-    """One file with its forms."""
-
-    file: _File
-    readable: Readable
+# Files with what they contain.
+_Contents = Sequence[tuple[_File, Readable]]
 
 
 def gather(
@@ -72,7 +67,7 @@ def gather(
     Args:
         files: paths of files.
         fmus: FMUs to look into.
-        seeds: the requirement's signals: sources are cut to what they depend on.
+        seeds: the requirement's signals: diagrams are cut to what they depend on.
         signals: all signals that the language model is told.
         checked: files with a line that looks like a secret and is none, by the names that messages give them.
         ranges: bounds of the inputs and parameters whose levels are wanted.
@@ -94,58 +89,34 @@ def gather(
                 left_out.append(f"context {fmu.name}: {entry} is left out, because it is not text")
             else:
                 found.append(inner)
-    library = _library(found)
-    sources = [_Source(file, _readable(file, seeds, signals, library)) for file in found]
+    texts = {f.content: parsed(f.content, f.name) for f in found if isinstance(f.content, str)}
+    library = {text: source for text, source in texts.items() if source is not None}
+    contents = [
+        (f, of_text(f.content, f.name, seeds, signals, is_named=f.is_named, library=library))
+        if isinstance(f.content, str)
+        else (f, of_diagram(f.content, seeds))
+        for f in found
+    ]
     # Of the files inside an FMU, those with one form say nothing about the signals.
-    sources = [s for s in sources if s.file.is_named or len(s.readable.forms) > 1]
-    if sentry is None:
-        return Context(levels=_levels(sources, ranges))
-    compared = tuple(_limited(_compared(sources, signals)))
-    chosen = _fitting(sources, MAX_TOTAL - sum(_size(each) for each in compared))
-    for source, (_, text) in zip(sources, chosen, strict=True):
-        _look_again(source, text, sentry)
-    sentry.refuse_unused()
-    return Context(
-        tuple(
-            Excerpt(s.file.path, s.file.name, s.file.sha256, _shortened(s.readable.forms, i), text)
-            for s, (i, text) in zip(sources, chosen, strict=True)
-        ),
-        compared,
-        _levels(sources, ranges),
-        (*left_out, *sentry.notes),
+    contents = [(file, readable) for file, readable in contents if file.is_named or len(readable.forms) > 1]
+    solved = (
+        level for _, readable in contents for level in levels_of(readable.found, readable.known, ranges)
     )
-
-
-def _levels(sources: Iterable[_Source], ranges: Mapping[str, tuple[float, float]]) -> tuple[Level, ...]:
-    found = (levels_of(s.readable.found, s.readable.known, ranges) for s in sources)
-    return tuple(dict.fromkeys(level for each in found for level in each))
-
-
-def _library(files: Iterable[_File]) -> Mapping[str, Source]:
-    """Return what sources say, by their text."""
-    found: dict[str, Source] = {}
-    for file in files:
-        if isinstance(file.content, str):
-            source = parsed(file.content, file.name)
-            if source is not None:
-                found[file.content] = source
-    return found
-
-
-def _readable(
-    file: _File, seeds: Collection[str], signals: Collection[str], library: Mapping[str, Source]
-) -> Readable:
-    if not isinstance(file.content, str):
-        return of_diagram(file.content, seeds)
-    return of_text(file.content, file.name, seeds, signals, is_named=file.is_named, library=library)
-
-
-def _look_again(source: _Source, text: str, sentry: Sentry) -> None:
-    """Refuse what encodings may have hidden before."""
-    beside = [t.text for t in source.readable.found] + [told for _, told in source.readable.modes]
-    told = "\n".join((text, *beside))
-    file = source.file
-    sentry.look(told, f"{file.path}, as it is told", file.path, file.otherwise)
+    levels = tuple(dict.fromkeys(solved))
+    if sentry is None:
+        return Context(levels=levels)
+    compared = tuple(_limited(_compared(contents, signals)))
+    chosen = _fitting(contents, MAX_TOTAL - sum(_size(each) for each in compared))
+    excerpts = []
+    for (file, readable), (i, text) in zip(contents, chosen, strict=True):
+        # Encodings may have hidden a secret before.
+        beside = [t.text for t in readable.found] + [told for _, told in readable.modes]
+        told = "\n".join((text, *beside))
+        sentry.look(told, f"{file.path}, as it is told", file.path, file.otherwise)
+        form = f"{readable.forms[i].name}{', because the rest is too long' if i else ''}"
+        excerpts.append(Excerpt(file.path, file.name, file.sha256, form, text))
+    sentry.refuse_unused()
+    return Context(tuple(excerpts), compared, levels, (*left_out, *sentry.notes))
 
 
 def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
@@ -203,45 +174,41 @@ def _limited(compared: Iterable[Compared]) -> Iterator[Compared]:
             yield each
 
 
-def _fitting(sources: list[_Source], room: int) -> list[tuple[int, str]]:
+def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
     """Return number and text of each file's fullest form so that each and all together fit.
 
     The last form of each file is some words long, so that it fits in any case.
     """
+    forms = [readable.forms for _, readable in contents]
     chosen = []
-    for source in sources:
-        forms = source.readable.forms
-        texts = ((i, form.text()) for i, form in enumerate(forms))
-        last = len(forms) - 1
+    for each in forms:
+        texts = ((i, form.text()) for i, form in enumerate(each))
+        last = len(each) - 1
         chosen.append(next((i, t) for i, t in texts if 0 < len(t) <= MAX_CHARACTERS or i == last))
-    around = sum(len(s.file.name) + max(len(f.name) for f in s.readable.forms) for s in sources)
+    around = sum(len(file.name) + max(len(f.name) for f in readable.forms) for file, readable in contents)
     while sum(len(text) for _, text in chosen) + around > room:
-        shrinkable = [k for k, (i, _) in enumerate(chosen) if i + 1 < len(sources[k].readable.forms)]
+        shrinkable = [k for k, (i, _) in enumerate(chosen) if i + 1 < len(forms[k])]
         if not shrinkable:
             raise SpecError(
-                f"context: {counted(len(sources), 'file')} are too many even with only their names told; "
+                f"context: {counted(len(contents), 'file')} are too many even with only their names told; "
                 "name fewer"
             )
         longest = max(shrinkable, key=lambda k: len(chosen[k][1]))
         i = chosen[longest][0] + 1
-        chosen[longest] = (i, sources[longest].readable.forms[i].text())
+        chosen[longest] = (i, forms[longest][i].text())
     return chosen
 
 
-def _shortened(forms: tuple[Form, ...], i: int) -> str:
-    return forms[i].name if i == 0 else f"{forms[i].name}, because the rest is too long"
-
-
-def _compared(sources: list[_Source], signals: Collection[str]) -> Iterator[Compared]:
+def _compared(contents: _Contents, signals: Collection[str]) -> Iterator[Compared]:
     """Return all thresholds, those of signals of the model first."""
     ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
     for name in signals:
         words = name.split(".")
         for i in range(len(words)):
             ends.setdefault(".".join(words[i:]).strip("'"), []).append(name)
-    modes = [m for s in sources for m in s.readable.modes if m[0] in ends]
+    modes = [m for _, readable in contents for m in readable.modes if m[0] in ends]
     yield from (Compared(tuple(ends[name]), text, "") for name, text in modes)
-    found = [t for s in sources for t in s.readable.found]
+    found = [t for _, readable in contents for t in readable.found]
     told = [(tuple(sorted(name for end in _plain(t) & ends.keys() for name in ends[end])), t) for t in found]
     ordered = sorted(told, key=lambda pair: not pair[0])
     yield from (Compared(names, t.text, t.place) for names, t in ordered[:_MAX_COMPARISONS])

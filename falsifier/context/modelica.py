@@ -1,11 +1,10 @@
 """What Modelica compares: in the class that declares the signals, and in blocks of the standard library."""
 
 import re
-from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 from falsifier.context.levels import Definitions
-from falsifier.context.sources import Component, Scope, Source
+from falsifier.context.sources import Component, Scope, Source, definitions_of
 from falsifier.context.thresholds import Threshold, at_breakpoints, number_in, thresholds, within
 
 # Comparisons by the type's name; names in braces are inputs, other names parameters.
@@ -46,18 +45,18 @@ _WORD = re.compile(r"\{(\w+)\}|\b[a-zA-Z]\w*\b")
 
 
 def modelica_comparisons(
-    source: Source, library: Sequence[Source], names: Collection[str]
+    source: Source, library: Sequence[Source], signals: Collection[str]
 ) -> tuple[list[Threshold], Mapping[str, str], Definitions]:
     """Return what a file compares, values of its parameters, and what its variables are equal to.
 
     Args:
         source: the file.
         library: all files that were read: a class may extend one of another file.
-        names: names that the class of the model declares. Variables of other classes are not the model's
+        signals: signals of the model. Variables of classes that do not declare most of them are not the
             signals of the same name.
     """
     scopes = {name: scope for each in (*library, source) for name, scope in each.scopes.items()}
-    main = _class_with_bases(source, scopes, frozenset(names))
+    main = _class_with_bases(source, scopes, roots_of(signals))
     constants = _constants(main, scopes, library)
     declared = {name: element for each in main for name, element in scopes[each].components.items()}
     leading = {port: text for each in main for port, text in scopes[each].leading.items()}
@@ -75,22 +74,12 @@ def modelica_comparisons(
     return found, constants, Definitions({**made, **leading, **known.equal}, known.fed)
 
 
-def definitions_of(scopes: Iterable[Scope]) -> Definitions:
-    """Return what variables are equal to at all times, and what each depends on in one step.
-
-    A variable with several statements, or one under a condition, equals no single expression.
-    """
-    values: dict[str, list[str]] = defaultdict(list)
-    fed: dict[str, set[str]] = defaultdict(set)
-    for scope in scopes:
-        for name, texts in scope.values.items():
-            values[name] += texts
-            fed[name] |= scope.uses[name]
-    equal = {name: texts[0] for name, texts in values.items() if len(texts) == 1 and texts[0]}
-    return Definitions(equal, {name: frozenset(used) for name, used in fed.items()})
+def roots_of(names: Collection[str]) -> set[str]:
+    """Names under which a source may declare signals: those of components or members, and the last ones."""
+    return {part for name in names for part in (name.partition(".")[0], name.rpartition(".")[2])}
 
 
-def _class_with_bases(source: Source, scopes: Mapping[str, Scope], names: frozenset[str]) -> list[str]:
+def _class_with_bases(source: Source, scopes: Mapping[str, Scope], names: Collection[str]) -> list[str]:
     """Return the class of a file that declares most of these names, the last one on ties, and its bases."""
     best, most = list[str](), 1
     for name in source.scopes:
@@ -98,7 +87,7 @@ def _class_with_bases(source: Source, scopes: Mapping[str, Scope], names: frozen
         for each in merged:  # grows
             merged += [base for base in scopes[each].bases if base in scopes and base not in merged]
             del merged[_MAX_BASES:]
-        count = len({n for each in merged for n in names.intersection(scopes[each].components)})
+        count = len({n for each in merged for n in scopes[each].components if n in names})
         if count >= most:
             best, most = merged, count
     return best

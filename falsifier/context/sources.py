@@ -9,6 +9,8 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from falsifier.context.levels import Definitions
+
 # Comments, texts and names in quotes may contain any sign. Patterns take what they have looked at, so that
 # time grows with the length of a file.
 _SILENT = re.compile(
@@ -162,6 +164,21 @@ def without_annotations(text: str) -> str:
     return told + text[end:]
 
 
+def definitions_of(scopes: Iterable[Scope]) -> Definitions:
+    """Return what variables are equal to at all times, and what each depends on in one step.
+
+    A variable with several statements, or one under a condition, equals no single expression.
+    """
+    values: dict[str, list[str]] = defaultdict(list)
+    fed: dict[str, set[str]] = defaultdict(set)
+    for scope in scopes:
+        for name, texts in scope.values.items():
+            values[name] += texts
+            fed[name] |= scope.uses[name]
+    equal = {name: texts[0] for name, texts in values.items() if len(texts) == 1 and texts[0]}
+    return Definitions(equal, {name: frozenset(used) for name, used in fed.items()})
+
+
 def _blank(found: re.Match[str], *, keeps_names: bool) -> str:
     """Return what stands for a comment or text, with as many lines."""
     return found[0] if keeps_names and found["name"] else " " + "\n" * found[0].count("\n")
@@ -248,8 +265,8 @@ def _read_statement(
     form = _MODELICA_DECLARATION if found.is_modelica else _C_DECLARATION
     declaration = None if _UNDECLARED.match(text) else form.match(text)
     words = {*declaration["words"].split(), declaration["kind"]} if declaration else set[str]()
-    for part in _split(declaration["rest"]) if declaration else [text]:
-        left, sign, value = _sides(part)
+    for part in split_at_commas(declaration["rest"]) if declaration else [text]:
+        left, sign, value = sides_of(part)
         met = (_WORD if declaration else names).findall(re.sub(r"\[[^\]]*\]", "", left))
         if declaration and met:
             _declare(found, block, declaration["kind"], met[0], left, value, words, line)
@@ -289,8 +306,8 @@ def _modified(found: Source, text: str, depth: int = 0) -> dict[str, str]:
     direct: dict[str, str] = {}
     if opening < 0 or depth > _MAX_DEPTH:
         return direct
-    for part in _split(text[opening + 1 : _closing(text, opening) - 1]):
-        left, _, value = _sides(part)
+    for part in split_at_commas(text[opening + 1 : _closing(text, opening) - 1]):
+        left, _, value = sides_of(part)
         names = _WORD.findall(left.partition("(")[0])  # each final start(...) = 3
         if names and 0 < len(value) <= _MAX_VALUE:
             direct[names[-1]] = value
@@ -301,10 +318,10 @@ def _modified(found: Source, text: str, depth: int = 0) -> dict[str, str]:
 
 def _leads(text: str, scope: Scope) -> Iterator[tuple[str, str]]:
     """Return what leads to an input of a component, which the library calls u, u1, ... or reference."""
-    left, _, right = _sides(text)
+    left, _, right = sides_of(text)
     is_connection = text.startswith("connect")
     if is_connection:
-        sides = [path[1] for part in _split(left.partition("(")[2]) if (path := _PATH.match(part))]
+        sides = [path[1] for part in split_at_commas(left.partition("(")[2]) if (path := _PATH.match(part))]
         pairs = [(sides[0], sides[1]), (sides[1], sides[0])] if len(sides) == 2 else []
     else:
         path = _PATH.match(left)
@@ -364,7 +381,7 @@ def _outside(text: str, sign: str) -> Iterator[re.Match[str]]:
             yield found
 
 
-def _split(text: str) -> Iterator[str]:
+def split_at_commas(text: str) -> Iterator[str]:
     """Return what stands between the commas that are outside of brackets."""
     begin = 0
     for comma in _outside(text, ","):
@@ -373,7 +390,7 @@ def _split(text: str) -> Iterator[str]:
     yield text[begin:].strip()
 
 
-def _sides(text: str) -> tuple[str, str, str]:
+def sides_of(text: str) -> tuple[str, str, str]:
     """Return what stands before an assignment or equation, its sign, and its value in one line."""
     sign = next(_outside(text, _ASSIGNING), None)
     if sign is None:
@@ -383,45 +400,3 @@ def _sides(text: str) -> tuple[str, str, str]:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def constants_of(sources: Sequence[Source], signals: Iterable[str]) -> Mapping[str, str]:
-    """Return values of macros, constants and fields of filled structures of C; ``5 or 9`` if there are two.
-
-    Args:
-        sources: files, each of which may define the structures of another one.
-        signals: names of signals, which are no constants although a structure may give their first value.
-    """
-    found: dict[str, dict[str, None]] = defaultdict(dict)
-    structures = {name: fields for s in sources for name, fields in s.structures.items()}
-    changing = {name.rpartition(".")[2] for name in signals}.union(*(s.names_set for s in sources))
-    for source in sources:
-        for name, texts in source.scopes[""].constants.items():
-            found[name] |= dict.fromkeys(texts)
-        for kind, values in source.filled:
-            for name, value in _fields(kind, values, structures):
-                if name not in changing:
-                    found[name][value] = None
-    return {name: " or ".join(texts) for name, texts in found.items()}
-
-
-def _fields(
-    kind: str, values: str, structures: Mapping[str, Sequence[tuple[str, str]]], depth: int = 0
-) -> Iterator[tuple[str, str]]:
-    """Return names and values of the fields of a structure, from ``{ 1, { 2, 3 }, .x = 4 }``."""
-    fields = structures.get(kind, ())
-    if len(fields) == 1 and not fields[0][1]:  # another name of this structure
-        fields = structures.get(fields[0][0], ())
-    at = 0
-    for part in _split(values.strip()[1:-1]):
-        left, _, right = _sides(part)
-        if right and left.startswith("."):
-            at = next((i for i, (_, name) in enumerate(fields) if name == left[1:].strip()), at)
-            part = right
-        if at < len(fields) and part:
-            inner, name = fields[at]
-            if not part.startswith("{"):
-                yield name, part
-            elif depth < _MAX_DEPTH:
-                yield from _fields(inner, part, structures, depth + 1)
-        at += 1
