@@ -22,7 +22,7 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel, read_info
-from falsifier.fmu.description import wine
+from falsifier.fmu.description import libraries
 
 HERE = Path(__file__).parent
 FMUS = HERE.parent / "fmus"
@@ -97,9 +97,9 @@ def first_simulation(*, windows: bool) -> float:
 
 def report(rounds: int) -> str:
     """Return all results as Markdown."""
-    found = wine.find_wine()
+    found = libraries.find_wine()
     if found is None:
-        raise SystemExit(f"Wine is missing: {wine.HOW_TO_INSTALL}")
+        raise SystemExit(f"Wine is missing: {libraries.HOW_TO_INSTALL}")
     version = subprocess.run([found, "--version"], capture_output=True, text=True, check=True).stdout.strip()
     lines = [
         "# What Wine costs a simulation",

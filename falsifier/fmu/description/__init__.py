@@ -11,7 +11,13 @@ from falsifier.fmu.description.archive import (
     read_entry,
     this_platform,
 )
-from falsifier.fmu.description.libraries import misnamed_text, missing_binary_text
+from falsifier.fmu.description.libraries import (
+    HOW_TO_INSTALL,
+    find_wine,
+    misnamed_text,
+    missing_binary_text,
+    windows_path,
+)
 from falsifier.fmu.description.model_description import (
     Description,
     describe,
@@ -20,10 +26,16 @@ from falsifier.fmu.description.model_description import (
     read_info,
 )
 from falsifier.fmu.description.needed_libraries import binary_remarks
-from falsifier.fmu.description.structure import Structure, read_structure
-from falsifier.fmu.description.units import Unit, Units, conversion, is_known, read_units
+from falsifier.fmu.description.structure import (
+    Structure,
+    Unit,
+    Units,
+    conversion,
+    is_known,
+    read_structure,
+    read_units,
+)
 from falsifier.fmu.description.variables import Slot
-from falsifier.fmu.description.wine import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.description.xml import read_xml
 
 __all__ = [

@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu.description import archive
-from falsifier.fmu.description.libraries import find_libraries
+from falsifier.fmu.description.libraries import can_run_windows, find_libraries, windows_text
 from falsifier.fmu.description.variables import (
     LONGEST_NAME,
     Slot,
@@ -23,7 +23,6 @@ from falsifier.fmu.description.variables import (
     is_true,
     read_variables,
 )
-from falsifier.fmu.description.wine import can_run_windows, windows_text
 from falsifier.fmu.description.xml import read_xml
 
 _INTERFACE_TAGS: Mapping[str, Interface] = {

@@ -13,11 +13,9 @@ from pathlib import Path, PurePosixPath
 
 from falsifier.errors import ModelError
 from falsifier.fmu.description import archive
-from falsifier.fmu.description.elf import Elf, read_elf
-from falsifier.fmu.description.libraries import misnamed_text, missing_binary_text
+from falsifier.fmu.description.binaries import Elf, read_elf, read_pe
+from falsifier.fmu.description.libraries import misnamed_text, missing_binary_text, wine_libraries
 from falsifier.fmu.description.model_description import Description, read_description
-from falsifier.fmu.description.pe import read_pe
-from falsifier.fmu.description.wine import wine_libraries
 
 # Larger libraries are not read.
 _MOST_BYTES = 512 << 20

@@ -1,17 +1,25 @@
-"""A system of FMUs as its workers get it: components, connections between scalars, order of stepping."""
+"""A system of FMUs as its workers get it, with the description of the whole: all variables, by component."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import reduce
+from math import gcd
 from pathlib import Path
 from typing import Literal
 
-from falsifier.core.model import Interface, Variable
-from falsifier.fmu.description import Description
+from falsifier.core.model import Interface, ModelInfo, Variable
+from falsifier.errors import SpecError
+from falsifier.fmu.description import Description, Slot
 
 Method = Literal["gauss-seidel", "jacobi"]
 Loops = Literal["refuse", "delay", "iterate"]
 Extrapolation = Literal["hold", "linear"]
 Isolation = Literal["together", "each"]
+# Maximum number of connections in the description that people and language models read.
+_SHOWN_LINKS = 40
+# Largest denominator of steps like 1/30 s, which are written with many digits.
+_MAX_DENOMINATOR = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +153,110 @@ class Network:
 
     def title(self, place: Place) -> str:
         """Return the name of a variable in the system."""
-        return title(self.members, place)
+        return full_name(self.members, place)
 
 
-def title(members: Sequence[Member], place: Place) -> str:
+def full_name(members: Sequence[Member], place: Place) -> str:
     """Return the name of a variable in a system of these components."""
     return place.name if place.member == SYSTEM else f"{members[place.member].name}.{place.name}"
+
+
+def merged(
+    name: str, members: Sequence[Member], links: Sequence[Link], frame: Frame, notes: Iterable[str]
+) -> tuple[Description, dict[str, Place]]:
+    """Return the description of a system, and where each of its variables is.
+
+    A connected input is a local variable of the system: its component computes nothing from a value that
+    anybody else could set.
+
+    Raises:
+        SpecError: if two variables would have the same name.
+    """
+    fed = {_location(members, link.target): link for link in links}
+    values = dict(frame.values)
+    variables = [replace(v, start=values.get(v.name, v.start)) for v in frame.inputs]
+    slots = {v.name: Slot(0, v.type or "Real") for v in frame.inputs}
+    places = {v.name: Place(SYSTEM, v.name) for v in frame.inputs}
+    for k, member in enumerate(members):
+        for variable in member.description.info.variables:
+            place = Place(k, variable.name)
+            title = f"{member.name}.{variable.name}"
+            if title in places:
+                raise SpecError(
+                    f"two variables of the system are named {title!r}; rename the component", key="components"
+                )
+            slot = member.description.slots[variable.name]
+            link = fed.get(_location(members, place)) if variable.causality == "input" else None
+            alias = variable.alias_of and f"{member.name}.{variable.alias_of}"
+            shown = replace(variable, name=title, alias_of=alias, start=values.get(title, variable.start))
+            if link is not None:
+                source = full_name(members, link.source)
+                shown = replace(shown, causality="local", settable=False)
+                slot = replace(slot, refusal=f"it is connected to {source}")
+            variables.append(shown)
+            slots[title], places[title] = slot, place
+    for other, meant in frame.outputs:
+        if other not in places:
+            variable = next(v for v in variables if v.name == meant)
+            variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
+            slots[other], places[other] = slots[meant], places[meant]
+    infos = [m.description.info for m in members]
+    info = ModelInfo(
+        name=name,
+        description=_description(members, links),
+        fmi_version=" and ".join(sorted({i.fmi_version for i in infos})),
+        interfaces=("co-simulation",),
+        platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
+        tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
+        stop_time=frame.stop_time or _only([i.stop_time for i in infos]),
+        step_size=_step([m.step for m in members], [i.step_size for i in infos]),
+        tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
+        variables=tuple(variables),
+        components=tuple(m.name for m in members),
+        connections=_titles(members, links),
+        notes=(
+            *frame.notes,
+            *notes,
+            *(f"{m.name}: {note}" for m in members for note in m.description.info.notes),
+        ),
+    )
+    return Description(info, "", {}, slots), places
+
+
+def _location(members: Sequence[Member], place: Place) -> tuple[int, int, int]:
+    slot = members[place.member].description.slots[place.name]
+    return place.member, slot.reference, slot.offset
+
+
+def _description(members: Sequence[Member], links: Sequence[Link]) -> str:
+    said: dict[str, list[str]] = {}
+    for m in members:
+        said.setdefault(m.description.info.description or m.name, []).append(m.name)
+    parts = (", ".join(names) + (f" ({text})" if text not in names else "") for text, names in said.items())
+    fed = [f"{source} -> {target}" for source, target in _titles(members, links)]
+    shown = ", ".join(fed[:_SHOWN_LINKS]) + (", ..." if len(fed) > _SHOWN_LINKS else "")
+    return f"System of {', '.join(parts)}" + (f". Connections: {shown}" if fed else "")
+
+
+def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str, str], ...]:
+    return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
+
+
+def _only(times: Iterable[float | None]) -> float | None:
+    """Return the time that all who state one agree on."""
+    stated = {time for time in times if time is not None}
+    return stated.pop() if len(stated) == 1 else None
+
+
+def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float | None:
+    """Return the largest step that divides all steps of the components' own; else the smallest default."""
+    exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in own if step]
+    if exact:
+        return float(reduce(_common, exact))
+    return min((step for step in default if step), default=None)
+
+
+def _common(a: Fraction, b: Fraction) -> Fraction:
+    return Fraction(
+        gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator
+    )

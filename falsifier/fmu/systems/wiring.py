@@ -8,9 +8,18 @@ from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description import Structure, conversion, describe, read_structure
-from falsifier.fmu.systems.network import SYSTEM, Coupling, Extrapolation, Frame, Link, Member, Network, Place
+from falsifier.fmu.systems.network import (
+    SYSTEM,
+    Coupling,
+    Extrapolation,
+    Frame,
+    Link,
+    Member,
+    Network,
+    Place,
+    merged,
+)
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
-from falsifier.fmu.systems.system_info import merged
 
 _EXTRAPOLATIONS = ("hold", "linear")
 

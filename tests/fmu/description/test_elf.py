@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from falsifier.fmu.description.elf import read_elf
+from falsifier.fmu.description.binaries import read_elf
 
 
 def library(

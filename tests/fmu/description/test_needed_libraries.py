@@ -7,9 +7,9 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError
-from falsifier.fmu.description import needed_libraries, wine
+from falsifier.fmu.description import libraries, needed_libraries
+from falsifier.fmu.description.libraries import can_run_windows
 from falsifier.fmu.description.needed_libraries import binary_remarks
-from falsifier.fmu.description.wine import can_run_windows
 from tests.fmu.description.test_elf import library
 from tests.fmu.description.test_pe import windows_library
 from tests.fmu.fixtures import FOLDER, path
@@ -169,4 +169,4 @@ def test_a_damaged_binary_is_an_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize("character", ["\\", '"'])
 def test_paths_that_windows_programs_cannot_open_are_refused(character: str) -> None:
     with pytest.raises(ModelError, match="set TMPDIR to another folder"):
-        wine.windows_path(Path(f"/tmp/a{character}b/x.dll"))
+        libraries.windows_path(Path(f"/tmp/a{character}b/x.dll"))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from falsifier.fmu.description.pe import read_pe
+from falsifier.fmu.description.binaries import read_pe
 from tests.fmu.fixtures import FOLDER
 
 START, ADDRESS, OFFSET = 0x80, 0x1000, 0x200

@@ -7,8 +7,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu.description import archive
-from falsifier.fmu.description.structure import Structure, read_structure
-from falsifier.fmu.description.units import Unit, conversion, read_units
+from falsifier.fmu.description.structure import Structure, Unit, conversion, read_structure, read_units
 from tests.fmu.fixtures import path
 
 FMI2 = """<fmiModelDescription fmiVersion="2.0"><ModelVariables>

@@ -12,7 +12,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel, read_info
-from falsifier.fmu.description import wine
+from falsifier.fmu.description import libraries
 from tests import patience
 from tests.command import ROOT
 from tests.fixtures.fmus.catalogue import FIXTURES, WINDOWS
@@ -22,8 +22,8 @@ from tests.fmu.support import CRASH, DISCARD, END, ERROR, EXIT, HANG
 from tests.hostile.test_model_exchange import MISDEEDS
 
 needs_wine = pytest.mark.skipif(
-    wine.find_wine() is None or not wine.can_run_windows(),
-    reason=f"Windows libraries are not simulated here; {wine.HOW_TO_INSTALL}",
+    libraries.find_wine() is None or not libraries.can_run_windows(),
+    reason=f"Windows libraries are not simulated here; {libraries.HOW_TO_INSTALL}",
 )
 FOLDER = fixtures.FOLDER / "win64"
 INTERFACES: dict[str, Interface] = {"CoSimulation": "co-simulation", "ModelExchange": "model-exchange"}
@@ -147,7 +147,7 @@ def test_a_hang_is_stopped_and_the_next_simulation_runs_in_a_new_process(misdeed
 
 def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.which", lambda _: None)
-    if not wine.can_run_windows():
+    if not libraries.can_run_windows():
         pytest.skip("Windows libraries are not simulated on this machine, with or without Wine")
     model = FmuModel(FOLDER / "Lag_2.fmu")
     with pytest.raises(ModelError, match=r"run through Wine, which is missing: .*apt-get install wine64"):
@@ -157,7 +157,7 @@ def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyP
 def test_the_description_says_that_it_runs_through_wine() -> None:
     notes = read_info(FOLDER / "Lag_3.fmu").notes
     assert [note for note in notes if note.startswith("win64 only")] == (
-        [wine.windows_text()] if wine.can_run_windows() else []
+        [libraries.windows_text()] if libraries.can_run_windows() else []
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Connection, Coupling, System
-from falsifier.fmu.description import wine
+from falsifier.fmu.description import libraries
 from falsifier.fmu.process import Policy, Reply, Where
 from falsifier.fmu.process.plan import make_plan
 from falsifier.fmu.systems.order import SystemOrder
@@ -101,7 +101,7 @@ def test_an_output_may_feed_several_inputs_and_arrays_go_element_by_element() ->
 
 def test_components_with_a_windows_library_only_are_refused() -> None:
     path = fixtures.FOLDER / "win64" / "Lag_2.fmu"
-    if not wine.can_run_windows():
+    if not libraries.can_run_windows():
         pytest.skip("on this machine it is refused as an FMU without a library")
     with pytest.raises(SpecError, match=r"its only library is for Windows; .* not as a component"):
         System({"lag": path}, {})

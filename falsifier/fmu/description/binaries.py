@@ -1,19 +1,24 @@
-"""What a shared library for Linux says of itself, read from its file (ELF) without loading it.
+"""What a shared library says of itself, read from its file without loading it: ELF of Linux, PE of Windows.
 
-Names and numbers are those of the System V ABI and of the Linux Standard Base. All machines with processes of
-64 bits that FMUs are built for have the least significant byte first.
+Names and numbers are those of the System V ABI, of the Linux Standard Base, and of Microsoft's "PE Format".
+All machines with processes of 64 bits that FMUs are built for have the least significant byte first.
 """
 
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-_MAGIC, _LITTLE_ENDIAN, _ENTRY_BYTES = b"\x7fELF", 1, 16
+_ELF_MAGIC, _LITTLE_ENDIAN, _ENTRY_BYTES = b"\x7fELF", 1, 16
 _LOADED, _DYNAMIC = 1, 2  # PT_LOAD, PT_DYNAMIC
 _NEEDED, _STRINGS, _RPATH, _RUNPATH = 1, 5, 15, 29  # DT_NEEDED, DT_STRTAB, DT_RPATH, DT_RUNPATH
 _DEFINED, _REQUIRED = 0x6FFFFFFC, 0x6FFFFFFE  # DT_VERDEF, DT_VERNEED
 # Limits of what is read from a damaged file; real ones stay far below.
 _MOST_ENTRIES, _LONGEST_NAME = 10_000, 4096
+_PLACE = 0x3C  # where the file says where its header starts
+_PE_MAGIC = b"PE\0\0"
+_X86_64 = 0x8664
+_PE32_PLUS = 0x20B
+_HEADER, _SECTION, _IMPORT = 24, 40, 20  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +46,12 @@ def read_elf(content: bytes) -> Elf:
     Raises:
         ValueError: if it is not one, or is damaged.
     """
-    if content[:4] != _MAGIC or len(content) < 64 or content[4] not in (1, 2) or content[5] != _LITTLE_ENDIAN:
+    if (
+        content[:4] != _ELF_MAGIC
+        or len(content) < 64
+        or content[4] not in (1, 2)
+        or content[5] != _LITTLE_ENDIAN
+    ):
         raise ValueError("not an ELF file")
     if content[4] == 1:
         return Elf(32)
@@ -135,3 +145,67 @@ class _File:
             if not distance:
                 return
             at += distance
+
+
+@dataclass(frozen=True, slots=True)
+class Pe:
+    """Contents of a PE file.
+
+    Attributes:
+        is_64: whether it is for 64-bit processes on x86.
+        needed: file names of the libraries that are loaded with it.
+    """
+
+    is_64: bool
+    needed: tuple[str, ...]
+
+
+def read_pe(content: bytes) -> Pe:
+    """Read a PE file.
+
+    Raises:
+        ValueError: if it is not one, or is damaged.
+    """
+    try:
+        return _read_imports(content)
+    except (struct.error, IndexError, OverflowError) as error:
+        raise ValueError(f"a damaged Windows library ({error})") from error
+
+
+def _read_imports(content: bytes) -> Pe:
+    if content[:2] != b"MZ":
+        raise ValueError("not a Windows library")
+    (start,) = struct.unpack_from("<I", content, _PLACE)
+    if content[start : start + 4] != _PE_MAGIC:
+        raise ValueError("not a Windows library")
+    machine, sections, size = struct.unpack_from("<HH12xH", content, start + 4)
+    optional = start + _HEADER
+    (kind,) = struct.unpack_from("<H", content, optional)
+    # The first directory is that of the exports, the second that of the imports.
+    directories = optional + (112 if kind == _PE32_PLUS else 96)
+    count, _, _, address = struct.unpack_from("<IIII", content, directories - 4)
+    places = [struct.unpack_from("<8xIIII", content, optional + size + k * _SECTION) for k in range(sections)]
+    needed = _imported(content, places, address) if count > 1 and address else ()
+    return Pe(machine == _X86_64, tuple(needed))
+
+
+def _imported(content: bytes, sections: list[tuple[int, ...]], address: int) -> Iterator[str]:
+    at = _position(sections, address)
+    for k in range(_MOST_ENTRIES):
+        (name,) = struct.unpack_from("<12xI4x", content, at + k * _IMPORT)
+        if not name:
+            return
+        start = _position(sections, name)
+        end = content.find(b"\0", start, start + _LONGEST_NAME)
+        if end < 0:
+            raise IndexError("a name does not end")
+        yield content[start:end].decode("utf-8", "replace")
+    raise IndexError("its imports do not end")
+
+
+def _position(sections: list[tuple[int, ...]], address: int) -> int:
+    """Return where in the file an address in memory comes from."""
+    for size, start, stored, offset in sections:
+        if start <= address < start + max(size, stored):
+            return offset + address - start
+    raise IndexError("an address outside of all sections")
