@@ -2,14 +2,14 @@
 
 The LLM proposes the first candidate, because its first guess is better than any corner; the surrogate then
 shows how the system responds, with an input that steps or switches. From then on the rule in
-``falsifier.engines.turns`` decides who is next: from what each half has brought, and from what a simulation
-and a question cost. The times are those of the run's record, so a resumed run decides in the same way.
+``falsifier.engines.turns`` decides who is next, from what each half has brought.
 
 A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
-starts of its own search; the best predicted one is simulated at once, later or never, see ``turns.due``. One
-that is the same experiment as an earlier sample is not simulated on untested predictions, and the LLM is told
-so. Before it answers, the LLM is told why the surrogate chose its samples and what it would do next, and may
-request predictions; if it does not, it is told them afterwards and may revise its candidates once.
+starts of its own search; the best predicted one is simulated if that is worth it, see
+``turns.is_worth_simulating``. One that is the same experiment as an earlier sample is not simulated on
+untested predictions, and the LLM is told so. Before it answers, the LLM is told why the surrogate chose its
+samples and what it would do next, and may request predictions; if it does not, it is told them afterwards
+and may revise its candidates once, or insist on some.
 """
 
 import logging
@@ -26,12 +26,12 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.engines.surrogate.planning import is_seen
-from falsifier.engines.turns import TRIAL, Half, Ledger, Who, due, helps, next_turn
+from falsifier.engines.turns import TRIAL, Half, Who, helps, is_worth_simulating, next_turn
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import NoValidReplyError, OnExchange
-from falsifier.llm.messages import Chat, Exchange
+from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
@@ -56,10 +56,9 @@ class Settings:
         count: number of candidates requested later.
         tries: maximum number of candidates of a later answer that are simulated, best predicted first.
         promising: share of the best robustness by which an answer must be predicted to lower it to be
-            simulated at once, unless it is predicted to be better than what the surrogate would do next.
+            simulated, unless it is predicted to be better than what the surrogate would do next.
         same: share of each range within which a candidate is the same experiment as a sample, if it is that
             near to it in every input at all times and in every parameter.
-        hold: number of the surrogate's turns for which any other answer waits.
         misses: number of successive predicted violations that did not occur after which predictions are no
             longer trusted and the LLM is told so.
         reasons: maximum number of the surrogate's latest samples of which the LLM is told the reason.
@@ -74,7 +73,6 @@ class Settings:
     tries: int = 1
     promising: float = 0.1
     same: float = 0.1
-    hold: int = 4
     misses: int = 3
     reasons: int = 4
     what_if: bool = True
@@ -86,7 +84,6 @@ class _Answer:
     """Candidates of one answer: those still to be returned by ``ask``, and those whose evaluation is due."""
 
     queue: list[Candidate]
-    held: int = 0
     helped: bool = False
     asked: set[object] = field(default_factory=set)
 
@@ -109,8 +106,6 @@ class Hybrid:
         self.settings = settings or Settings()
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
         self._llm, self._numerical = Half(), Half()
-        self._ledger = Ledger()
-        self._simulations: int | None = None
         self._best = np.inf
         self._best_candidate: Candidate | None = None
         self._since_best = self._told = 0
@@ -125,22 +120,12 @@ class Hybrid:
         self._repeats: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Connect the adviser, which has the chat, to a run; note what its exchanges cost."""
-
-        def noted(exchange: Exchange) -> None:
-            self._ledger.exchanged(exchange)
-            on_exchange(exchange)
-
-        self.adviser.attach(noted, wrap)
+        """Connect the adviser, which has the chat, to a run."""
+        self.adviser.attach(on_exchange, wrap)
 
     def begin(self, simulations: int | None) -> None:
         """Be told the maximum number of simulations, and tell the adviser."""
-        self._simulations = simulations
         self.adviser.begin(simulations)
-
-    def timed(self, seconds: float) -> None:
-        """Be told how long the last ``ask`` took, which counts if the LLM was not asked."""
-        self._ledger.asked(seconds)
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Tell the adviser that a violation does not count."""
@@ -153,7 +138,6 @@ class Hybrid:
             ChatError: if the LLM cannot be reached for the first question; later, and if its replies are not
                 valid, the surrogate continues without it.
         """
-        self._ledger.begin(max(n, 1))
         return [self._ask_one() for _ in range(max(n, 1))]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
@@ -178,13 +162,12 @@ class Hybrid:
     @property
     def next(self) -> Who:
         """Which half has the next turn."""
-        return next_turn(self._llm, self._numerical, self._ledger.costs, simulations=self._simulations)
+        return next_turn(self._llm, self._numerical)
 
     def _note(self, evaluation: Evaluation) -> None:
         self._told += 1
         self._points.append(self.surrogate.layout.point(evaluation.candidate))
         self._since_best += 1
-        self._ledger.simulated(evaluation.seconds)
         key, robustness = evaluation.candidate.key, evaluation.robustness
         helped = helps(robustness, self._best)
         if robustness is not None and robustness < self._best:
@@ -207,7 +190,7 @@ class Hybrid:
         if self._answer is None and self.next == "llm":
             self._question()
         answer = self._answer
-        if answer is not None and answer.queue and self._is_due(answer):
+        if answer is not None and answer.queue and self._is_worth_it(answer):
             candidate = answer.queue.pop(0)
             answer.asked.add(candidate.key)
             if self._numeric is not None and self._is_same(candidate, self._numeric):
@@ -215,8 +198,6 @@ class Hybrid:
             return candidate
         candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
         self._own.add(candidate.key)
-        if answer is not None and answer.queue:
-            answer.held += 1
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
     def _question(self) -> None:
@@ -234,8 +215,6 @@ class Hybrid:
                 raise
             queue = []
             self._unanswered.append(str(error))
-        finally:
-            self._ledger.answered()
         self._reasons.clear()
         self._answer = _Answer(queue)
         if not queue:
@@ -279,22 +258,21 @@ class Hybrid:
         candidates.sort(key=lambda c: c.key not in self._insisted)
         return candidates[: settings.tries]
 
-    def _is_due(self, answer: _Answer) -> bool:
-        """Whether the next candidate of an answer is simulated now; drop it if that is not worth it."""
+    def _is_worth_it(self, answer: _Answer) -> bool:
+        """Whether the next candidate of an answer is simulated; drop it if not."""
         if self._llm.turns == 0:
             return True
         candidate = answer.queue[0]
         if candidate.key in self._insisted:
             return True
         repeated = self._repeated(candidate)
-        when = due(
+        if is_worth_simulating(
             repeats=repeated is not None,
             promising=self._is_promising(candidate),
             trusted=self._is_trusted,
             on_trial=self._llm.turns < TRIAL,
-        )
-        if when != "never":
-            return when == "now" or answer.held >= self.settings.hold
+        ):
+            return True
         if repeated is not None:
             self._repeats.append(self._repeat_told(candidate, repeated))
         answer.queue.clear()

@@ -135,9 +135,6 @@ class LLMEngine:
         """Be told that a violation does not count, which prompts state with the reason."""
         self._doubts |= doubts_told([confirmation], self._disguise)
 
-    def timed(self, seconds: float) -> None:
-        """Do nothing: how long an answer took does not change the next question."""
-
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return how many samples are not the LLM's, and why."""
         return self._stand_ins.remarks(evaluations)

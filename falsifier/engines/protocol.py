@@ -48,13 +48,6 @@ class FollowsRun(Protocol):
         """Be told that a violation does not count, before its evaluation is told."""
         ...
 
-    def timed(self, seconds: float) -> None:
-        """Be told how long the last ``ask`` took, in s.
-
-        A resumed run states the recorded time: an engine that reads a clock itself cannot be resumed.
-        """
-        ...
-
 
 @runtime_checkable
 class HasRemarks(Protocol):

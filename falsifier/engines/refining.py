@@ -57,7 +57,6 @@ class Refining:
         self._constant: dict[object, Evaluation] = {}
         self._earlier: dict[object, Evaluation] = {}
         self._copies: list[Candidate] = []
-        self._was_asked = False
         self._doubts: list[Confirmation] = []
 
     @property
@@ -72,8 +71,7 @@ class Refining:
             self._refine()
         wanted = max(n, 1) if self._end is None else min(max(n, 1), self._end - done)
         candidates, self._copies = self._copies[:wanted], self._copies[wanted:]
-        self._was_asked = len(candidates) < wanted
-        if self._was_asked:
+        if len(candidates) < wanted:
             candidates += self._asked(wanted - len(candidates))
         self._pending += len(candidates)
         return candidates
@@ -97,12 +95,6 @@ class Refining:
         engine = self._stages[self._level].engine
         if isinstance(engine, FollowsRun):
             engine.doubt(confirmation)
-
-    def timed(self, seconds: float) -> None:
-        """Tell the engine of the current level how long the last ``ask`` took, if it was asked."""
-        engine = self._stages[self._level].engine
-        if self._was_asked and isinstance(engine, FollowsRun):
-            engine.timed(seconds)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return the remarks of the engines of all levels."""

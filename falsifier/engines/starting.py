@@ -26,7 +26,6 @@ class Starting:
     def __init__(self, engine: Engine, known: deque[Candidate]) -> None:
         self.engine = engine
         self.known = known
-        self._was_known = False
 
     @property
     def name(self) -> str:
@@ -35,8 +34,7 @@ class Starting:
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return known candidates as long as there are any, then those of the other engine."""
-        self._was_known = bool(self.known)
-        if self._was_known:
+        if self.known:
             return [self.known.popleft() for _ in range(min(max(n, 1), len(self.known)))]
         return self.engine.ask(n)
 
@@ -53,11 +51,6 @@ class Starting:
         """Tell the other engine that a violation does not count if it wants to know."""
         if isinstance(self.engine, FollowsRun):
             self.engine.doubt(confirmation)
-
-    def timed(self, seconds: float) -> None:
-        """Tell the other engine how long the last ``ask`` took, if it was asked and wants to know."""
-        if not self._was_known and isinstance(self.engine, FollowsRun):
-            self.engine.timed(seconds)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return the remarks of the other engine."""

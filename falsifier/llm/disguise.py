@@ -1,14 +1,27 @@
 """Neutral names and scales, so that the prompt does not reveal which system is searched.
 
-Inputs are u1, u2, ..., parameters p1, ..., other signals y1, ..., derived ones z1, .... What is searched runs
-from 0 to 1, everything else is mapped to between 0 and 1 (``falsifier.llm.scaling`` states the rules). Units,
-descriptions, types and names of enumeration items are left out. Times stay in seconds.
+Inputs are u1, u2, ..., parameters p1, ..., other signals y1, ..., derived ones z1, .... Units, descriptions,
+types and names of enumeration items are left out. Times stay in seconds. The rules for numbers:
+
+- What is searched runs from 0 to 1: its range is mapped linearly. Integers, Booleans and enumerations become
+  levels between 0 and 1.
+- Of every other signal the usual range is mapped linearly to 0.2 to 0.8. It is the one that the model
+  declares, else that of all numbers that predicates compare the signal with and of its start values, widened
+  by 1.3, so that the digits of the original do not stay. All of this is known before the first question. If
+  it is a single number, that is 0.5 from the first question on, and the largest distance from it in the first
+  trajectory determines how wide the range is.
+- A predicate that compares one signal with a number keeps its form. Any other one is replaced by a derived
+  signal that is compared with 0.5: its left side minus its right side, scaled as a signal of its own. Its
+  coefficients would give the system away, and a sum of scaled signals is not the scaled sum.
+
+Scales do not change during a run. Robustness is that of the scaled formula; its sign is that of the original
+one.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +36,14 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.observations import monitor_for
 from falsifier.llm.prompts.view import View
 from falsifier.llm.scaling import (
-    Scales,
-    are_comparable,
+    MIDDLE,
+    Scale,
     compared_numbers,
     hidden_value,
     keeps_form,
     levels,
     margin,
     real_value,
-    scaled_predicate,
-    signed_names,
     with_predicates,
 )
 from falsifier.problem.requirement import Requirement
@@ -47,11 +58,11 @@ Columns = Mapping[str, NDArray[np.float64]]
 _MORE_DECIMALS = 2
 _DESCRIPTION = (
     "Names are neutral and numbers have no units. Everything that you choose runs from 0 to 1. Each signal "
-    "has a scale of its own from 0 to 1, which is linear between 0.2 and 0.8 and compressed beyond; "
-    "robustness is that of scaled signals"
+    "has a linear scale of its own, on which its usual values are between 0.2 and 0.8; robustness is that of "
+    "scaled signals"
 )
-# What a derived signal is compared with.
-_MIDDLE = 0.5
+# Significant digits of numbers in a formula.
+_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -63,6 +74,7 @@ class Disguise:
         names: neutral names by real name.
         derived: predicates that are told as derived signals, with what stands for the real names of these.
         scales: how signals are scaled, by real name.
+        anchored: real names of signals whose scale has a middle before anything was simulated.
         whole: names of real signals that had few whole values in a trajectory.
         fractional: names of real signals that had other values in a trajectory.
     """
@@ -70,7 +82,8 @@ class Disguise:
     real: View
     names: Mapping[str, str]
     derived: Mapping[Predicate, str]
-    scales: Scales
+    scales: Mapping[str, Scale]
+    anchored: frozenset[str]
     whole: frozenset[str] = frozenset()
     fractional: frozenset[str] = frozenset()
 
@@ -85,12 +98,11 @@ class Disguise:
         start = start or {}
         inputs = [r.name for r in view.space.inputs]
         parameters = [p.name for p in view.space.parameters]
-        searched = {*inputs, *parameters}
         formula = view.requirement.formula
         seen = dict.fromkeys(
             (*formula.signals, *view.experiment.outputs, *(v.name for v in view.info.inputs))
         )
-        others = [name for name in seen if name not in searched]
+        others = [name for name in seen if name not in {*inputs, *parameters}]
         changed = [p for p in formula.predicates if not keeps_form(p)]
         # No variable has such a name.
         derived = {p: f"\0{k}" for k, p in enumerate(changed, start=1)}
@@ -100,15 +112,12 @@ class Disguise:
             **{name: f"y{i}" for i, name in enumerate(others, start=1)},
             **{name: f"z{i}" for i, name in enumerate(derived.values(), start=1)},
         }
-        scales = Scales.of(
-            {
-                **{name: [*compared_numbers(formula, name), *start.get(name, ())] for name in others},
-                **{name: _known_margins(p, start) for p, name in derived.items()},
-            },
-            {name: _unit_of_margin(view, p) for p, name in derived.items()},
-            {name: limits for name in others if (limits := _declared(view, name)) is not None},
-        )
-        return cls(view, names, derived, scales)
+        known: dict[str, list[float]] = {
+            **{name: [*compared_numbers(formula, name), *start.get(name, ())] for name in others},
+            **{name: _known_margins(p, start) for p, name in derived.items()},
+        }
+        scales = {name: Scale.of(numbers, _declared(view, name)) for name, numbers in known.items()}
+        return cls(view, names, derived, scales, frozenset(name for name in known if known[name]))
 
     @cached_property
     def view(self) -> View:
@@ -144,9 +153,14 @@ class Disguise:
             columns = {n: c for n, c in trajectory.columns.items() if n in self.names}
             whole = {n for n, column in columns.items() if is_discrete(column, kind="real")}
             steady = {n for n, c in columns.items() if np.ptp(c) == 0 and c[0] == np.round(c[0])}
+            scaled = self._scaled_columns(trajectory)
+            scales = {
+                n: scale.fitted(scaled[n], has_middle=n in self.anchored) if n in scaled else scale
+                for n, scale in found.scales.items()
+            }
             found = replace(
                 found,
-                scales=found.scales.fitted(self._scaled_columns(trajectory)),
+                scales=scales,
                 whole=found.whole | whole,
                 fractional=found.fractional | (columns.keys() - whole - steady),
             )
@@ -193,15 +207,8 @@ class Disguise:
         predicate = next((p for p in self._predicates if str(p) == verdict.predicate), None)
         if predicate is None or is_on_limit(robustness):
             return robustness
-        if predicate in self.derived:
-            return self.scales[self.derived[predicate]].number(robustness) - _MIDDLE
-        (name,) = predicate.left.signals or predicate.right.signals
-        (limit,) = compared_numbers(predicate, name)
-        # Whether a larger value of the signal is a larger robustness.
-        rises = (verdict.values.get(name, np.inf) > limit) == (verdict.robustness > 0)
-        there = limit + (robustness if rises else -robustness)
-        distance = self._scaled(name, there) - self._scaled(name, limit)
-        return distance if rises else -distance
+        name = self.derived.get(predicate) or (*predicate.left.signals, *predicate.right.signals)[0]
+        return robustness * (self._scaled(name, 1.0) - self._scaled(name, 0.0))
 
     def hidden_values(self, values: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
         """Return smallest and largest values under neutral names, without those that are not shown."""
@@ -249,16 +256,22 @@ class Disguise:
     def _predicates(self) -> dict[Predicate, Predicate]:
         """Hidden predicates by real ones."""
         return {
-            p: Predicate(p.operator, Name(self.names[self.derived[p]]), Number(_MIDDLE))
+            p: Predicate(p.operator, Name(self.names[self.derived[p]]), Number(MIDDLE))
             if p in self.derived
             else self._rescaled(p)
             for p in self.real.requirement.formula.predicates
         }
 
     def _rescaled(self, predicate: Predicate) -> Predicate:
-        (name,) = predicate.left.signals or predicate.right.signals
-        compared = Predicate(predicate.operator, predicate.left, predicate.right)  # scaled, it is no flag
-        return scaled_predicate(compared, partial(self._scaled, name), self.names[name])
+        """A predicate that keeps its form, over the scaled signal; scaled, it is no flag."""
+        (name,) = (*predicate.left.signals, *predicate.right.signals)
+
+        def side(part: object) -> Name | Number:
+            if isinstance(part, Number):
+                return Number(float(f"{self._scaled(name, part.value):.{_DIGITS}g}"))
+            return Name(self.names[name])
+
+        return Predicate(predicate.operator, side(predicate.left), side(predicate.right))
 
     def _hidden_input(self, r: InputRange) -> InputRange:
         low, high = hidden_value(r, r.low), hidden_value(r, r.high)
@@ -301,14 +314,8 @@ class Disguise:
 
     def _derivation(self, predicate: Predicate) -> str:
         """What a derived signal is made of, without numbers."""
-        terms = signed_names(predicate)
-        if not terms or {name for _, name in terms} & self._searched.keys():
-            names = dict.fromkeys((*predicate.left.signals, *predicate.right.signals))
-            return f"derived from {listed([self.names[name] for name in names])}"
-        first, *rest = sorted(terms)  # a plus comes before a minus
-        lead = "" if first[0] == "+" else "-"
-        text = "".join(f" {sign} {self.names[name]}" for sign, name in rest)
-        return f"{lead}{self.names[first[1]]}{text} before scaling, less a constant, on a scale of its own"
+        names = dict.fromkeys((*predicate.left.signals, *predicate.right.signals))
+        return f"derived from {listed([self.names[name] for name in names])}"
 
     def _scaled_columns(self, trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
         """Columns that have scales, derived ones included, before they are scaled."""
@@ -320,7 +327,7 @@ class Disguise:
         return {
             **{self.names[n]: (trajectory[n] - r.low) / (r.high - r.low or 1.0) for n, r in searched.items()},
             **{
-                self.names[n]: self.scales[n].of(column)
+                self.names[n]: self.scales[n].of_values(column)
                 for n, column in self._scaled_columns(trajectory).items()
             },
         }
@@ -340,13 +347,3 @@ def _known_margins(predicate: Predicate, start: Mapping[str, tuple[float, float]
     found = margin(predicate, {n: np.array([start[n][0]]) for n in names})
     size = float(np.abs(found).max())
     return [-size, size]
-
-
-def _unit_of_margin(view: View, predicate: Predicate) -> str:
-    """A name for the unit of left minus right side; empty if it has not that of its signals, or none."""
-    units = {view.unit(n) for n in (*predicate.left.signals, *predicate.right.signals)}
-    return (
-        f"difference in {units.pop()}"
-        if len(units) == 1 and units != {""} and are_comparable(predicate)
-        else ""
-    )

@@ -228,8 +228,6 @@ class _Loop:
         """Ask for n candidates, and start to simulate them."""
         engine = state.engine
         candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
-        if isinstance(engine, FollowsRun):
-            engine.timed(seconds)
         self.turns += 1
         self.think(seconds)
         self.emit(

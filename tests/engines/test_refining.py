@@ -28,7 +28,6 @@ class Listening(Uniform):
         self.first = list(first)
         self.begun: int | None = None
         self.doubted: list[object] = []
-        self.seconds: list[float] = []
 
     def ask(self, n: int = 1) -> list[Candidate]:
         return [self.first.pop(0)] if self.first else super().ask(n)
@@ -41,9 +40,6 @@ class Listening(Uniform):
 
     def doubt(self, confirmation: object) -> None:
         self.doubted.append(confirmation)
-
-    def timed(self, seconds: float) -> None:
-        self.seconds.append(seconds)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         return (f"told {len(self.told)} of {len(evaluations)}",) if self.told else ()
@@ -160,15 +156,13 @@ def test_a_violation_that_does_not_count_is_told_to_the_next_level_too() -> None
     assert second.doubted == [doubtful]
 
 
-def test_times_and_remarks_are_those_of_the_engines_that_were_asked() -> None:
+def test_remarks_are_those_of_the_engines_that_were_asked() -> None:
     coarse, held, _ = spaces(free=False)
     first, second = listening(coarse), listening(held)
     engine = Refining([Stage(first, coarse, 0), Stage(second, held, 2)])
     engine.begin(20)
     told: list[Evaluation] = []
-    for seconds in range(2 + COPIES + 1):
+    for _ in range(2 + COPIES + 1):
         told += [judge(c) for c in engine.ask()]
-        engine.timed(seconds)
         engine.tell(told[-1:])
-    assert (first.seconds, second.seconds) == ([0, 1], [2 + COPIES]), "copies are not the engine's"
     assert engine.remarks(told) == ("told 2 of 5", "told 3 of 5")

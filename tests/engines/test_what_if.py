@@ -26,7 +26,7 @@ from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS
 from tests.llm.server import Received, Step, serving
 
-EAGER = Settings(hold=0, promising=-9.0)
+EAGER = Settings(promising=-9.0)
 Line = str | ChatReply | Exception
 OnExchange = Callable[[Exchange], None]
 
@@ -110,7 +110,7 @@ def test_the_limit_of_calls() -> None:
         return candidates(1.75) if "limit of 2 calls" in "".join(answers(request)) else call(1.0)
 
     chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(hold=0, promising=-9.0, what_if_calls=2)))
+    run(hybrid(chat, settings=Settings(promising=-9.0, what_if_calls=2)))
     at = first_offer(chat.requests)
     assert "At most 2 calls" in chat.requests[at].tools[0].description
     told = answers(chat.requests[at + 3])
@@ -169,7 +169,7 @@ def test_no_tool_where_no_call_is_allowed() -> None:
         return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
 
     chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(hold=0, promising=-9.0, what_if_calls=0)))
+    run(hybrid(chat, settings=Settings(promising=-9.0, what_if_calls=0)))
     assert not any(r.tools for r in chat.requests)
     assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
 

@@ -142,7 +142,7 @@ def test_what_becomes_of_a_formula(formula: str, hidden: str) -> None:
         assert foretold.robustness == pytest.approx(told.verdict.robustness, abs=1e-8)
 
 
-def test_outputs_stay_between_0_and_1_and_scales_do_not_change() -> None:
+def test_scales_do_not_change() -> None:
     problem = load_problem("CCx")
     disguise = Disguise.of(View.of(problem), start_values(problem))
     told_first = disguise.view.info.description, str(disguise.view.requirement.formula)
@@ -155,12 +155,10 @@ def test_outputs_stay_between_0_and_1_and_scales_do_not_change() -> None:
     for evaluation in (first, second):
         told = fitted.hidden(evaluation).trajectory
         assert told is not None
-        assert all(0 <= column.min() <= column.max() <= 1 for column in told.columns.values())
         assert {told[f"y{i}"][0] for i in range(1, 6)} == {0.5}
     gear = Disguise.of(View.of(load_problem("AT51"))).view
     assert (gear.kind("z1"), gear.description("z1")) == ("integer", "derived from y1")
-    kept = disguise.view.info["z2"].description
-    assert kept == "y3 - y1 before scaling, less a constant, on a scale of its own"
+    assert disguise.view.info["z2"].description == "derived from y3 and y1"
 
 
 def test_signals_that_take_whole_values_are_told_by_their_changes() -> None:
