@@ -1,4 +1,4 @@
-"""The archive of what was reached, and how to reach more: return to it, then go on differently.
+"""The coverage engine, and its archive of what was reached: return to it, then go on differently.
 
 Returning before exploring is the idea of Go-Explore (Ecoffet et al., Nature 590 (2021) 580-586). Preferring
 what is rare is the power schedule of coverage-guided fuzzers (Böhme et al., IEEE TSE 45 (2019) 489-506).
@@ -7,16 +7,19 @@ Systems are causal: inputs that stay the same up to a time do what they did unti
 """
 
 from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
 import numpy as np
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array
 from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.engines.coverage.programs import Programs
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
 # Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
@@ -25,6 +28,8 @@ _NEW_END, _REPEATED = 0.6, 0.2
 _SLIGHT, _EARLIER = 0.2, 0.2
 # Two values of robustness that differ by at most this share of their size are the same level.
 _SAME_LEVEL = 1e-6
+# Ideas, then random points, among which one that was not simulated is looked for.
+_IDEAS, _DRAWS = 10, 100
 
 
 @dataclass(slots=True, eq=False)
@@ -189,3 +194,53 @@ def describe(mark: Mark) -> str:
             return f"{source} come close to its threshold"
         case _:
             return f"{source} go {what[0]}"
+
+
+class Coverage:
+    """Collects inputs that reached something new, and goes on from these; robustness is not used."""
+
+    name = "coverage"
+
+    def __init__(self, problem: Problem, *, seed: int) -> None:
+        self.layout = planning_layout(problem.space, TimeGrid.of(problem))
+        self.seed = seed
+        self._explorer = Explorer(problem, self.layout)
+        self._known: set[int] = set()
+        self._asked = 0
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        """Return n candidates."""
+        return [self._ask_one() for _ in range(max(n, 1))]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Add the trajectories to what was reached."""
+        for evaluation in evaluations:
+            self.avoid(evaluation.candidate)
+            if evaluation.trajectory is not None:
+                point = self.layout.point(evaluation.candidate)
+                self._explorer.learn(point, evaluation.trajectory, 0.0, 0.0)
+
+    def avoid(self, candidate: Candidate) -> None:
+        """Do not propose a candidate, because it is about to be simulated."""
+        self._known.add(hash(candidate.key))
+
+    def avoids(self, candidate: Candidate) -> bool:
+        """Whether a candidate was simulated or is about to be."""
+        return hash(candidate.key) in self._known
+
+    def _ask_one(self) -> Candidate:
+        ideas = self._ideas(np.random.default_rng([self.seed, self._asked]))
+        self._asked += 1
+        for idea in ideas:
+            candidate = self.layout.candidate(idea.point, origin=self.name, rationale=idea.why)
+            if not self.avoids(candidate):
+                break
+        self.avoid(candidate)
+        return candidate
+
+    def _ideas(self, rng: np.random.Generator) -> Iterator[Idea]:
+        for _ in range(_IDEAS):
+            yield self._explorer.propose(rng)
+        for _ in range(_DRAWS):
+            point = self.layout.settled(rng.random(self.layout.dimension))
+            yield Idea(point, "random: all other ideas were simulated")

@@ -1,17 +1,22 @@
 """Linear dynamics learnt from whole trajectories, as deviations from the best one, with several lags.
 
 Deviations cancel initial transients and set points; lags account for hidden states. A roll-out predicts all
-candidates of a population at once: one matrix product per cell.
+candidates of a population at once: one matrix product per cell. A forecaster keeps how good predictions were.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
+from falsifier.engines.layout import Layout
+from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.stl import Verdict
 
 # Predicted outputs are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5
@@ -22,6 +27,10 @@ _FAR = 30.0
 _LEAST_INPUT_UNIT = 0.05
 # Products of a regression: rows times the square of the features. Limits the time of a fit.
 _MOST_PRODUCTS = 3e7
+# Number of the last predictions whose median error is the recent error.
+_RECENT = 4
+# Recent error, as a share of the margins' spread, below which predictions are trusted.
+_TRUSTED = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,3 +159,74 @@ def _lagged(values: Array, lags: int, which: NDArray[np.intp], at: NDArray[np.in
 def _spread(deviations: Array) -> Array:
     """Return the root mean square of each column, shape (n,), of deviations, shape (m, cells, n)."""
     return np.asarray(np.sqrt(np.mean(deviations**2, axis=(0, 1))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forecast:
+    """Prediction for one point, made before its simulation.
+
+    Attributes:
+        margins: predicted margins of the predicates.
+        cost: predicted scaled robustness.
+    """
+
+    margins: Margins
+    cost: float
+
+
+class Forecaster:
+    """Predicts with the latest fit, and keeps the errors of predictions made before their simulation."""
+
+    def __init__(self, settings: Settings, layout: Layout) -> None:
+        self._settings, self._layout = settings, layout
+        self._errors: list[float] = []
+        self._missed: list[bool] = []
+        self._dynamics: LinearDynamics | None = None
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether recent predictions were good."""
+        return self.recent_error < _TRUSTED
+
+    @property
+    def recent_error(self) -> float:
+        """Recent error as a share of the margins' spread; inf if unknown."""
+        return float(np.median(self._errors[-_RECENT:])) if self._errors else inf
+
+    @property
+    def misses(self) -> int:
+        """Number of forecasts, counted back from the last one, of violations that did not occur."""
+        return next((i for i, missed in enumerate(reversed(self._missed)) if not missed), len(self._missed))
+
+    def fitted(self, traces: Sequence[Trace], best: int, rng: np.random.Generator) -> "Forecaster":
+        """Return this with dynamics learnt from traces, of which ``best`` has the lowest cost."""
+        other = copy(self)
+        other._dynamics = LinearDynamics(traces, best, self._settings, rng)
+        return other
+
+    def predictor(self, cost: PredictedCost) -> Callable[[Array], Array]:
+        """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
+        return lambda points: cost.cost(self._margins(cost, points))
+
+    def verdicts(self, cost: PredictedCost, points: Array) -> list[Verdict]:
+        """Return the verdicts predicted for points, shape (m, d), in the requirement's own unit."""
+        return cost.plain().verdicts(self._margins(cost, points))
+
+    def forecast(self, cost: PredictedCost, point: Array) -> Forecast:
+        """Return the prediction for one point, to be passed to ``judge`` after its simulation."""
+        margins = self._margins(cost, point[None])
+        return Forecast(margins, float(cost.cost(margins)[0]))
+
+    def judge(self, forecast: Forecast, true: Margins, cost: PredictedCost, *, violated: bool) -> None:
+        """Record the error of a forecast, given the simulated margins of the predicates."""
+        errors = [
+            np.sqrt(np.mean(((p - t) / scale) ** 2))
+            for p, t, scale in zip(forecast.margins, true, cost.scales, strict=True)
+        ]
+        self._errors.append(float(np.mean(errors)))
+        self._missed.append(forecast.cost < 0 and not violated)
+
+    def _margins(self, cost: PredictedCost, points: Array) -> Margins:
+        assert self._dynamics is not None, "fitted first"
+        inputs = self._layout.inputs(points, cost.grid)
+        return cost.margins(self._dynamics.predict(inputs), inputs)

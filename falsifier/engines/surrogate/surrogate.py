@@ -13,14 +13,13 @@ from falsifier.engines.cma import CMA
 from falsifier.engines.coverage import Explorer
 from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.engines.simple import Corners, Uniform
-from falsifier.engines.surrogate.changes import Seen, propose_change
+from falsifier.engines.surrogate.dynamics import Forecast, Forecaster
 from falsifier.engines.surrogate.feasibility import Feasibility
-from falsifier.engines.surrogate.forecast import Forecast, Forecaster
 from falsifier.engines.surrogate.history import History, Sample
+from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
 from falsifier.engines.surrogate.planning import is_seen, plan
 from falsifier.engines.surrogate.policy import Levels, Policy
 from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
-from falsifier.engines.surrogate.region import TrustRegion
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation

@@ -5,8 +5,7 @@ import pytest
 
 from falsifier.core.space import SearchSpace
 from falsifier.engines.layout import TimeGrid, planning_layout
-from falsifier.engines.surrogate.dynamics import LinearDynamics, ridge
-from falsifier.engines.surrogate.forecast import Forecaster
+from falsifier.engines.surrogate.dynamics import Forecaster, LinearDynamics, ridge
 from falsifier.engines.surrogate.history import trace_of
 from falsifier.engines.surrogate.predicted_cost import PredictedCost, inner_windows, needs_several
 from falsifier.engines.surrogate.variation import random_points
