@@ -119,8 +119,7 @@ def run(
     from falsifier.problem.refinement import widened
     from falsifier.record.run import falsify
     from falsifier.search.budget import Budget
-    from falsifier.views.fmu_log import FmuLog
-    from falsifier.views.progress import make_display
+    from falsifier.views.progress import FmuLog, make_display
 
     source, llm = problem_source(options), llm_settings(options)
     check_context(source.context, [engine] if llm is None else [])
