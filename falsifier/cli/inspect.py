@@ -114,7 +114,7 @@ def _check_diagram(fmu: Path, *, drawn: bool, alone: bool, out: Path | None) -> 
 
 
 def _draw_diagram(system: "System", out: Path | None) -> None:
-    from falsifier.views.diagram import diagram, diagram_text
+    from falsifier.views.model_text import diagram, diagram_text
 
     found = diagram(system)
     if out is None:
@@ -131,7 +131,7 @@ def _draw_diagram(system: "System", out: Path | None) -> None:
 
 def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
     from falsifier.context.simulink import names_text, read_diagram
-    from falsifier.views.simulink_text import simulink_json, simulink_text
+    from falsifier.views.model_text import simulink_json, simulink_text
 
     diagram = read_diagram(file)
     if as_json:

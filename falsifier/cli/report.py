@@ -11,7 +11,7 @@ from falsifier.cli.files import check_out, draw
 from falsifier.cli.options import command, directory_argument, json_option, out_option
 from falsifier.cli.output import say
 from falsifier.record import manifest
-from falsifier.views.coverage_text import coverage_json, coverage_text
+from falsifier.views.analyses_text import coverage_json, coverage_text
 from falsifier.views.report import html_report, junit_report, markdown_report, write_evaluations
 from falsifier.views.terminal import warn
 

@@ -130,7 +130,7 @@ def formalize(
     Without --llm, templates that fit an English sentence are shown, and nothing is written.
     """
     from falsifier.problem.writing import subject_of, with_requirement
-    from falsifier.views.readings_text import advice_json, advice_text, formalized_json, formalized_text
+    from falsifier.views.analyses_text import advice_json, advice_text, formalized_json, formalized_text
 
     settings = connection_settings(options)
     if settings is None:

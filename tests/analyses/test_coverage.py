@@ -20,7 +20,7 @@ from falsifier.errors import SpecError
 from falsifier.record.manifest import InputRecord, Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
 from falsifier.testing import lag_problem
-from falsifier.views.coverage_text import coverage_json, coverage_text
+from falsifier.views.analyses_text import coverage_json, coverage_text
 from tests.problems import mostly_broken
 
 TIMES = np.linspace(0.0, 10.0, 11)

@@ -1,9 +1,22 @@
 import json
+from pathlib import Path
 
+from falsifier.context.simulink import read_diagram
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.fmu import read_info
-from falsifier.views.model_text import info_json, info_text
+from falsifier.fmu import Connection, Coupling, Frame, System, read_info
+from falsifier.views.model_text import (
+    MOST_PORTS,
+    diagram,
+    diagram_text,
+    info_json,
+    info_text,
+    simulink_json,
+    simulink_text,
+)
+from tests.fixtures import simulink
+from tests.fmu.fixtures import path
 from tests.fmu.fixtures import path as fmu_path
+from tests.fmu.small_systems import LOOP, component, system
 
 
 def test_all_variables_of_a_large_model_have_a_line_each() -> None:
@@ -37,3 +50,67 @@ def test_without_outputs_all_variables_are_shown() -> None:
     text = info_text(read_info(fmu_path("NoOutputs_2dymola")))
     assert "\nother variables\n" in text
     assert "\ny  " in text
+
+
+def test_text_begins_with_the_size_and_json_has_everything(tmp_path: Path) -> None:
+    diagram = read_diagram(simulink.write_slx(tmp_path / "limphome.slx"))
+    assert simulink_text(diagram).startswith("21 blocks in 2 systems, 1 chart\nModel limphome")
+    found = json.loads(simulink_json(diagram))
+    assert found["root"]["blocks"][0]["name"] == "disagreement"
+    assert found["charts"][0]["states"][0]["name"] == "Normal"
+
+
+def test_the_text_says_order_ports_units_connections_and_what_is_late() -> None:
+    links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5, offset=-1.0, extrapolation="linear")}
+    model = system({"pi": component("Gain_2", 0.2), "plant": "Plant_2"}, links)
+    assert (
+        diagram_text(diagram(model))
+        == """\
+system: 2 components, in the order in which they step (gauss-seidel)
+
+ 1 plant  (Plant_2.fmu, co-simulation)
+     u [m]  <-  pi.y  (late)
+     y [m]  ->  pi.measured
+
+ 2 pi  (Gain_2.fmu, co-simulation, every 0.2 s)
+     r [m]         <-  not connected
+     measured [m]  <-  plant.y * 0.5 -1 (extrapolated)
+     y [m]         ->  plant.u
+
+(late): the value of the previous communication point"""
+    )
+
+
+def test_with_jacobi_all_connections_are_late_except_for_inputs_of_the_whole() -> None:
+    whole = Frame((Variable("s", causality="input", unit="m"),))
+    model = System(
+        {"a": path("Plant_2"), "b": path("Plant_2")},
+        {"a.u": "s", "b.u": "a.y"},
+        frame=whole,
+        coupling=Coupling("jacobi"),
+    )
+    text = diagram_text(diagram(model))
+    assert "input of the system: s -> a.u" in text and "u [m]  <-  s\n" in text
+    assert "u [m]  <-  a.y  (late)" in text
+
+
+def test_iterated_loops_are_named_and_one_component_has_no_order() -> None:
+    model = system({"plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
+    text = diagram_text(diagram(model))
+    assert "plant, pi: repeated until the outputs agree" in text and "late" not in text
+    single = diagram_text(diagram(system({"a": "Plant_2"}, {})))
+    assert single.startswith("system: 1 component (gauss-seidel)")
+
+
+def test_of_many_ports_the_connected_ones_are_shown() -> None:
+    from dataclasses import replace
+
+    model = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": "a.y"})
+    (first, second) = model.network.members
+    more = tuple(Variable(f"in{k}", causality="input") for k in range(MOST_PORTS + 3))
+    info = second.description.info
+    wide = replace(second.description, info=replace(info, variables=(*more, *info.variables)))
+    object.__setattr__(model.network, "members", (first, replace(second, description=wide)))
+    box = diagram(model).boxes[1]
+    assert len(box.inputs) == MOST_PORTS and box.inputs[0].name == "u" and box.left_out == 4
+    assert "... and 4 more that are not connected" in diagram_text(diagram(model))

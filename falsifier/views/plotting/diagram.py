@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from falsifier.views.diagram import Box, Diagram, Wire, loop_texts
+from falsifier.views.model_text import Box, SystemDiagram, Wire, loop_texts
 from falsifier.views.plotting.axes import caption, figure_of, own_axes
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ _MOST_INCHES = 200.0
 _WIRE, _LATE, _OPEN, _SPARE = "#1f5fa8", "#b8860b", "#a03030", "#999999"
 
 
-def plot_diagram(found: Diagram) -> "Figure":
+def plot_diagram(found: SystemDiagram) -> "Figure":
     """Draw the components and connections of a system.
 
     Wires to the next component go straight, wires to later ones above the boxes, wires back below them.
@@ -84,7 +84,9 @@ def _draw_box(ax: "Axes", box: Box, number: int, left: float, width: float) -> N
         ax.text(left + 0.3, -height + 0.5 * _ROW, more, va="center", fontsize=7, color="#555555")
 
 
-def _draw_wires(ax: "Axes", found: Diagram, ends: dict[str, tuple[float, float, int]], height: float) -> None:
+def _draw_wires(
+    ax: "Axes", found: SystemDiagram, ends: dict[str, tuple[float, float, int]], height: float
+) -> None:
     above = below = 0
     beside = [0] * len(found.boxes)
     for wire in found.wires:

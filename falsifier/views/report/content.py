@@ -26,7 +26,7 @@ from falsifier.search.levels import level_results
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.margins import is_on_limit, margin_words
 from falsifier.stl.monitor import Verdict
-from falsifier.views.coverage_text import tried_facts
+from falsifier.views.analyses_text import tried_facts
 from falsifier.views.plotting.panels import Panel, panels
 from falsifier.views.text import Fact
 

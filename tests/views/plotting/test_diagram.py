@@ -5,7 +5,7 @@ from itertools import pairwise
 from matplotlib.patches import Rectangle
 
 from falsifier.fmu import Component, Coupling
-from falsifier.views.diagram import diagram
+from falsifier.views.model_text import diagram
 from falsifier.views.plotting import plot_diagram
 from tests.fmu.small_systems import LOOP, component, solved, system
 

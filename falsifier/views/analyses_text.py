@@ -1,14 +1,20 @@
-"""What a run has tried, as a table for terminals or as JSON."""
+"""What a run has tried, and readings of a requirement, as text for terminals or as JSON."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from falsifier.analyses.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
+from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.analyses.range_parts import FAST, PACES, SLOW
 from falsifier.core.literals import one_line
+from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
-from falsifier.views.text import Fact
+from falsifier.problem.template_advice import Advice, hint
+from falsifier.stl.margins import margin_words, signed
+from falsifier.views.text import Fact, llm_use
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8
@@ -172,3 +178,138 @@ def _label(mode: ModeCoverage, value: int) -> str:
 
 def _named(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
+def formalized_text(found: Formalized) -> str:
+    """Return all readings, how they differ, and what the language model has cost."""
+    lines: list[str] = []
+    for number, reading in enumerate(found.readings, start=1):
+        lines += _reading_lines(number, reading)
+    for difference in found.differences:
+        lines += _difference_lines(difference)
+    lines += [f"rejected: {one_line(reason)}" for reason in found.rejected]
+    lines.append(f"language model: {llm_use(found.spent)}")
+    return "\n".join(lines)
+
+
+def formalized_json(found: Formalized) -> dict[str, Any]:
+    """Return the same as a JSON object."""
+    readings = [
+        {
+            "formula": str(r.formula),
+            "words": r.words,
+            "meaning": r.meaning,
+            "nominal_robustness": None if r.nominal is None else r.nominal.robustness,
+        }
+        for r in found.readings
+    ]
+    differences = [
+        {
+            "first": d.first,
+            "second": d.second,
+            "only_first": _points(d.only_first),
+            "only_second": _points(d.only_second),
+        }
+        for d in found.differences
+    ]
+    spent = {"calls": found.spent.calls, "tokens": found.spent.tokens, "cost": found.spent.cost}
+    return {
+        "sentence": found.sentence,
+        "readings": readings,
+        "differences": differences,
+        "rejected": list(found.rejected),
+        "spent": spent,
+    }
+
+
+def advice_text(sentence: str, advice: list[Advice]) -> str:
+    """Return which templates fit a sentence, how to write them, and what formulas cannot say."""
+    hints = [f"note: {said}"] if (said := hint(sentence)) else []
+    lines = []
+    for one in advice:
+        lines += [f"{one.template}: {one.summary}", *(f"  {line}" for line in one.section.splitlines())]
+    lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
+    return "\n".join([*lines, *hints])
+
+
+def advice_json(sentence: str, advice: list[Advice]) -> dict[str, Any]:
+    """Return the same as a JSON object."""
+    return {
+        "sentence": sentence.strip(),
+        "templates": [asdict(one) for one in advice],
+        "note": hint(sentence),
+    }
+
+
+def _reading_lines(number: int, reading: Reading) -> Iterator[str]:
+    yield f"{number}. {reading.formula}"
+    yield f"   in words   {reading.words}"
+    if reading.meaning:
+        yield f"   meant      {one_line(reading.meaning)}"
+    if reading.nominal is not None:
+        yield f"   nominal    {_nominal(reading)}"
+
+
+def _nominal(reading: Reading) -> str:
+    nominal = reading.nominal
+    if nominal is None or nominal.robustness is None:
+        return f"the simulation failed: {'' if nominal is None else one_line(nominal.reason)}"
+    return f"robustness {signed(nominal.robustness)} ({margin_words(nominal.robustness)})"
+
+
+def _difference_lines(difference: Difference) -> Iterator[str]:
+    one, other = difference.first, difference.second
+    if difference.only_first is None and difference.only_second is None:
+        yield f"{one} and {other}: no example was found that satisfies only one of them"
+    for number, rest, trajectory in (
+        (one, other, difference.only_first),
+        (other, one, difference.only_second),
+    ):
+        if trajectory is not None:
+            yield f"only {number}, not {rest}, is satisfied by (0 to {trajectory.times[-1]:g} s)"
+            yield from (f"   {line}" for line in trace_lines(trajectory))
+
+
+def _points(trajectory: Trajectory | None) -> dict[str, list[list[float]]] | None:
+    """Return the steps of each signal as [time, value]."""
+    if trajectory is None:
+        return None
+    return {
+        name: [
+            [float(trajectory.times[k]), float(column[k])]
+            for k in range(len(column))
+            if k == 0 or column[k] != column[k - 1]
+        ]
+        for name, column in trajectory.columns.items()
+    }
+
+
+_BARS = "▁▂▃▄▅▆▇█"
+_WIDTH = 48
+
+
+def trace_lines(trajectory: Trajectory, *, width: int = _WIDTH) -> list[str]:
+    """Return one line per signal: its name, its course over time, and its smallest and largest value."""
+    longest = max(map(len, trajectory.columns), default=0)
+    return [
+        f"{name:<{longest}}  {sparkline(column, width=width)}  {_span(column)}"
+        for name, column in trajectory.columns.items()
+    ]
+
+
+def sparkline(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], *, width: int = _WIDTH) -> str:
+    """Return a column as a line of bars, each the value in the middle of its part of the time.
+
+    >>> sparkline(np.array([0.0, 0.0, 1.0, 1.0]), width=4)
+    '▁▁██'
+    """
+    at = ((np.arange(width) + 0.5) * len(values) / width).astype(int)
+    shown = np.asarray(values)[at]
+    low, high = float(np.min(values)), float(np.max(values))
+    heights = np.zeros(width) if low == high else (shown - low) / (high - low)
+    return "".join(_BARS[round(h * (len(_BARS) - 1))] for h in heights)
+
+
+def _span(column: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    low, high = float(np.min(column)), float(np.max(column))
+    return f"constant {low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
