@@ -151,15 +151,15 @@ class _Loop:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
             RunStarted(
-                problems=tuple(t.problem for t in self.states),
-                engines=tuple(t.engine.name for t in self.states),
+                problems=tuple(state.problem for state in self.states),
+                engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
                 searched=self.levels[-1].space,
                 levels=self.levels if len(self.levels) > 1 else (),
                 replayed=self.steps.replayed,
             )
         )
-        while standing := [t for t in self.states if t.counterexample is None]:
+        while standing := [state for state in self.states if state.counterexample is None]:
             wanted = self.wanted(jobs, in_batches=in_batches)
             if not wanted:
                 self.settle(self.waiting.popleft(), standing)
@@ -252,7 +252,10 @@ class _Loop:
         evaluation = started.wait()
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.
         judges = standing if started.state in standing else [started.state, *standing]
-        judged = [(t, evaluation if t is started.state else judge(t.problem, evaluation)) for t in judges]
+        judged = [
+            (state, evaluation if state is started.state else judge(state.problem, evaluation))
+            for state in judges
+        ]
         self.note(started, evaluation, judged)
         for state, seen in judged:
             state.untold.append(seen)
@@ -309,7 +312,7 @@ class _Loop:
             if isinstance(state.engine, FollowsRun):
                 state.engine.doubt(confirmation)
         event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
-        if all(t.counterexample is not None for t in self.states):
+        if all(state.counterexample is not None for state in self.states):
             self.emit_last(event)
         else:
             self.emit(event)
