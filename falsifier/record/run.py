@@ -12,6 +12,7 @@ from falsifier.core.arguments import instance, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
+from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import AsksLLM, Engine
 from falsifier.engines.starting import KNOWN, Starting
@@ -23,8 +24,9 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal
+from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
 from falsifier.record.manifest import Manifest
+from falsifier.record.records import EvaluatedRecord
 from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
@@ -209,6 +211,7 @@ def resume(
 
     Raises:
         JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
+        SpecError: if the budget is less than what a run has spent.
     """
     if isinstance(problems, Problem | str) or not isinstance(problems, Sequence):
         raise SpecError(
@@ -227,7 +230,7 @@ def resume(
     for place, described in described_at.items():
         request = described.request
         if budget is not None:
-            request = request.model_copy(update={"budget": _changed(request.budget, budget)})
+            request = request.model_copy(update={"budget": _changed(request.budget, budget, place)})
         if not problems and not request.problems:
             raise JournalError(
                 f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
@@ -390,11 +393,18 @@ def _budget(given: Budget | int | None) -> Budget:
     return Budget(DEFAULT_SIMULATIONS if given is None else whole("budget", given, least=1))
 
 
-def _changed(budget: Budget, given: Budget | int) -> Budget:
-    """The limits of a run that is continued with others."""
-    if isinstance(given, Budget):
-        return given
-    return replace(budget, simulations=whole("budget", given, least=1))
+def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
+    """The limits of a run that is continued with others; what it has spent stays spent."""
+    if not isinstance(given, Budget):
+        given = replace(budget, simulations=whole("budget", given, least=1))
+    records = read_journal(place, with_candidates=False)
+    spent = sum(isinstance(record, EvaluatedRecord) for record in records)
+    if given.simulations is not None and given.simulations < spent:
+        raise SpecError(
+            f"{place}: this run has {counted(spent, 'simulation')} already, which count in the budget: give "
+            f"more than {given.simulations}"
+        )
+    return given
 
 
 def _settings(llm: LLM | None) -> LLMSettings | None:

@@ -149,6 +149,8 @@ class TestResume:
         assert [e.candidate.key for e in more.evaluations] == [e.candidate.key for e in whole.evaluations]
         (again,) = resume(tmp_path)
         assert again.spent.simulations == 7, "the new limit is that of the run"
+        with pytest.raises(SpecError, match="has 7 simulations already"):
+            resume(tmp_path, budget=6)
 
     def test_a_language_model_is_asked_only_for_what_a_larger_budget_adds(self, tmp_path: Path) -> None:
         def chat(*values: float) -> ScriptedChat:
