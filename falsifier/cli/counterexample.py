@@ -18,6 +18,7 @@ from falsifier.cli.options import (
     interface_option,
     json_option,
     out_option,
+    policy_options,
     requirement_option,
     run_argument,
 )
@@ -67,6 +68,7 @@ _MAP_SAMPLES, _MAP_POINTS = 256, 441
 @out_option(
     "File to write; default: shrunk.json, of a nearest miss shrunk.csv; with --map robustness-map.png."
 )
+@policy_options
 @json_option
 def explain(
     *,
@@ -80,6 +82,7 @@ def explain(
     requirement: str | None,
     out: Path | None,
     as_json: bool,
+    **rights: Any,
 ) -> None:
     """Say why a counterexample violates, simplify it, or map what is around it.
 
@@ -101,18 +104,19 @@ def explain(
         raise click.UsageError("--api-base requires --llm NAME")
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
-        _shrink(case, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
+        _shrink(case, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json, **rights)
     elif mapped:
-        _map(case, run, budget=budget or _MAP_SAMPLES + _MAP_POINTS, out=out, as_json=as_json)
+        _map(case, run, budget=budget or _MAP_SAMPLES + _MAP_POINTS, out=out, as_json=as_json, **rights)
     else:
-        _explain(case, run, llm=llm, api_base=api_base, as_json=as_json)
+        _explain(case, run, llm=llm, api_base=api_base, as_json=as_json, **rights)
 
 
 @command()
 @run_argument
 @interface_option("FMI interface through which it is simulated; default: that of the run.")
+@policy_options
 @json_option
-def replay(*, run: Path, interface: "Interface | None", as_json: bool) -> None:
+def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights: Any) -> None:
     """Simulate a counterexample again, even if the FMU or the requirement has changed since.
 
     RUN is a run directory or a counterexample file.
@@ -122,7 +126,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool) -> None:
     """
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
-    with _loaded(case) as problem:
+    with _loaded(case, rights) as problem:
         own = getattr(problem.model, "interface", None)
         judged = problem if interface in (None, own) else other_interface(problem)
         replayed = replay_stored(case.stored, judged)
@@ -142,7 +146,8 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool) -> None:
     metavar="DIR",
     help="Only keep the counterexample in this folder of counterexamples, for pytest --falsifier.",
 )
-def export(*, run: Path, out: Path | None, store: Path | None) -> None:
+@policy_options
+def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) -> None:
     """Write a counterexample for FMPy, fmusim, OpenModelica, Simulink and pytest.
 
     RUN is a run directory or a counterexample file.
@@ -151,7 +156,7 @@ def export(*, run: Path, out: Path | None, store: Path | None) -> None:
 
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
-    with _loaded(case) as problem:
+    with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         if store is not None:
             say(str(Database(store).save(problem, case.stored)))
@@ -181,7 +186,9 @@ def _check_parts(*, shrunk: bool, mapped: bool, **groups: Mapping[str, object]) 
             raise click.UsageError(f"{', '.join(given)}: {reasons[group]}")
 
 
-def _shrink(case: Case, *, budget: int, at_most: float | None, out: Path | None, as_json: bool) -> None:
+def _shrink(
+    case: Case, *, budget: int, at_most: float | None, out: Path | None, as_json: bool, **rights: Any
+) -> None:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
     from falsifier.counterexamples.shrink import shrink
 
@@ -189,7 +196,7 @@ def _shrink(case: Case, *, budget: int, at_most: float | None, out: Path | None,
     file = case.beside("shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
     begins = b'"time"' if case.is_miss else b'{\n  "format"'
     check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.place)
-    with _loaded(case) as problem:
+    with _loaded(case, rights) as problem:
         shrunk = shrink(
             problem,
             case.simulated(problem),
@@ -250,7 +257,9 @@ def _shrunk_line(problem: Problem, shrunk: "Shrunk", budget: int) -> str:
     return f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}"
 
 
-def _explain(case: Case, run: Path, *, llm: str | None, api_base: str | None, as_json: bool) -> None:
+def _explain(
+    case: Case, run: Path, *, llm: str | None, api_base: str | None, as_json: bool, **rights: Any
+) -> None:
     """Print what broke, and what resetting each input alone comes to."""
     from falsifier.counterexamples.explain import explain, narrate
 
@@ -261,7 +270,7 @@ def _explain(case: Case, run: Path, *, llm: str | None, api_base: str | None, as
         name, effort = name_and_effort(llm)
         chat = connect(name, effort=effort, api_base=api_base)
     picture = None
-    with _loaded(case) as problem:
+    with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         explanation = explain(problem, evaluation)
         if case.is_miss:
@@ -284,13 +293,13 @@ def _explain(case: Case, run: Path, *, llm: str | None, api_base: str | None, as
         say(f"picture: {picture}")
 
 
-def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool) -> None:
+def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool, **rights: Any) -> None:
     """Draw the robustness around it."""
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
     points = isqrt(budget * _MAP_POINTS // (_MAP_SAMPLES + _MAP_POINTS))
-    with _loaded(case) as problem:
+    with _loaded(case, rights) as problem:
         found = robustness_map(
             problem, case.simulated(problem), samples=budget - points * points, points=points
         )
@@ -325,11 +334,13 @@ def _say_about(case: Case, problem: Problem, named: Path) -> None:
 
 
 @contextmanager
-def _loaded(case: Case) -> Iterator[Problem]:
+def _loaded(case: Case, rights: Mapping[str, Any]) -> Iterator[Problem]:
     """Load the problem, say what its FMU may do, and close the model at the end."""
-    problem = case.problem()
+    problem, withheld = case.problem(allow=rights["allow"], deny=rights["deny"])
     for note in rights_notes(problem.model):
         warn(note)
+    if withheld:
+        warn(f"not allowed, as it was not when this was recorded: {', '.join(withheld)}; --allow grants it")
     try:
         yield problem
     finally:

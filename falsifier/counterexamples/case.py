@@ -1,5 +1,6 @@
 """What commands on a run or file are about: a counterexample; of a run without one, the nearest miss."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from falsifier.counterexamples.store import (
     counterexample_file,
     file_of,
     keep_recorded,
+    limited,
     load,
     problem_of,
     shrunk_file,
@@ -41,6 +43,8 @@ class Case:
         stored: content of the counterexample's file; None for a nearest miss.
         suffix: what names of files beside it end in, if the run searched several requirements.
         simulations: number of simulations of the run that were judged; 0 for a counterexample.
+        allow: what the FMU was allowed then; None if that is not recorded.
+        deny: what it was denied then.
     """
 
     place: Path
@@ -51,6 +55,8 @@ class Case:
     stored: StoredCounterexample | None = None
     suffix: str = ""
     simulations: int = 0
+    allow: tuple[str, ...] | None = None
+    deny: tuple[str, ...] = ()
 
     @property
     def is_miss(self) -> bool:
@@ -78,20 +84,29 @@ class Case:
         file = Path(name)
         return self.place / f"{file.stem}{self.suffix}{file.suffix}"
 
-    def problem(self) -> Problem:
-        """Load the problem.
+    def problem(
+        self, *, allow: Iterable[str] = (), deny: Iterable[str] = ()
+    ) -> tuple[Problem, tuple[str, ...]]:
+        """Load the problem; its FMU gets no more rights than it had then, and those that are given here.
+
+        Args:
+            allow: what the user allows now.
+            deny: what the user denies now.
+
+        Returns:
+            The problem, and the rights that the spec gives now but did not give then, which are withheld.
 
         Raises:
             SpecError: if it was made in Python, or can no longer be loaded.
         """
-        if self.stored is not None:
-            return problem_of(self.stored)
+        if self.source is None and self.stored is not None:
+            problem_of(self.stored)  # which says what to do
         if self.source is None:
             raise SpecError(
                 f"{self.place}: the problem of this run was made in Python: call simulate() and "
                 "explain() there"
             )
-        return load_source(self.source)
+        return limited(load_source(self.source), self.allow, (*self.deny, *deny), granted=allow)
 
     def simulated(self, problem: Problem) -> Evaluation:
         """Simulate it again, for its trajectory.
@@ -127,7 +142,16 @@ def counterexample_case(place: Path) -> Case:
     file = counterexample_file(place)
     stored = load(file)
     candidate = Candidate.from_json(stored.candidate)
-    return Case(file, stored.requirement, stored.problem, candidate, stored.robustness, stored)
+    return Case(
+        file,
+        stored.requirement,
+        stored.problem,
+        candidate,
+        stored.robustness,
+        stored,
+        allow=stored.allow,
+        deny=stored.deny,
+    )
 
 
 def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Case:
@@ -174,7 +198,17 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     robustness, candidate = min(misses, key=lambda pair: pair[0])
     source = described.of(name).request.source
     suffix = f"-{file_name(name)}" if described.shared else ""
-    return Case(directory, name, source, candidate, robustness, None, suffix, len(judged))
+    return Case(
+        directory,
+        name,
+        source,
+        candidate,
+        robustness,
+        suffix=suffix,
+        simulations=len(judged),
+        allow=described.allow,
+        deny=described.deny,
+    )
 
 
 def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:

@@ -9,8 +9,8 @@ so that it can be replayed after the FMU or the requirement has changed.
 """
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
@@ -24,7 +24,7 @@ from falsifier.core.files import check_seal, file_name, seal, write_whole
 from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.fmu import fmu_files, fmus_sha256
+from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, resolved
 from falsifier.problem.loading import load_source, reloadable, spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource, Target
@@ -72,6 +72,10 @@ class StoredCounterexample(BaseModel):
     outcome: Outcome
     reason: str
     fmu_sha256: str | None = None
+    allow: tuple[str, ...] | None = Field(
+        None, description="What the FMU was allowed, paths relative to this file; null: as the spec says."
+    )
+    deny: tuple[str, ...] = Field((), description="What it was denied.")
     falsifier: str = __version__
     sum: str = Field("", description="Checksum of the file up to here; without it, nothing is checked.")
 
@@ -111,6 +115,8 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
         outcome=confirmation.outcome,
         reason=confirmation.reason,
         fmu_sha256=fmus_sha256(fmu_files(problem.model).values()),
+        allow=tuple(getattr(problem.model, "allow", ())),
+        deny=tuple(getattr(problem.model, "deny", ())),
     )
 
 
@@ -123,6 +129,8 @@ def _content(
     outcome: Outcome,
     reason: str,
     fmu_sha256: str | None,
+    allow: tuple[str, ...],
+    deny: tuple[str, ...],
 ) -> StoredCounterexample:
     return StoredCounterexample(
         requirement=requirement.name,
@@ -136,13 +144,16 @@ def _content(
         outcome=outcome,
         reason=reason,
         fmu_sha256=fmu_sha256,
+        allow=allow,
+        deny=deny,
     )
 
 
 def save(stored: StoredCounterexample, path: Path) -> Path:
     """Write a counterexample file atomically, with the problem's paths relative to it; return its path."""
     request = stored.problem and _seen_from(stored.problem, path.parent)
-    content = stored.model_copy(update={"problem": request}).model_dump(mode="json")
+    allow = stored.allow and tuple(_seen_right(word, path.parent) for word in stored.allow)
+    content = stored.model_copy(update={"problem": request, "allow": allow}).model_dump(mode="json")
     del content["sum"]
     return write_whole(path, seal(json.dumps(content, indent=2)))
 
@@ -174,7 +185,8 @@ def load(path: Path | str) -> StoredCounterexample:
             f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
         ) from None
     found = stored.problem and _found_from(stored.problem, file.parent)
-    return stored.model_copy(update={"problem": found, "sum": ""})
+    allow = stored.allow and resolved(stored.allow, file.parent)
+    return stored.model_copy(update={"problem": found, "allow": allow, "sum": ""})
 
 
 def counterexample_file(path: Path) -> Path:
@@ -267,12 +279,14 @@ def keep_recorded(directory: Path) -> None:
             outcome="confirmed",
             reason=record.reason,
             fmu_sha256=described.fmu_sha256,
+            allow=described.allow,
+            deny=described.deny,
         )
         save(content, file)
 
 
 def problem_of(stored: StoredCounterexample) -> Problem:
-    """Load the problem of a counterexample.
+    """Load the problem of a counterexample; its FMU gets no rights that it had not when it was found.
 
     Raises:
         SpecError: if the problem was made in Python, or its spec can no longer be loaded.
@@ -282,7 +296,30 @@ def problem_of(stored: StoredCounterexample) -> Problem:
             f"the problem of this counterexample of {stored.requirement} was made in Python: run the script "
             "or test that found it"
         )
-    return load_source(stored.problem)
+    return limited(load_source(stored.problem), stored.allow, stored.deny)[0]
+
+
+def limited(
+    problem: Problem, allow: Collection[str] | None, deny: Iterable[str], *, granted: Iterable[str] = ()
+) -> tuple[Problem, tuple[str, ...]]:
+    """Return the problem with no more rights of its FMU than were recorded, and those that are withheld.
+
+    Whoever is handed a counterexample may not read what a spec has come to allow since.
+
+    Args:
+        problem: the problem, with the rights that its spec gives now.
+        allow: what was allowed when it was recorded; None: not recorded, nothing is withheld.
+        deny: what was denied then, which stays denied.
+        granted: what the user allows now; paths begin in the current folder.
+    """
+    model = problem.model
+    if not isinstance(model, FmuModel | System):
+        return problem, ()
+    given = resolved(granted, Path())
+    kept = tuple(word for word in model.allow if allow is None or word in allow)
+    withheld = tuple(word for word in model.allow if word not in (*kept, *given))
+    allowed, denied = dict.fromkeys((*kept, *given)), dict.fromkeys((*model.deny, *deny))
+    return replace(problem, model=replace(model, allow=tuple(allowed), deny=tuple(denied))), withheld
 
 
 def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
@@ -354,6 +391,12 @@ def _split(target: str) -> tuple[Path | None, str]:
     if not parts.file:
         return None, ""
     return Path(parts.file), f":{parts.requirement}" if parts.requirement else ""
+
+
+def _seen_right(word: str, folder: Path) -> str:
+    """Return what is allowed with its path, if it has one, relative to a folder."""
+    kind, colon, path = word.partition(":")
+    return f"{kind}:{Path(relpath(path, folder.resolve())).as_posix()}" if colon else word
 
 
 def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:

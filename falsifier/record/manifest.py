@@ -108,6 +108,8 @@ class Manifest(_Strict):
     )
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
+    allow: tuple[str, ...] = Field((), description="What the FMU was allowed beyond its own folders.")
+    deny: tuple[str, ...] = Field((), description="What it was denied.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
     contexts: dict[str, Context] = Field(
         {}, description="What the language model was told of context files, by requirement."
@@ -190,6 +192,8 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         not_searched=problem.held,
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
+        allow=tuple(getattr(problem.model, "allow", ())),
+        deny=tuple(getattr(problem.model, "deny", ())),
         hashes=file_hashes(problem),
         contexts={p.name: p.context for p in problems if p.context != Context()},
     )

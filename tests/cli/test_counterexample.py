@@ -56,6 +56,22 @@ def test_what_an_fmu_may_do_is_kept_and_said(tmp_path: Path) -> None:
         assert "may also: programs" in done.err and "may not use: network" in done.err
 
 
+def test_a_spec_that_allows_more_than_the_run_had_gives_a_replay_no_more(tmp_path: Path) -> None:
+    fmu, text = bundled("fmus") / "AT.fmu", (bundled("specs") / "AT.toml").read_text()
+    spec, allowed = tmp_path / "my.toml", f'"write:{tmp_path}", "programs"'
+    spec.write_text(text.replace("../fmus/AT.fmu", fmu.as_posix()))
+    assert run(tmp_path, "run", "my.toml:AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
+    spec.write_text(spec.read_text().replace("[model]", f"[model]\nallow = [{allowed}]"))
+    done = run(tmp_path, "replay", "run")
+    assert done.code == 1 and "may also" not in done.err
+    assert (
+        f"not allowed, as it was not when this was recorded: write:{tmp_path}, programs; --allow" in done.err
+    )
+    given = run(tmp_path, "replay", "run", "--allow", "programs", "--deny", "network")
+    assert "may also: programs\n" in given.err and "may not use: network" in given.err
+    assert f"recorded: write:{tmp_path}; --allow grants it" in given.err
+
+
 def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     done = run(folder, "explain", "run", "--shrink", "--json")
     assert done.code == 0, done.err

@@ -99,7 +99,7 @@ def test_the_record_says_what_the_levels_were(tmp_path: Path) -> None:
         (6, "fixed parameterization: u (12 control points, constant)"),
     ]
     miss = nearest_miss(tmp_path)
-    assert miss.simulated(miss.problem()).robustness == pytest.approx(miss.robustness)
+    assert miss.simulated(miss.problem()[0]).robustness == pytest.approx(miss.robustness)
 
 
 def test_requirements_that_share_a_search_share_its_levels() -> None:

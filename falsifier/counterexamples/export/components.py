@@ -82,7 +82,7 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
             files.append(write_csv(seen.inputs, folder / "input.csv", model))
         if seen.outputs.columns:
             files.append(write_csv(seen.outputs, folder / "outputs.csv", model))
-        text = _spec(member, seen, problem.experiment.tolerance)
+        text = _spec(member, seen, problem)
         if text:
             files.append(folder / f"{file_name(member.name)}.toml")
             files[-1].write_text(text, encoding="utf-8")
@@ -211,8 +211,8 @@ class _Reader:
         return 0 if source < target or iterates else 1
 
 
-def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
-    """Return a spec of the FMU alone; empty if it has no inputs or no outputs to compare."""
+def _spec(member: Member, seen: Seen, problem: Problem) -> str:
+    """Return a spec of the FMU alone, with the system's rights; empty without inputs or outputs."""
     if not seen.outputs.columns or not len(seen.inputs.times):
         return ""
     document = tomlkit.document()
@@ -225,7 +225,9 @@ def _spec(member: Member, seen: Seen, tolerance: float | None) -> str:
         "interface": member.interface,
         "stop_time": float(seen.outputs.times[-1]),
         "output_interval": seen.step,
-        "tolerance": tolerance,
+        "tolerance": problem.experiment.tolerance,
+        "allow": list(getattr(problem.model, "allow", ())) or None,
+        "deny": list(getattr(problem.model, "deny", ())) or None,
     }
     document["model"] = {key: value for key, value in model.items() if value is not None}
     document["inputs"] = dict(_inputs(member, seen))

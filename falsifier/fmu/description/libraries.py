@@ -154,7 +154,7 @@ def windows_text() -> str:
     """Say that an FMU runs through Wine, and whether it is installed."""
     found = find_wine()
     state = f"found as {found}" if found else f"which is missing: {HOW_TO_INSTALL}"
-    return f"win64 only: runs through Wine, {state}"
+    return f"win64 only: runs through Wine, {state}; there it can execute programs, allowed or not"
 
 
 def windows_path(path: Path) -> str:
