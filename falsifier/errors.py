@@ -7,7 +7,8 @@ failed.
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, Literal
 
 # Maximum number of characters of a rejected value in a message.
@@ -54,7 +55,25 @@ class SpecError(FalsifierError):
         file, key = (part and " ".join(part.splitlines()) for part in (file, key))
         self.file = file
         self.key = key
+        self.message = message
         super().__init__(": ".join(part for part in (file, key, message) if part))
+
+
+@contextmanager
+def in_section(file: str | None = None, key: str | None = None) -> Iterator[None]:
+    """Complete errors raised within, which name only keys of this section and no file.
+
+    Args:
+        file: the spec file; None if something around knows it.
+        key: the section's key.
+    """
+    try:
+        yield
+    except SpecError as error:
+        if error.file is not None:
+            raise
+        keys = ".".join(part for part in (key, error.key) if part)
+        raise SpecError(error.message, file=file, key=keys or None) from None
 
 
 class FormulaError(FalsifierError):

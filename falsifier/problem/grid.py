@@ -65,8 +65,8 @@ def choose_grid(
         SpecError: if only a very fine grid fits, or a step is far too short for the stop time.
     """
     # Otherwise the search below for a round interval would take minutes.
-    check_steps(stop_time, fmu_step or None, file="", key="model.output_interval")
-    check_steps(stop_time, step_size, file="", key="model.step_size")
+    check_steps(stop_time, fmu_step or None, key="model.output_interval")
+    check_steps(stop_time, step_size, key="model.step_size")
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
@@ -168,7 +168,7 @@ def _text(seconds: Fraction) -> str:
     return f"{float(seconds):.6g}"
 
 
-def check_steps(stop_time: float, period: float | None, *, file: str, key: str) -> None:
+def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
     """Check that a period in s divides the stop time into no more than MAX_STEPS steps.
 
     Raises:
@@ -178,20 +178,19 @@ def check_steps(stop_time: float, period: float | None, *, file: str, key: str) 
         raise SpecError(
             f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:g} s; "
             f"the smallest value is {stop_time / MAX_STEPS:g}",
-            file=file,
             key=key,
         )
 
 
-def check_sizes(experiment: Experiment, space: SearchSpace, file: str) -> None:
+def check_sizes(experiment: Experiment, space: SearchSpace) -> None:
     """Check the steps of the solver and of inputs that are sampled and held.
 
     Raises:
         SpecError: naming the key and the smallest period.
     """
-    check_steps(experiment.stop_time, experiment.step_size, file=file, key="model.step_size")
+    check_steps(experiment.stop_time, experiment.step_size, key="model.step_size")
     for r in space.inputs:
-        check_steps(experiment.stop_time, r.hold, file=file, key=f"inputs.{r.name}.hold")
+        check_steps(experiment.stop_time, r.hold, key=f"inputs.{r.name}.hold")
 
 
 def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:

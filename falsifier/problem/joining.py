@@ -7,10 +7,10 @@ from typing import Any
 
 from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
 from falsifier.core.space import SearchSpace
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_sizes, check_steps, choose_grid, default_freedom, formula_times
-from falsifier.problem.models import check_own_steps, default_interface, make_model
+from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import (
     DEFAULT_POINTS,
     search_space,
@@ -66,46 +66,49 @@ def join(
         SpecError: naming the file, the key and the remedy.
         ModelError: if the FMU cannot be read or simulated.
     """
-    file = str(path)
-    if requirement not in spec.requirements:
-        raise SpecError(
-            f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}", file=file
+    with in_section(str(path)):
+        if requirement not in spec.requirements:
+            raise SpecError(f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}")
+        if profile is not None and profile not in spec.profiles:
+            raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}")
+        layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
+        model = model or make_model(spec, layers, path)
+        info = model.info
+        if changes is not None:
+            changes = placed(changes, info)
+            layers[-1] = changes
+        experiment, grid = _experiment(
+            spec, layers, info, lambda stop: spec_formulas(spec, stop) if stl is None else [stl]
         )
-    if profile is not None and profile not in spec.profiles:
-        raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}", file=file)
-    layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-    model = model or make_model(spec, layers, path)
-    if changes is not None:
-        changes = placed(changes, model.info, file)
-        layers[-1] = changes
-    experiment, grid = _experiment(
-        spec, layers, model.info, lambda stop: spec_formulas(spec, stop) if stl is None else [stl], file
-    )
-    check_own_steps(model, experiment, file)
-    inputs, parameters = _merged(spec, layers)
-    formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
-    inputs |= _with_points(inputs, changes, formulas, experiment)
-    space, fixed = search_space(inputs, parameters, model.info, experiment.stop_time, file)
-    if searches:
-        _check_searched(space, inputs, model.info, file)
-    check_sizes(experiment, space, file)
-    known = {*space.names, *fixed, *(v.name for v in model.info.inputs if isinstance(v.start, int | float))}
-    section = spec.requirements[requirement]
-    is_option = stl is not None or path.suffix in MODEL_FILES
-    stated_by = "formula" if isinstance(section, RequirementSection) else "template"
-    key = "--stl" if is_option else f"requirements.{requirement}.{stated_by}"
-    text = expanded(spec, requirement, model.info, experiment, file) if stl is None else stl
-    formula = parse_requirement(text, model.info, experiment, file=file, key=key)
-    experiment = replace(experiment, strings=string_values(parameters, model.info, path.parent))
-    recorded = [*spec.model.record, *formula.signals]
-    return Joined(
-        model,
-        Requirement(requirement if stl is None else stl_name, formula, "" if stl else section.description),
-        space,
-        _recording(experiment, model.info, recorded, known, file),
-        fixed,
-        (*model.info.notes, *_notes(grid, model)),
-    )
+        if isinstance(model, System):
+            model.check_steps(experiment)
+        inputs, parameters = _merged(spec, layers)
+        formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
+        inputs |= _with_points(inputs, changes, formulas, experiment)
+        space, fixed = search_space(inputs, parameters, info, experiment.stop_time)
+        if searches:
+            _check_searched(space, inputs, info, is_spec=path.suffix not in MODEL_FILES)
+        check_sizes(experiment, space)
+        section, key = spec.requirements[requirement], f"requirements.{requirement}"
+        if stl is None:
+            with in_section(key=key):
+                text = expanded(section, info, experiment)
+        is_option = stl is not None or path.suffix in MODEL_FILES
+        stated_by = "formula" if isinstance(section, RequirementSection) else "template"
+        with in_section(key="--stl" if is_option else f"{key}.{stated_by}"):
+            formula = parse_requirement(text if stl is None else stl, info, experiment)
+        known = {*space.names, *fixed, *(v.name for v in info.inputs if isinstance(v.start, int | float))}
+        experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
+        return Joined(
+            model,
+            Requirement(
+                requirement if stl is None else stl_name, formula, "" if stl else section.description
+            ),
+            space,
+            _recording(experiment, info, [*spec.model.record, *formula.signals], known),
+            fixed,
+            (*info.notes, *_notes(grid, model)),
+        )
 
 
 def join_formula(
@@ -151,7 +154,8 @@ def join_formula(
         info = model.info
         system = replace(model, allow=(*model.allow, *changes.allow), deny=(*model.deny, *changes.deny))
         data = {"model": {}, "components": {n: {"fmu": str(part.fmu)} for n, part in model.parts.items()}}
-    changes = placed(changes, info, str(path))
+    with in_section(str(path)):
+        changes = placed(changes, info)
     data["model"]["stop_time"] = changes.stop_time or info.stop_time
     if data["model"]["stop_time"] is None:
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
@@ -176,7 +180,6 @@ def _experiment(
     layers: Iterable[ModelChanges],
     info: ModelInfo,
     formulas_of: Callable[[float], Iterable[str]],
-    file: str,
 ) -> tuple[Experiment, Grid | None]:
     """Return the experiment without outputs, and its grid if nobody stated the interval.
 
@@ -192,24 +195,21 @@ def _experiment(
 
     stop_time = stated("stop_time") or info.stop_time
     if stop_time is None:
-        raise SpecError(
-            f"the {info.noun} has no default stop time; add this key", file=file, key="model.stop_time"
-        )
+        raise SpecError(f"the {info.noun} has no default stop time; add this key", key="model.stop_time")
     output_interval, step_size = stated("output_interval"), stated("step_size")
     formulas = formulas_of(stop_time)
     grid = None
     if output_interval is None:
         # All formulas of a spec, so that its requirements can share a search.
-        grid = _grid(stop_time, formula_times(formulas), info, step_size, file)
+        grid = _grid(stop_time, formula_times(formulas), info, step_size)
         output_interval = grid.interval
-    check_steps(stop_time, output_interval, file=file, key="model.output_interval")
+    check_steps(stop_time, output_interval, key="model.output_interval")
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
-        fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None, file)
+        fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None)
         raise SpecError(
             f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
             f"try {fits.interval:.12g}",
-            file=file,
             key="model.output_interval",
         )
     experiment = Experiment(
@@ -223,13 +223,8 @@ def _experiment(
     return experiment, grid
 
 
-def _grid(
-    stop_time: float, times: Iterable[float], info: ModelInfo, step_size: float | None, file: str
-) -> Grid:
-    try:
-        return choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
-    except SpecError as error:
-        raise SpecError(str(error), file=file) from None
+def _grid(stop_time: float, times: Iterable[float], info: ModelInfo, step_size: float | None) -> Grid:
+    return choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
 
 
 def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
@@ -246,7 +241,7 @@ def rights_notes(model: Model) -> Iterator[str]:
 
 
 def _recording(
-    experiment: Experiment, info: ModelInfo, extra: Iterable[str], known: Collection[str], file: str
+    experiment: Experiment, info: ModelInfo, extra: Iterable[str], known: Collection[str]
 ) -> Experiment:
     """Return the experiment that records all outputs and those extra variables whose values are unknown."""
     outputs = [v.name for v in info.outputs if v.kind != "string"]
@@ -255,9 +250,7 @@ def _recording(
     for name in extra:
         if name not in info:
             names = [v.name for v in info.variables]
-            raise SpecError(
-                f"unknown variable {name!r}; {did_you_mean(name, names)}", file=file, key="model.record"
-            )
+            raise SpecError(f"unknown variable {name!r}; {did_you_mean(name, names)}", key="model.record")
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     return replace(experiment, outputs=tuple(outputs))
@@ -297,20 +290,19 @@ def _with_points(
 
 
 def _check_searched(
-    space: SearchSpace, inputs: Mapping[str, InputSection], info: ModelInfo, file: str
+    space: SearchSpace, inputs: Mapping[str, InputSection], info: ModelInfo, *, is_spec: bool
 ) -> None:
     if space.names:
         return
-    if file.endswith(MODEL_FILES):  # there is no spec file
-        raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}", file=file)
+    if not is_spec:
+        raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}")
     raise SpecError(
         "nothing to search; add [inputs.NAME] with range and control_points, or [parameters.NAME] with range",
-        file=file,
         key="inputs",
     )
 
 
-def placed(changes: ModelChanges, info: ModelInfo, file: str) -> ModelChanges:
+def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
     """Return the changes with each name where the model has it: options do not say what is an input.
 
     Raises:
@@ -326,17 +318,16 @@ def placed(changes: ModelChanges, info: ModelInfo, file: str) -> ModelChanges:
             names = [v.name for v in info.variables if v.settable or v.causality == "input"]
             raise SpecError(
                 f"the {info.noun} has no input, parameter or start value {name!r}; "
-                f"{did_you_mean(name, names)}",
-                file=file,
+                f"{did_you_mean(name, names)}"
             )
         stated = section.model_dump(exclude_unset=True)
         if info[name].causality == "input":
             if isinstance(section.value, str):
-                raise SpecError(f"{name}: expected a number, got {section.value!r}", file=file)
+                raise SpecError(f"{name}: expected a number, got {section.value!r}")
             inputs[name] = InputSection.model_validate(stated)
         elif not stated.keys() <= {"range", "value"} or not stated:
             raise SpecError(
-                f"{name} is no input: --search {name}=LOW:HIGH searches it, without control points", file=file
+                f"{name} is no input: --search {name}=LOW:HIGH searches it, without control points"
             )
         else:
             parameters[name] = ParameterSection.model_validate(stated)

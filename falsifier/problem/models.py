@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo
+from falsifier.core.model import Interface, Model, ModelInfo
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import (
     Component,
@@ -38,10 +38,10 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     logging = stated[-1] if stated else spec.model.logging
     allow, deny = rights_of(path, layers, spec.model)
     if is_system(spec):
-        _check_interface(spec, layers, str(path))
+        _check_interface(spec, layers)
         return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
     fmu = _existing(path, spec.model.fmu or "", "model.fmu")
-    interface = _interface(spec, layers, read_info(fmu), str(path))
+    interface = _interface(spec, layers, read_info(fmu))
     return FmuModel(fmu, interface=interface, logging=logging, allow=allow, deny=deny)
 
 
@@ -108,19 +108,6 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         raise SpecError(str(error), file=str(path)) from None
 
 
-def check_own_steps(model: Model, experiment: Experiment, file: str) -> None:
-    """Check that the steps of a system's components fit the experiment.
-
-    Raises:
-        SpecError: naming the component and steps that fit.
-    """
-    if isinstance(model, System):
-        try:
-            model.check_steps(experiment)
-        except SpecError as error:
-            raise SpecError(str(error), file=file) from None
-
-
 def _single(path: Path, fmu: str, key: str) -> Path:
     if is_package(fmu):
         raise SpecError(
@@ -140,13 +127,12 @@ def _existing(path: Path, fmu: str, key: str) -> Path:
     return found
 
 
-def _check_interface(spec: Spec, layers: Sequence[ModelChanges], file: str) -> None:
+def _check_interface(spec: Spec, layers: Sequence[ModelChanges]) -> None:
     stated = [spec.model.interface, *(layer.interface for layer in layers)]
     if "model-exchange" in stated:
         raise SpecError(
             "components of a system have interfaces of their own; set components.NAME.interface and remove "
             "this key",
-            file=file,
             key="model.interface",
         )
 
@@ -158,7 +144,7 @@ def default_interface(info: ModelInfo) -> Interface | None:
     return info.interfaces[0] if info.interfaces else None
 
 
-def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file: str) -> Interface:
+def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo) -> Interface:
     stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
     if not info.interfaces:
         raise ModelError(
@@ -170,5 +156,5 @@ def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo, file
     offered = " and ".join(info.interfaces)
     if stated is None or stated not in info.interfaces:
         advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
-        raise SpecError(f"the FMU offers {offered}{advice}", file=file, key="model.interface")
+        raise SpecError(f"the FMU offers {offered}{advice}", key="model.interface")
     return stated

@@ -8,7 +8,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import NAME_IN_LINES, Spec
+from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement, Spec
 from falsifier.problem.template_arguments import TemplateError
 from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
@@ -56,14 +56,12 @@ class Requirement:
         return f"Requirement({self.name!r}, {str(self.formula)!r}{description})"
 
 
-def parse_requirement(
-    text: str, info: ModelInfo, experiment: Experiment, *, file: str | None = None, key: str | None = None
-) -> Formula:
+def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> Formula:
     """Parse a formula and check its signals and windows against a model and an experiment.
 
     Raises:
-        SpecError: naming the file and key, and the position of a syntax error, the unknown signal, or the
-            window that extends past the stop time.
+        SpecError: naming the position of a syntax error, the unknown signal, or the window that extends past
+            the stop time.
     """
     try:
         formula = parse(text)
@@ -77,13 +75,13 @@ def parse_requirement(
         # One input has one name, whose values are known at every sample without asking the model.
         formula = renamed(formula, _input_names(info, formula))
     except FormulaError as error:
-        raise SpecError(str(error), file=file, key=key) from None
+        raise SpecError(str(error)) from None
     try:
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
         fits = fitting_interval(formula, experiment.stop_time, experiment.output_interval)
         advice = "" if fits is None else f"; output_interval = {fits:.12g} fits all times"
-        raise SpecError(f"{error}{advice}", file=file, key=key) from None
+        raise SpecError(f"{error}{advice}") from None
     return formula
 
 
@@ -96,13 +94,12 @@ def spec_formulas(spec: Spec, stop_time: float) -> list[str]:
     return found
 
 
-def expanded(spec: Spec, requirement: str, info: ModelInfo, experiment: Experiment, file: str) -> str:
+def expanded(section: AnyRequirement, info: ModelInfo, experiment: Experiment) -> str:
     """Return the text of a requirement's formula.
 
     Raises:
         SpecError: naming the argument of a template that names an unknown signal or does not fit.
     """
-    section, key = spec.requirements[requirement], f"requirements.{requirement}"
     for argument, name in section.signals():
         if name not in info:
             message = f"unknown signal {name!r}; {similar(name, info)}"
@@ -111,11 +108,11 @@ def expanded(spec: Spec, requirement: str, info: ModelInfo, experiment: Experime
                     f"the model has no {name}: state rate, the signal that is this rate of change; or over, "
                     "a time in s, and range, [low, high]"
                 )
-            raise SpecError(message, file=file, key=f"{key}.{argument}")
+            raise SpecError(message, key=argument)
     try:
         return section.expanded(experiment.stop_time, experiment.output_interval)
     except TemplateError as error:
-        raise SpecError(str(error), file=file, key=f"{key}.{error.key}") from None
+        raise SpecError(str(error), key=error.key) from None
 
 
 def similar(name: str, info: ModelInfo) -> str:
