@@ -37,7 +37,7 @@ from falsifier.record.trajectory_files import save_trajectory
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.loop import search
 from falsifier.search.request import RunRequest
-from falsifier.search.steps import Live
+from falsifier.search.steps import Steps
 from falsifier.views.report import html_report
 
 SIMULATIONS = 1000
@@ -74,7 +74,7 @@ def overhead(target: str, directory: Path) -> str:
     engine, executor = TimedEngine(make_engine("uniform", problem, seed=0)), TimedExecutor()
     with open_journal(directory, keep=request.keep) as journal:
         started = perf_counter()
-        steps = Live(executor)
+        steps = Steps(executor)
         (result,) = search([problem], [engine], request.budget, steps=steps, listeners=[journal])
         whole = perf_counter() - started
     problem.model.close()

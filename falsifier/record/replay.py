@@ -6,7 +6,7 @@ valid reply that ended a run is asked again; it stays paid for.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
@@ -31,32 +31,22 @@ from falsifier.search.budget import Spent
 from falsifier.search.steps import Steps, proposals
 
 
-@dataclass(slots=True)
-class Replayed:
+@dataclass(kw_only=True)
+class Replayed(Steps):
     """The steps that a journal contains, then live ones.
 
     Attributes:
-        live: carries out the rest.
         asked: what engines suggested, by the index of the first candidate's evaluation.
-        evaluations: recorded evaluations by index; those that a repair dropped are carried out.
+        evaluations: recorded evaluations by index.
         confirmed: recorded confirmations by evaluation index and requirement.
         recording: recorded replies of a language model.
-        seconds: wall-clock seconds of the recorded part.
-        unrepeated: what was spent on questions that are not played back.
     """
 
-    live: Steps
     asked: dict[int, AskedRecord]
     evaluations: dict[int, Evaluation]
     confirmed: dict[tuple[int, str], ConfirmedRecord]
     recording: Recording
-    seconds: float
-    unrepeated: Spent
-    replayed: int = field(init=False)
     _next: int = 0
-
-    def __post_init__(self) -> None:
-        self.replayed = len(self.evaluations)
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Let the engine repeat its recorded suggestions.
@@ -66,7 +56,7 @@ class Replayed:
         """
         record = self.asked.get(self._next)
         if record is None:
-            return self.live.ask(problem, engine, wanted)
+            return super().ask(problem, engine, wanted)
         # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
         candidates = proposals(engine, problem.space, record.n)
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
@@ -85,27 +75,23 @@ class Replayed:
         """Start what is left of an evaluation: all of it, its trajectory, or nothing."""
         recorded = self.evaluations.get(index)
         if recorded is None:
-            return self.live.start(problem, [candidate])[0]
+            return super().start(problem, [candidate])[0]
         if recorded.verdict is None or recorded.trajectory is not None:
             return lambda: recorded
         # The trajectory was not kept, but engines need it.
-        simulate = self.live.start(problem, [recorded.candidate])[0]
+        simulate = super().start(problem, [recorded.candidate])[0]
         return lambda: replace(recorded, trajectory=simulate().trajectory)
-
-    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
-        """Tell the engine, which has to learn again what it had learnt."""
-        return self.live.tell(engine, evaluations)
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Return the recorded confirmation of a violation; without one, confirm it."""
         record = self.confirmed.get((index, problem.name))
         if record is None:
-            return self.live.confirm(problem, evaluation, index)
+            return super().confirm(problem, evaluation, index)
         return record.confirmation(problem, evaluation)
 
     def chat(self, inner: Chat) -> Chat:
         """Return a chat that plays the recorded replies first."""
-        return RecordedChat(self.recording, self.live.chat(inner))
+        return RecordedChat(self.recording, inner)
 
 
 def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
@@ -113,14 +99,16 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     if not records:
         return live
     exchanges, unrepeated = _played_back(records)
+    evaluations = recorded_evaluations(directory, records)
     return Replayed(
-        live,
-        {r.first: r for r in records if isinstance(r, AskedRecord)},
-        recorded_evaluations(directory, records),
-        {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
-        Recording(exchanges),
-        max(map(elapsed_at, records)),
-        unrepeated,
+        executor=live.executor,
+        replayed=len(evaluations),
+        seconds=max(map(elapsed_at, records)),
+        unrepeated=unrepeated,
+        asked={r.first: r for r in records if isinstance(r, AskedRecord)},
+        evaluations=evaluations,
+        confirmed={(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
+        recording=Recording(exchanges),
     )
 
 

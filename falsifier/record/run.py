@@ -36,7 +36,7 @@ from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
-from falsifier.search.steps import Live, Steps
+from falsifier.search.steps import Steps
 
 Falsifiable = Problem | ProblemSource | str
 LLM = LLMSettings | Chat | str
@@ -321,8 +321,7 @@ def carry_out(
         engines: list[Engine] = [Starting(each, known) for each in made] if known else made
         for problem in problems:
             stack.callback(problem.model.close)
-        live = Live(stack.enter_context(local_executor(request.jobs, problems[0].model)))
-        steps: Steps = live
+        steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         all_listeners = tuple(listeners)
         if directory is not None:
             described = described or manifest.describe(request, told, engines[0].name)
@@ -334,7 +333,7 @@ def carry_out(
                 manifest.write(directory, described)
             elif recorded.request.budget != request.budget:
                 manifest.write(directory, recorded.with_budget(request.budget))
-            steps = replayed(directory, journal.records, live)
+            steps = replayed(directory, journal.records, steps)
             stop = directory / STOP
             stop.unlink(missing_ok=True)  # of an earlier process
             # What happens is recorded first, even if another listener raises.

@@ -29,7 +29,7 @@ from falsifier.search.events import (
 from falsifier.search.levels import Level, reached
 from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
-from falsifier.search.steps import Live, Steps
+from falsifier.search.steps import Steps
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -82,7 +82,7 @@ def search(
         _check_alike(problems[0], problem)
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(states, levels, budget, steps or Live(), directory, tuple(listeners), prepared)
+    loop = _Loop(states, levels, budget, steps or Steps(), directory, tuple(listeners), prepared)
     status: ResultStatus
     try:
         loop.attach()

@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
@@ -18,51 +17,15 @@ from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 
 
-class Steps(Protocol):
-    """The steps that the loop delegates: carried out live, or taken from a record."""
-
-    @property
-    def replayed(self) -> int:
-        """Number of evaluations taken from a record."""
-        ...
-
-    @property
-    def seconds(self) -> float:
-        """Wall-clock seconds of the recorded part of the run."""
-        ...
-
-    @property
-    def unrepeated(self) -> Spent:
-        """What the recorded part spent on questions to a language model that are not played back."""
-        ...
-
-    def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
-        ...
-
-    def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
-        """Start to simulate candidates; return functions that wait for their evaluations, in order."""
-        ...
-
-    def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
-        """Tell an engine; return the time that took in s."""
-        ...
-
-    def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """Check a violation, given the index of its evaluation."""
-        ...
-
-    def chat(self, inner: Chat) -> Chat:
-        """Return the chat that an engine should ask instead of its own."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Live:
-    """Carries out every step.
+@dataclass
+class Steps:
+    """Carries out every step; a resumed run has others, which take what they can from its record.
 
     Attributes:
         executor: runs the simulations; None: this process.
+        replayed: number of evaluations taken from a record.
+        seconds: wall-clock seconds of the recorded part of the run.
+        unrepeated: what the recorded part spent on questions to a language model that are not played back.
     """
 
     executor: Executor | None = None
@@ -71,27 +34,27 @@ class Live:
     unrepeated: Spent = field(default_factory=Spent)
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Ask the engine, and measure the time."""
+        """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
         started = perf_counter()
         candidates = proposals(engine, problem.space, wanted)
         return candidates, wanted, perf_counter() - started
 
     def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
-        """Simulate and judge on the executor."""
+        """Start to simulate and judge; return functions that wait for the evaluations, in order."""
         return start(problem, candidates, self.executor)
 
     def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
-        """Tell the engine, and measure the time."""
+        """Tell an engine; return the time that took in s."""
         started = perf_counter()
         engine.tell(evaluations)
         return perf_counter() - started
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
-        """Simulate again with a fresh instance; the index is for replay only."""
+        """Check a violation with a fresh instance; the index of its evaluation is for replay only."""
         return confirm(problem, evaluation)
 
     def chat(self, inner: Chat) -> Chat:
-        """Return the engine's own chat."""
+        """Return the chat that an engine should ask instead of its own."""
         return inner
 
 

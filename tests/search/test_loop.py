@@ -22,7 +22,7 @@ from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
 from falsifier.search.loop import search
-from falsifier.search.steps import Live
+from falsifier.search.steps import Steps
 from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import broken, mostly_broken, never
@@ -129,7 +129,7 @@ def test_batches_are_told_in_the_order_of_asking() -> None:
             [make_engine("uniform", problem, seed=5)],
             Budget(10),
             jobs=4,
-            steps=Live(executor),
+            steps=Steps(executor),
         )
     (alone,) = search([problem], [make_engine("uniform", problem, seed=5)], Budget(10), jobs=4)
     assert len(parallel.evaluations) == 10
