@@ -312,9 +312,8 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
     except SpecError as error:
         if error.key is None or not error.key.startswith("requirements."):
             raise
-        problem = str(error).partition(f"{error.key}: ")[2]
         argument = error.key.removeprefix(f"requirements.{name}").removeprefix(".")
-        raise SpecError(problem, file=_OPTION, key=argument or None) from None
+        raise SpecError(error.message, file=_OPTION, key=argument or None) from None
     return str(joined.requirement.formula)
 
 

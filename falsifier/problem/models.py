@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from falsifier.core.model import Interface, Model, ModelInfo
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import ModelError, SpecError, in_section
 from falsifier.fmu import (
     Component,
     Connection,
@@ -63,12 +63,8 @@ def rights_of(
     words = (*section.allow, *(word for layer in layers for word in layer.allow))
     allow = resolved(words, path.parent if path is not None else Path())
     deny = (*section.deny, *(word for layer in layers for word in layer.deny))
-    try:
+    with in_section(*((str(path), "model") if path is not None else ())):
         Policy.of(allow, deny)
-    except SpecError as error:
-        if path is None:
-            raise
-        raise SpecError(str(error), file=str(path), key="model") from None
     return allow, deny
 
 
@@ -85,34 +81,25 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         ModelError: if an FMU cannot be read.
     """
     coupling = Coupling(**spec.coupling.model_dump())
-    if spec.model.fmu is not None:
-        package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
-        return replace(package, logging=logging)
-    components = {
-        name: Component(_single(path, section.fmu, f"components.{name}.fmu"), section.step, section.interface)
-        for name, section in spec.components.items()
-    }
-    connections = {
-        target: Connection(each.source, each.factor, each.offset, each.extrapolation)
-        for target, each in spec.connections.items()
-    }
-    try:
-        return System(
-            components,
-            connections,
-            coupling=coupling,
-            name=path.stem,
-            logging=logging,
-        )
-    except SpecError as error:
-        raise SpecError(str(error), file=str(path)) from None
+    with in_section(str(path)):
+        if spec.model.fmu is not None:
+            package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
+            return replace(package, logging=logging)
+        components = {
+            name: Component(_single(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface)
+            for name, part in spec.components.items()
+        }
+        connections = {
+            target: Connection(each.source, each.factor, each.offset, each.extrapolation)
+            for target, each in spec.connections.items()
+        }
+        return System(components, connections, coupling=coupling, name=path.stem, logging=logging)
 
 
 def _single(path: Path, fmu: str, key: str) -> Path:
     if is_package(fmu):
         raise SpecError(
             "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here",
-            file=str(path),
             key=key,
         )
     return _existing(path, fmu, key)
@@ -121,9 +108,7 @@ def _single(path: Path, fmu: str, key: str) -> Path:
 def _existing(path: Path, fmu: str, key: str) -> Path:
     found = path.parent / fmu
     if not found.is_file():
-        raise SpecError(
-            f"no such FMU: {found}; give its path relative to the spec file", file=str(path), key=key
-        )
+        raise SpecError(f"no such FMU: {found}; give its path relative to the spec file", key=key)
     return found
 
 

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
+from pydantic.fields import FieldInfo
 
 from falsifier.core.literals import one_line
-from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.errors import SpecError, did_you_mean, in_section, rejected
 from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
     Components,
@@ -127,26 +128,26 @@ def read_spec(path: Path) -> Spec:
     Raises:
         SpecError: naming the file, the key and what was expected.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")  # some editors begin files with a byte order mark
-    except FileNotFoundError:
-        raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one", file=str(path)) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise SpecError(f"cannot be read: {error}", file=str(path)) from None
-    if len(text) > _MAX_LENGTH:
-        raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}", file=str(path))
-    if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
-        raise SpecError(f"has a key of more than {_MAX_KEY_PARTS} parts", file=str(path))
-    try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
-        raise SpecError(f"not valid TOML: {error}", file=str(path)) from None
-    if not data:
-        raise SpecError(
-            "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "
-            "`falsifier init MODEL.fmu` write a spec to begin with",
-            file=str(path),
-        )
+    with in_section(str(path)):
+        try:
+            text = path.read_text(encoding="utf-8-sig")  # some editors begin files with a byte order mark
+        except FileNotFoundError:
+            raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one") from None
+        except (OSError, UnicodeDecodeError) as error:
+            raise SpecError(f"cannot be read: {error}") from None
+        if len(text) > _MAX_LENGTH:
+            raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}")
+        if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
+            raise SpecError(f"has a key of more than {_MAX_KEY_PARTS} parts")
+        try:
+            data = tomllib.loads(text)
+        except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
+            raise SpecError(f"not valid TOML: {error}") from None
+        if not data:
+            raise SpecError(
+                "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "
+                "`falsifier init MODEL.fmu` write a spec to begin with"
+            )
     return parse_spec(data, file=str(path))
 
 
@@ -160,33 +161,32 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
     Raises:
         SpecError: naming the file, the key and what was expected.
     """
-    try:
-        spec = Spec.model_validate(data)
-    except ValidationError as error:
-        raise spec_error(error, file, Spec, _SECTIONS) from None
-    for section in ("requirements", "profiles", "components"):
-        for name in getattr(spec, section):
-            if one_line(name) != name:
-                raise SpecError(NAME_IN_LINES, file=file, key=f"{section}.{name!r}")
-    _check_model(spec, file)
+    with in_section(file):
+        try:
+            spec = Spec.model_validate(data)
+        except ValidationError as error:
+            raise _error_of(error) from None
+        for section in ("requirements", "profiles", "components"):
+            for name in getattr(spec, section):
+                if one_line(name) != name:
+                    raise SpecError(NAME_IN_LINES, key=f"{section}.{name!r}")
+        _check_model(spec)
     return spec
 
 
-def _check_model(spec: Spec, file: str) -> None:
+def _check_model(spec: Spec) -> None:
     """Check that a spec has either an FMU or components."""
     if spec.model.fmu is None and not spec.components:
         about = ModelSection.model_fields["fmu"].description
-        raise SpecError(f"this key is missing ({about})", file=file, key="model.fmu")
+        raise SpecError(f"this key is missing ({about})", key="model.fmu")
     if spec.components and spec.model.fmu is not None:
         raise SpecError(
-            "a spec has either one FMU here or [components.NAME]; remove one of them",
-            file=file,
-            key="model.fmu",
+            "a spec has either one FMU here or [components.NAME]; remove one of them", key="model.fmu"
         )
     is_system = bool(spec.components) or str(spec.model.fmu).endswith(PACKAGES)
     if (spec.connections and not spec.components) or (spec.coupling != CouplingSection() and not is_system):
         key = "connections" if spec.connections else "coupling"
-        raise SpecError("only a system has this section: add [components.NAME]", file=file, key=key)
+        raise SpecError("only a system has this section: add [components.NAME]", key=key)
 
 
 def overlay(base: Section | None, changes: Section) -> Section:
@@ -206,17 +206,8 @@ def overlay(base: Section | None, changes: Section) -> Section:
     return base.model_copy(update=stated)
 
 
-def spec_error(
-    error: ValidationError, file: str, root: type[BaseModel], sections: Mapping[str, type[BaseModel]]
-) -> SpecError:
-    """Return the error to raise for the first thing that is wrong.
-
-    Args:
-        error: what pydantic found.
-        file: name of the file.
-        root: the whole spec.
-        sections: its sections by the key that holds them; in angle brackets by the kind of a requirement.
-    """
+def _error_of(error: ValidationError) -> SpecError:
+    """Return the error to raise for the first thing that is wrong."""
     first = error.errors()[0]
     where = [str(part) for part in first["loc"] if part not in _STEPS]
     location = _keys_of(where)
@@ -224,19 +215,17 @@ def spec_error(
     kind = first["type"]
     if kind == "union_tag_not_found":
         known = did_you_mean(str(first["input"].get("template")), TEMPLATES)
-        return SpecError(f"no such template; {known}", file=file, key=f"{key}.template")
+        return SpecError(f"no such template; {known}", key=f"{key}.template")
     if kind in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
-        return SpecError(
-            f"names with dots are written in quotes: {quoted}", file=file, key=".".join(location[:2])
-        )
+        return SpecError(f"names with dots are written in quotes: {quoted}", key=".".join(location[:2]))
     if kind == "extra_forbidden":
-        known = did_you_mean(location[-1], sorted(_fields(where[:-1], root, sections)))
-        return SpecError(f"unknown key; {known}", file=file, key=key)
+        known = did_you_mean(location[-1], sorted(_fields(where[:-1])))
+        return SpecError(f"unknown key; {known}", key=key)
     if kind == "missing":
-        field = _fields(where[:-1], root, sections).get(location[-1])
+        field = _fields(where[:-1]).get(location[-1])
         meaning = f" ({field.description})" if field is not None and field.description else ""
-        return SpecError(f"this key is missing{meaning}", file=file, key=key)
-    return SpecError(rejected(first["msg"], first["input"]), file=file, key=key)
+        return SpecError(f"this key is missing{meaning}", key=key)
+    return SpecError(rejected(first["msg"], first["input"]), key=key)
 
 
 def _keys_of(where: list[str]) -> list[str]:
@@ -261,17 +250,16 @@ def _unquoted(error: ValidationError) -> str:
     return ""
 
 
-def _fields(
-    where: list[str], root: type[BaseModel], sections: Mapping[str, type[BaseModel]]
-) -> dict[str, Any]:
+def _fields(where: list[str]) -> Mapping[str, FieldInfo]:
     """Return the fields of the section at this location in a spec."""
     if where and where[-1] not in _keys_of(where[-1:]):
-        return dict(sections[where[-1]].model_fields)
-    fields = dict(root.model_fields)
+        return _SECTIONS[where[-1]].model_fields
+    fields: Mapping[str, FieldInfo] = Spec.model_fields
     location = _keys_of(where)
     for i, part in enumerate(location):
+        before = location[i - 1] if i else ""
         if part in _SINGLE:
-            fields = dict(sections[part].model_fields)
-        elif i > 0 and location[i - 1] in sections and location[i - 1] not in _SINGLE:
-            fields = dict(sections[location[i - 1]].model_fields)
+            fields = _SECTIONS[part].model_fields
+        elif before in _SECTIONS and before not in _SINGLE:
+            fields = _SECTIONS[before].model_fields
     return fields
