@@ -179,7 +179,7 @@ BROKEN: dict[str, tuple[Behaviour, str]] = {
     "nothing": (sends(response(b"")), "not JSON (it is empty)"),
     "no UTF-8": (sends(response(b'{"id": "\xff\xfe"}')), "not text in UTF-8"),
     "depth": (sends(response(b"[" * 100_000)), "nested too deeply"),
-    "no choices": (sends(response(b'{"id": "1", "choices": []}')), "does not have the form"),
+    "no choices": (sends(response(b'{"id": "1", "choices": []}')), "without any choice"),
     "a list": (sends(response(b"[]")), "does not have the form"),
     "an error as text": (sends(response(b'{"error": "model not loaded"}')), "model not loaded"),
     "a page of a proxy": (

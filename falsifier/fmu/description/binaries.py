@@ -167,12 +167,12 @@ def read_pe(content: bytes) -> Pe:
         ValueError: if it is not one, or is damaged.
     """
     try:
-        return _read_imports(content)
+        return _pe_of(content)
     except (struct.error, IndexError, OverflowError) as error:
         raise ValueError(f"a damaged Windows library ({error})") from error
 
 
-def _read_imports(content: bytes) -> Pe:
+def _pe_of(content: bytes) -> Pe:
     if content[:2] != b"MZ":
         raise ValueError("not a Windows library")
     (start,) = struct.unpack_from("<I", content, _PLACE)
