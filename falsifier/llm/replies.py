@@ -4,6 +4,7 @@ A prompt asks for one of two forms: JSON with signals by name and a rationale, o
 order between ``<point>`` and ``</point>``. A reply in the other form is read too.
 """
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.literals import printable
 from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal
 from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSpace
+from falsifier.core.words import counted
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.lenient import json_objects, repaired, without_thoughts
@@ -38,6 +40,10 @@ _LONGEST_RUN = 100_000
 _LONGEST_RATIONALE = 2000
 # More candidates than any question asks for; those beyond are not read.
 _MOST_CANDIDATES = 1000
+# Characters before the place where JSON breaks off that are told.
+_SHOWN_BEFORE = 24
+# Numbers outside of their ranges that are told.
+_MOST_OUTSIDE = 5
 # Share of a range by which a value may exceed it.
 _ROUNDING = 1e-3
 # Keys of a candidate, of its parts, and of several candidates.
@@ -196,10 +202,9 @@ class ReplyForm:
 
     def _candidate(self, reply: "CandidateReply", origin: str) -> Candidate:
         if reply.point is not None:
-            numbers = _unrolled(reply.point)
-            if len(numbers) == len(self.space.dimensions):
-                numbers = [_clamped(v, d) for v, d in zip(numbers, self.space.dimensions, strict=True)]
-            return self._decoded(numbers, reply.rationale, origin)
+            return self._decoded(_unrolled(reply.point), reply.rationale, origin)
+        if not self.named:  # what is wrong with a signal would tell names that were not told
+            raise RejectedReplyError(f'expected a list of {len(self.space.dimensions)} numbers as "point"')
         signals = {}
         for signal in reply.signals:
             if signal.name in signals:
@@ -243,10 +248,23 @@ class ReplyForm:
             raise RejectedReplyError(f"input {_shown(reply.name)}: {error}") from None
 
     def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
+        dimensions = self.space.dimensions
+        if len(numbers) != len(dimensions):
+            raise RejectedReplyError(f"expected {counted(len(dimensions), 'number')}, got {len(numbers)}")
+        numbers = [_clamped(v, d) for v, d in zip(numbers, dimensions, strict=True)]
+        outside = [
+            f"number {place}: {value:g} is outside its range [{d.low:g}, {d.high:g}]"
+            for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1)
+            if not d.low <= value <= d.high
+        ]
+        if outside and not self.named:
+            more = f"; and {len(outside) - _MOST_OUTSIDE} more" if len(outside) > _MOST_OUTSIDE else ""
+            raise RejectedReplyError("; ".join(outside[:_MOST_OUTSIDE]) + more)
         try:
             return self.space.decode(numbers, origin=origin, rationale=rationale)
         except CandidateError as error:
-            raise RejectedReplyError(str(error)) from None
+            what = str(error) if self.named else "the numbers are no sample: see what was said of each"
+            raise RejectedReplyError(what) from None
 
     def _admitted(self, candidate: Candidate) -> Candidate:
         try:
@@ -408,13 +426,20 @@ def _whole_numbers(found: Any) -> list[int]:
 
 
 def _other_keys(text: str) -> str:
-    """Which keys the last object of a reply without candidates has, and what was expected."""
-    objects = [found for found in json_objects(text) if found]
-    if not objects:
+    """Why a reply without candidates has none: where its JSON breaks off, or which keys it has."""
+    start = text.find("{")
+    if start < 0:
         return ""
-    keys = ", ".join(_shown(key) for key in list(objects[-1])[:10])
+    try:
+        found, _ = json.JSONDecoder(parse_int=float).raw_decode(text, start)
+    except json.JSONDecodeError as error:
+        before = _shown(text[max(start, error.pos - _SHOWN_BEFORE) : error.pos + 1])
+        return f" that can be read: {error.msg} after {before}"
+    except RecursionError:
+        return ": it is nested too deeply"
+    keys = ", ".join(_shown(key) for key in list(found)[:10])
     expected = ", ".join(repr(key) for key in sorted(_PARTS))
-    return f": its keys are {keys}; expected {expected} or 'candidates'"
+    return f": its keys are {keys}; expected {expected} or 'candidates'" if found else ""
 
 
 def _candidates_of(found: Any) -> list[dict[str, Any]]:

@@ -90,7 +90,10 @@ def test_replies_as_points(variant: str) -> None:
         "between <point> and </point>" in first.messages[0].content
         and "JSON" not in first.messages[0].content
     )
-    assert "at t = 6.66667, 10 s: 9, -9 are outside its range [-1, 1]" in rejected.messages[-1].content
+    assert (
+        "number 3: 9 is outside its range [-1, 1]; number 4: -9 is outside its range [-1, 1]"
+        in rejected.messages[-1].content
+    )
     assert ("point = [0, 0, 0.25, 1]" in later.messages[-1].content) == (variant != "MP5")
     assert first.messages == preview(problem, variant=variant, reply="points")
 

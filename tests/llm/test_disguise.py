@@ -55,6 +55,45 @@ def asked(name: str, variant: str, replies: Sequence[str]) -> tuple[str, Problem
     return sent, problem, done
 
 
+def bad_replies(problem: Problem) -> list[str]:
+    """Replies that are rejected in every way in which names could be told."""
+    size = len(problem.space.dimensions)
+    return [
+        json.dumps({"point": [7e5] * size}),
+        json.dumps({"point": [0.5] * (size + 1)}),
+        json.dumps({"point": [0.25] * size}),  # the first sample again
+        json.dumps({"signals": [{"name": "throttl", "values": [1]}]}),
+        json.dumps({"signals": [{"name": "u1", "values": [1]}, {"name": "u1", "values": [1]}]}),
+        json.dumps({"signals": [], "parameters": []}),
+        "no JSON",
+    ]
+
+
+@pytest.mark.parametrize("anonymous", [True, False])
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("name", ["AT6a", "PulseMeter"])
+def test_no_name_is_told_that_the_variant_hides(name: str, variant: str, *, anonymous: bool) -> None:
+    if not anonymous and variant != "MP1":
+        return
+    problem = load_problem(name)
+    first = json.dumps({"point": [0.25] * len(problem.space.dimensions)})
+    if name == "PulseMeter":
+        first = json.dumps({"point": [0, 1] * (len(problem.space.dimensions) // 2)})
+    sent = []
+    for bad in bad_replies(problem):
+        chat = ScriptedChat([first, bad, bad, bad])
+        engine = make_llm_engine(problem, chat, variant=variant, anonymous=anonymous)
+        engine.tell([evaluate(problem, *engine.ask())])
+        engine.ask()
+        sent += chat.requests
+    problem.model.close()
+    told = "\n".join(m.content for r in sent for m in r.messages if m.role != "assistant")
+    assert "That reply cannot be used" in told
+    names = {n for n in (*problem.space.names, *problem.experiment.outputs)}
+    for name in names:
+        assert not re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", told), name
+
+
 @pytest.mark.parametrize(
     ("name", "variant"), [("AT6a", "MP1"), ("AT51", "MP5"), ("NN", "MP4"), ("AT6a", "MP5")]
 )
