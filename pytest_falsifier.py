@@ -210,7 +210,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     from falsifier.core.words import candidate_lines
     from falsifier.counterexamples.explain import explain
     from falsifier.views.plotting import plot_evaluation, save_figure
-    from falsifier.views.text import broken_rows
+    from falsifier.views.text import broken_facts, fact_lines
 
     problem, found = checked.problem, checked.counterexample
     assert found is not None
@@ -223,7 +223,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"
     lines = [
         f"{problem.name} is violated by a {how}",
-        *(f"  {row}" for row in broken_rows(found.evaluation.verdict)),
+        *fact_lines(broken_facts(found.evaluation.verdict)),
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
         *(f"  {line}" for line in candidate_lines(found.evaluation.candidate, problem.space)),

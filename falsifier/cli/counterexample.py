@@ -36,7 +36,7 @@ from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 from falsifier.views.terminal import warn
-from falsifier.views.text import broken_rows, evaluation_json
+from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
@@ -229,7 +229,7 @@ def _shrink(
     if confirmation is not None:
         simpler = "this simpler input violates the requirement: " if case.is_miss else ""
         lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")
-        lines += [f"  {row}" for row in broken_rows(confirmation.evaluation.verdict)]
+        lines += fact_lines(broken_facts(confirmation.evaluation.verdict))
     share = "a tenth more than before" if case.is_miss else "half of the original's"
     changed = f", {share}; --at-most changes it" if at_most is None else ""
     lines.append(

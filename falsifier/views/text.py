@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
+from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted
+from falsifier.core.space import SearchSpace
+from falsifier.core.words import choices, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
@@ -27,28 +29,7 @@ Fact = tuple[str, str]
 def result_text(result: Result) -> str:
     """Format one result as text."""
     head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{_untested(result)}"
-    lines = [f"{head} ({seconds_text(result.spent)})"]
-    shown = result.counterexample.evaluation if result.counterexample else result.best
-    if result.counterexample is not None:
-        lines.append(f"  confirmed      {result.counterexample.reason}")
-    elif result.status != "failed":
-        lines.append(f"  reason         {result.reason}")
-    lines.append(f"  requirement    {result.problem.requirement.formula}")
-    if shown is not None:
-        lines += evaluation_lines(result.problem, shown)
-    if result.levels:
-        lines += [f"  {line}" for line in level_lines(result)]
-    elif result.counterexample is None and result.searched is not None and result.searched.inputs:
-        lines.append(f"  inputs         {parameterization_note(result.searched)}")
-    lines += [f"  note           {finding.text}" for finding in result.findings]
-    if held := held_text(result.problem.held_inputs):
-        lines.append(f"  not searched   {held}")
-    lines += [f"  failed         {failure.text}" for failure in result.failures]
-    lines += [f"  fragile        {c.reason}" for c in result.fragile]
-    lines += [f"  not confirmed  {c.reason}" for c in result.refuted]
-    lines += [f"  fallback       {remark}" for remark in result.remarks]
-    if result.spent.calls:
-        lines.append(f"  language model {llm_use(result.spent)}")
+    lines = [f"{head} ({seconds_text(result.spent)})", *fact_lines(result_facts(result))]
     if result.directory is not None:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
@@ -60,6 +41,38 @@ def result_text(result: Result) -> str:
     if result.status == "failed":
         lines.append(f"failed: {result.reason}")
     return "\n".join(map(one_line, lines))
+
+
+def result_facts(result: Result) -> list[Fact]:
+    """Return what is said of a result, in the order of reports, for terminals and notebooks.
+
+    What broke and by which inputs, whether that is sure or why the run ended, what was not tested; then what
+    engineers of searches ask.
+    """
+    problem, shown, found = result.problem, result.shown, result.counterexample
+    facts = [("requirement", str(problem.requirement.formula))]
+    if shown is not None:
+        facts += [*broken_facts(shown.verdict), *candidate_facts(shown.candidate, problem.space)]
+    if found is not None:
+        facts.append(("confirmed", found.reason))
+    elif result.status != "failed":
+        facts.append(("reason", result.reason))
+    if result.levels:
+        facts += level_facts(result)
+    elif found is None and result.searched is not None and result.searched.inputs:
+        facts.append(("inputs", parameterization_note(result.searched)))
+    facts += [("note", finding.text) for finding in result.findings]
+    if held := held_text(problem.held_inputs):
+        facts.append(("not searched", held))
+    facts += [("failed", failure.text) for failure in result.failures]
+    facts += [("fragile", c.reason) for c in result.fragile]
+    facts += [("not confirmed", c.reason) for c in result.refuted]
+    if shown is not None:
+        facts += margin_facts(shown.verdict, units_of(problem))
+        facts += [("rationale", shown.candidate.rationale)] if shown.candidate.rationale else []
+    facts += [("fallback", remark) for remark in result.remarks]
+    facts += [("language model", llm_use(result.spent))] if result.spent.calls else []
+    return facts
 
 
 def _untested(result: Result) -> str:
@@ -82,7 +95,7 @@ def results_text(results: Sequence[Result]) -> str:
             lines += [
                 f"{'':{width}}  {line}" for line in broken_lines(result.counterexample.evaluation.verdict)
             ]
-        lines += [f"{'':{width}}  {line}" for line in level_lines(result)]
+        lines += [f"{'':{width}}{line}" for line in fact_lines(level_facts(result))]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  failed: {failure.text}" for failure in result.failures]
         lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
@@ -129,10 +142,10 @@ def result_json(result: Result) -> dict[str, Any]:
     }
 
 
-def level_lines(result: Result) -> list[str]:
+def level_facts(result: Result) -> list[Fact]:
     """Say of each level of a search that refined its inputs what was searched, and what came of it."""
     return [
-        f"{found.name:<14} {found.text}: {parameterization_note(level.space)}"
+        (found.name, f"{found.text}: {parameterization_note(level.space)}")
         for level, found in zip(result.levels, _level_results(result), strict=True)
     ]
 
@@ -159,18 +172,38 @@ def _levels_json(result: Result) -> list[dict[str, Any]]:
 
 
 def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
-    """Say what decided an evaluation, and what was simulated."""
-    units = {variable.name: variable.unit for variable in problem.info.variables}
-    facts = verdict_facts(evaluation.verdict, units)
-    facts += [("rationale", evaluation.candidate.rationale)] if evaluation.candidate.rationale else []
-    lines = fact_lines(facts)
-    at = len(lines) - bool(evaluation.candidate.rationale)
-    inputs = [f"  {line}" for line in candidate_lines(evaluation.candidate, problem.space)]
-    return [*lines[:at], *inputs, *lines[at:]]
+    """Say what decided an evaluation, and what was simulated, in the order of reports."""
+    return fact_lines(evaluation_facts(problem, evaluation))
 
 
-def verdict_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
-    """Return what broke, the robustness, what decided it and when, with the values then.
+def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
+    """Return what broke, the inputs, and what decided an evaluation."""
+    candidate, verdict = evaluation.candidate, evaluation.verdict
+    facts = [*broken_facts(verdict), *candidate_facts(candidate, problem.space)]
+    facts += margin_facts(verdict, units_of(problem))
+    return [*facts, *([("rationale", candidate.rationale)] if candidate.rationale else [])]
+
+
+def units_of(problem: Problem) -> dict[str, str]:
+    """Return the units of a model's variables, by name."""
+    return {variable.name: variable.unit for variable in problem.info.variables}
+
+
+def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[Fact]:
+    """Return what a candidate chooses for each input and parameter; the units come from the search space."""
+    return [
+        (c.role, f"{c.label}{' =' if c.role == 'parameter' else ''} {c.text}")
+        for c in choices(candidate, space)
+    ]
+
+
+def broken_facts(verdict: Verdict | None) -> list[Fact]:
+    """Return what broke, and what made it necessary; nothing of what is not violated."""
+    return [("" if k else "what broke", line) for k, line in enumerate(broken_lines(verdict))]
+
+
+def margin_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
+    """Return the robustness, what decided it and when, with the values then.
 
     Args:
         verdict: the verdict; without one, there is nothing to tell.
@@ -179,12 +212,9 @@ def verdict_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fac
     if verdict is None:
         return []
     values = (f"{name} = {value:.6g} {units.get(name, '')}".strip() for name, value in verdict.values.items())
+    meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
-        *(("what broke" if k == 0 else "", line) for k, line in enumerate(broken_lines(verdict))),
-        (
-            "robustness",
-            f"{signed(verdict.robustness)} ({margin_words(verdict.robustness, verdict.predicate)})",
-        ),
+        ("robustness", f"{signed(verdict.robustness)} ({meaning})"),
         ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
         ("values then", ", ".join(values)),
     ]
@@ -198,11 +228,6 @@ def fact_lines(facts: Iterable[Fact]) -> list[str]:
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
     """Say what broke, and what made it necessary; nothing of what is not violated."""
     return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
-
-
-def broken_rows(verdict: Verdict | None) -> list[str]:
-    """The same, as rows of a table of facts."""
-    return [f"{'' if k else 'what broke':<14} {text}" for k, text in enumerate(broken_lines(verdict))]
 
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from falsifier.views.report.content import (
     trouble_lines,
     unshown_lines,
 )
-from falsifier.views.text import Fact, verdict_facts
+from falsifier.views.text import Fact, margin_facts
 
 
 def markdown_report(*directories: Path) -> str:
@@ -81,7 +81,7 @@ def _found(shown: Shown) -> list[str]:
         parts.append(markdown_text(one_line(shown.explanation)))
     if shown.confirmed:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
-    parts.append(_facts(verdict_facts(shown.verdict, shown.units)))
+    parts.append(_facts(margin_facts(shown.verdict, shown.units)))
     if advice(shown):
         parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
     return parts

@@ -36,7 +36,7 @@ from falsifier.views.report.content import (
     trouble_lines,
     unshown_lines,
 )
-from falsifier.views.text import Fact, verdict_facts
+from falsifier.views.text import Fact, margin_facts
 
 if TYPE_CHECKING:
     from falsifier.views.plotting import Figure
@@ -312,7 +312,7 @@ def _seconds(run: Run) -> str:
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     run, rationale = shown.run, shown.candidate.rationale
-    facts = [*verdict_facts(shown.verdict, shown.units), *level_facts(run)]
+    facts = [*margin_facts(shown.verdict, shown.units), *level_facts(run)]
     facts += [("rationale", rationale)] if rationale else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
