@@ -101,11 +101,6 @@ class Run:
         """Number of simulations."""
         return self.spent.simulations
 
-    @property
-    def best_so_far(self) -> NDArray[np.float64]:
-        """Smallest robustness up to each evaluation, shape (n,); NaN before the first verdict."""
-        return np.fmin.accumulate(self.robustness)
-
     def columns(self) -> Columns:
         """Read every evaluation; return one row each, as columns of equal length; see evaluation_columns.
 
