@@ -16,13 +16,13 @@ from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.loop import search
 
-PLACE = "{limit}"
+LIMIT = "{limit}"
 # The search ends when the threshold is known to this share of the range.
 RESOLUTION = 0.01
 # Steps of the bisection over what is simulated already: more than a threshold has significant digits.
 _JUDGED_STEPS = 20
 
-Searched = Callable[[float, bool, int], None]
+OnSearch = Callable[[float, bool, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def margin(
     engine: str = DEFAULT_ENGINE,
     budget: int = 300,
     seed: int = 0,
-    searched: Searched | None = None,
+    searched: OnSearch | None = None,
 ) -> Margin:
     """Find the threshold at which a search starts to find violations, by bisection.
 
@@ -99,8 +99,8 @@ def margin(
         SimulationError: if most simulations failed.
     """
     low, high = finite("between", between[0]), finite("between", between[1])
-    if PLACE not in vary:
-        raise SpecError(f"vary: expected {PLACE} in place of the threshold, got {vary!r}")
+    if LIMIT not in vary:
+        raise SpecError(f"vary: expected {LIMIT} in place of the threshold, got {vary!r}")
     if low >= high:
         raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
@@ -111,7 +111,7 @@ def margin(
 
 def at_threshold(problem: Problem, vary: str, threshold: float) -> Problem:
     """Return the problem with a formula in which the threshold has this value."""
-    text = vary.replace(PLACE, f"{threshold:.12g}")
+    text = vary.replace(LIMIT, f"{threshold:.12g}")
     formula = parse_requirement(text, problem.info, problem.experiment)
     return replace(problem, requirement=Requirement(problem.name, formula), source=None)
 
@@ -125,7 +125,7 @@ class _Bisection:
     engine: str
     budget: int
     seed: int
-    searched: Searched
+    searched: OnSearch
     falsified: float | None = None
     unfalsified: float | None = None
     history: list[Evaluation] = field(default_factory=list)
@@ -139,7 +139,7 @@ class _Bisection:
         if len(values) < 2:
             raise SimulationError(f"{self.problem.name}: the simulation failed: {self.history[0].reason}")
         if values[0] == values[-1]:
-            raise SpecError(f"vary: the robustness is the same for {PLACE} = {low:g} and {high:g}")
+            raise SpecError(f"vary: the robustness is the same for {LIMIT} = {low:g} and {high:g}")
         return (low, high) if values[0] < values[-1] else (high, low)
 
     def run(self, easy: float, hard: float) -> Margin:

@@ -126,15 +126,15 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import PLACE
+    from falsifier.analyses.margin import LIMIT
     from falsifier.analyses.margin import margin as find_margin
 
     low, high = _between(between)
-    if stl is None or PLACE not in stl:
-        raise click.UsageError(f"--stl: expected a formula with {PLACE} in place of a threshold")
+    if stl is None or LIMIT not in stl:
+        raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(options["target"]).kind != "python"
-    requirement = {"stl": stl.replace(PLACE, f"{low:.12g}") if made_here else None, "template": None}
+    requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None, "template": None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:
