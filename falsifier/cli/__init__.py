@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from falsifier import __version__
-from falsifier.cli.streams import (
+from falsifier.cli.output import (
     INTERRUPTED,
     end_at_interrupts,
     open_streams,

@@ -22,8 +22,7 @@ from falsifier.cli.options import (
     seed_option,
     stl_option,
 )
-from falsifier.cli.output import conclude
-from falsifier.cli.streams import INTERRUPTED
+from falsifier.cli.output import INTERRUPTED, conclude
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE

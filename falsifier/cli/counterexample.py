@@ -241,8 +241,7 @@ def _shrink(
 
 
 def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
-    from falsifier.counterexamples.export.inputs import input_table
-    from falsifier.counterexamples.export.tables import write_csv
+    from falsifier.counterexamples.export.tables import input_table, write_csv
 
     files = [write_csv(input_table(problem, evaluation.candidate), file, problem.model)]
     picture = draw_evaluation(problem, evaluation, file.with_suffix(".png"))

@@ -1,12 +1,23 @@
-"""Printing results on stdout; messages for people go to stderr through ``views.terminal``."""
+"""What the command line prints, and the standard streams, whatever state they were handed over in.
 
+Results go to stdout; messages for people go to stderr through ``views.terminal``.
+"""
+
+import os
+import signal
 import sys
+from contextlib import suppress
+from types import FrameType
 from typing import NoReturn
 
 import click
 
 from falsifier.core.literals import plain
 from falsifier.views.terminal import warn
+
+INTERRUPTED = 130
+# Moving displays hide the cursor of the terminal.
+_SHOW_CURSOR = b"\x1b[?25h\n"
 
 
 def say(text: str, *, nl: bool = True) -> None:
@@ -25,3 +36,63 @@ def conclude(text: str, code: int, *, nl: bool = True) -> NoReturn:
     except OSError as error:
         warn(f"falsifier: the result cannot be printed: {error.strerror or error}")
     sys.exit(code)
+
+
+def open_streams() -> None:
+    """Make all three streams usable.
+
+    A closed one is replaced: otherwise the next file that is opened, such as a journal, would take its place
+    and receive what is printed. Characters that the terminal's encoding lacks are written as escapes.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            # It takes the lowest free number, which is this one, and is a stream of child processes, too.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # noqa: FBT003
+    if sys.stdout is None:
+        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError):
+            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+
+
+def settle_streams() -> None:
+    """Write what is left; what cannot be written is dropped, or Python would end with another exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            drop(stream.fileno())
+
+
+def drop(descriptor: int) -> None:
+    """Let everything written to a descriptor vanish from now on."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+
+
+def stop_at_interrupts() -> None:
+    """Let the first Ctrl-C stop the command in an orderly way, and the second one at once."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have it ignored
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def end_at_interrupts(code: int) -> None:
+    """Let Ctrl-C end the program at once with this exit code, which is settled."""
+    if signal.getsignal(signal.SIGINT) in (_interrupt, _end):
+        signal.signal(signal.SIGINT, lambda _signal, _frame: os._exit(code))
+
+
+def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
+    signal.signal(signal.SIGINT, _end)
+    raise KeyboardInterrupt
+
+
+def _end(_signal: int, _frame: FrameType | None) -> NoReturn:
+    with suppress(OSError):
+        if os.isatty(2):
+            os.write(2, _SHOW_CURSOR)
+    os._exit(INTERRUPTED)

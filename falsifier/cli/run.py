@@ -210,7 +210,7 @@ def resume(
 
 def _known(place: Path, problem: "Problem") -> "Candidate":
     """Read known inputs, and say on stderr what was changed to fit them to the search space."""
-    from falsifier.counterexamples.known_inputs import known_inputs
+    from falsifier.counterexamples.case import known_inputs
 
     fitted = known_inputs(place, problem)
     for note in fitted.notes:

@@ -26,7 +26,7 @@ from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.counterexamples.known_inputs import recorded_inputs
+from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.evaluate import simulate as simulate_inputs
@@ -152,8 +152,7 @@ def _ended(evaluation: Evaluation) -> str:
 
 
 def _written(problem: Problem, evaluation: Evaluation, trajectory: Trajectory, out: Path) -> list[Path]:
-    from falsifier.counterexamples.export.inputs import input_table
-    from falsifier.counterexamples.export.tables import write_csv
+    from falsifier.counterexamples.export.tables import input_table, write_csv
 
     files = [write_whole(out / "trajectory.csv", _table(trajectory))]
     files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))

@@ -1,4 +1,4 @@
-"""What commands on a run or file are about: a counterexample; of a run without one, the nearest miss."""
+"""What is known of a run or file: a counterexample, the nearest miss, or inputs to start a search from."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -6,8 +6,8 @@ from pathlib import Path
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
+from falsifier.core.fitting import Fitted, fit
 from falsifier.core.words import counted
-from falsifier.counterexamples.known_inputs import judged_candidates
 from falsifier.counterexamples.store import (
     StoredCounterexample,
     beside,
@@ -19,13 +19,15 @@ from falsifier.counterexamples.store import (
     problem_of,
     shrunk_file,
 )
-from falsifier.errors import SimulationError, SpecError
+from falsifier.engines.starting import KNOWN
+from falsifier.errors import CandidateError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_run
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
 from falsifier.stl.margins import margin_words, signed
 
@@ -223,3 +225,53 @@ def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     raise SpecError(
         f"this run searched {', '.join(described.names)}; choose one with --requirement NAME", file=str(place)
     )
+
+
+def known_inputs(place: Path, problem: Problem) -> Fitted:
+    """Read known inputs, and fit them to a problem's search space.
+
+    Args:
+        place: a CSV file of inputs, a counterexample file, or a run directory, of which the evaluation with
+            the smallest robustness is taken.
+        problem: the problem that is to be searched.
+
+    Raises:
+        SpecError: if the place is none of these, or the run simulated nothing with success.
+        CandidateError: naming the place and what does not fit the search space.
+    """
+    found = replace(_contained(place, problem), origin=KNOWN, rationale=f"from {place}")
+    try:
+        return fit(problem.space, found)
+    except CandidateError as error:
+        raise CandidateError(f"{place}: {error}") from None
+
+
+def recorded_inputs(place: Path, requirement: str) -> Candidate:
+    """Return a counterexample, or the candidate with the smallest robustness in a run.
+
+    Args:
+        place: counterexample file or run directory.
+        requirement: the requirement that a run is judged by, if it searched that; otherwise the run's first.
+
+    Raises:
+        SpecError: if it is neither, or every simulation of the run failed.
+    """
+    if not holds_run(place):
+        return Candidate.from_json(load(place).candidate)
+    names = manifest.read(place).names
+    judged = judged_candidates(place, requirement if requirement in names else names[0])
+    if not judged:
+        raise SpecError(f"{place}: no simulation of this run has a verdict; choose another run")
+    return min(judged, key=lambda pair: pair[0])[1]
+
+
+def judged_candidates(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
+    """Return the robustness and the candidate of each recorded simulation with a verdict, in order."""
+    evaluations = recorded_evaluations(directory, read_journal(directory), requirement).values()
+    return [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
+
+
+def _contained(place: Path, problem: Problem) -> Candidate:
+    if place.suffix.lower() == ".csv" and not place.is_dir():
+        return Candidate(read_inputs(place, problem.info).signals)
+    return recorded_inputs(place, problem.name)

@@ -7,12 +7,18 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
 from falsifier.cli import main
+from falsifier.cli.files import write_counterexample
 from falsifier.core.files import bundled
-from tests.command import Done
+from falsifier.counterexamples.store import load
+from falsifier.evaluation.confirm import confirm
+from falsifier.evaluation.evaluate import evaluate
+from falsifier.testing import lag_problem
+from tests.command import Done, falsifier
 from tests.llm.server import Step, serving
-from tests.pictures import CRITICAL, OUTPUT, colours
+from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
 
 def run(folder: Path, *arguments: str) -> Done:
@@ -218,3 +224,50 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         assert (done.code, why in done.err) == (2, True), done.err
     assert own.read_bytes() == b"PK mine"
     assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]
+
+
+PROBLEM = lag_problem()
+FOUND = confirm(PROBLEM, evaluate(PROBLEM, PROBLEM.space.decode([1.0] * 4)))
+
+
+def test_a_counterexample_is_a_file_with_its_picture_beside_it(tmp_path: Path) -> None:
+    data, picture = write_counterexample(FOUND, tmp_path / "run")
+    assert load(data).robustness == FOUND.evaluation.robustness
+    assert data == tmp_path / "run" / "counterexample.json"
+    assert picture == data.with_suffix(".png")
+    assert {OUTPUT, INPUT, CRITICAL} <= colours(picture)
+
+
+def test_the_picture_is_named_and_titled_like_the_counterexample(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    titles: list[str] = []
+
+    def keep(figure: Figure, path: Path) -> None:
+        titles.append(figure.get_suptitle())
+
+    monkeypatch.setattr("falsifier.views.plotting.save_figure", keep)
+    files = write_counterexample(FOUND, tmp_path, name="fragile-1.json")
+    assert [f.name for f in files] == ["fragile-1.json", "fragile-1.png"]
+    assert json.loads(files[0].read_text())["outcome"] == "confirmed"
+    assert titles[0].startswith("LAG: x <= 0.9 was violated from")
+    assert f"robustness {FOUND.evaluation.robustness:+.5g}" in titles[0]
+
+
+def test_a_run_that_falsified_nothing_is_asked_about_its_nearest_miss(tmp_path: Path) -> None:
+    never = "python:tests.problems:impossible"
+    falsifier("run", never, "--engine", "uniform", "--budget", "5", "--quiet", "--out", "r", cwd=tmp_path)
+    told = [
+        falsifier("explain", "r", *part, cwd=tmp_path)
+        for part in ((), ("--shrink",), ("--map", "--budget", "7"))
+    ]
+    for done in told:
+        assert done.code == 0, done.err
+        assert "NEVER was not falsified in 5 simulations; this is about the nearest miss" in done.out
+        assert "counterexample" not in done.out
+    pictures = ("nearest-miss.png", "shrunk.png", "robustness-map.png")
+    assert all((tmp_path / "r" / name).exists() for name in pictures)
+    shrunk = falsifier("simulate", never, "--inputs", "r/shrunk.csv", cwd=tmp_path)
+    assert shrunk.code == 0 and "not violated by these inputs" in shrunk.out
+    refused = falsifier("explain", "r", "--map", "--at-most", "0.1", cwd=tmp_path)
+    assert refused.code == 2 and "--at-most: applies to --shrink only" in refused.err

@@ -18,16 +18,22 @@ import shutil
 from pathlib import Path
 
 from falsifier.core.files import file_name
-from falsifier.counterexamples.export.components import write_components
-from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.package import write_package
+from falsifier.counterexamples.export.components import write_components, write_package
 from falsifier.counterexamples.export.scripts import (
     identifier,
     openmodelica_script,
     pytest_file,
     replay_script,
 )
-from falsifier.counterexamples.export.tables import file_columns, write_csv, write_json, write_mat, write_ssv
+from falsifier.counterexamples.export.tables import (
+    file_columns,
+    input_table,
+    start_values,
+    write_csv,
+    write_json,
+    write_mat,
+    write_ssv,
+)
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel, System

@@ -1,4 +1,4 @@
-"""What each component of a system saw at its ports, so that it can be simulated and debugged alone.
+"""A system as an SSP package, and what each of its components saw at its ports, to simulate it alone.
 
 ::
 
@@ -10,9 +10,12 @@
 """
 
 import shutil
-from collections.abc import Iterator, Mapping
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import tomlkit
@@ -23,14 +26,31 @@ from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
 from falsifier.core.model import Variable
 from falsifier.core.trajectory import Trajectory
-from falsifier.counterexamples.export.inputs import InputTable, start_values
-from falsifier.counterexamples.export.tables import write_csv, write_json
+from falsifier.counterexamples.export.tables import (
+    InputTable,
+    parameter_set,
+    start_values,
+    write_csv,
+    write_json,
+)
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.stl.names import name_text
 
+_NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
+_SSD, _SSC = f"{{{_NAMESPACE}Description}}", f"{{{_NAMESPACE}Common}}"
+# Types of connectors; items of enumerations are numbers here.
+_TYPES: Mapping[str, str] = {
+    "real": "Real",
+    "integer": "Integer",
+    "enumeration": "Integer",
+    "boolean": "Boolean",
+    "string": "String",
+}
+_FMU_TYPE = "application/x-fmu-sharedlibrary"
+_IMPLEMENTATIONS = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 # Folder of an export in which each component has one.
 FOLDER = "components"
 # Share by which the outputs may leave the range that they had in the system.
@@ -267,3 +287,90 @@ def _range(column: Floats, variable: Variable) -> tuple[float, float]:
 def _around(column: Floats) -> tuple[float, float]:
     low, high = float(column.min()), float(column.max())
     return low - _MARGIN * max(1.0, abs(low)), high + _MARGIN * max(1.0, abs(high))
+
+
+def write_package(system: System, stop_time: float, resources: Mapping[str, Path], path: Path) -> Path:
+    """Write a system as an SSP 1.0 package.
+
+    Conversions of units are written as the transformations that they are. What SSP has no place for is left
+    out: steps of components' own, and how values are exchanged.
+
+    Args:
+        system: the system.
+        stop_time: stop time of the default experiment in s.
+        resources: files to add, by name; an ``.ssv`` file among them is bound to the system.
+        path: the ``.ssp`` file to write.
+    """
+    network = system.network
+    sources = {m.name: f"resources/{m.folder}_{m.path.name}" for m in network.members}
+    for short, name in (("ssd", "Description"), ("ssc", "Common")):
+        ElementTree.register_namespace(short, _NAMESPACE + name)
+    root = Element(f"{_SSD}SystemStructureDescription", {"version": "1.0", "name": system.name})
+    whole = SubElement(root, f"{_SSD}System", {"name": system.name})
+    _connectors(whole, [v for v in system.info.inputs if network.places[v.name].member == SYSTEM])
+    _bindings(whole, system, [f"resources/{name}" for name in resources if name.endswith(".ssv")])
+    elements = SubElement(whole, f"{_SSD}Elements")
+    for member in network.members:
+        attributes = {
+            "name": member.name,
+            "source": sources[member.name],
+            "type": _FMU_TYPE,
+            "implementation": _IMPLEMENTATIONS[member.interface],
+        }
+        component = SubElement(elements, f"{_SSD}Component", attributes)
+        info = member.description.info
+        _connectors(component, (*info.inputs, *info.outputs, *info.parameters))
+    connections = SubElement(whole, f"{_SSD}Connections")
+    for link in network.links:
+        _connection(connections, link, network)
+    SubElement(root, f"{_SSD}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(stop_time)})
+    _write(path, root, {sources[m.name]: m for m in network.members}, resources)
+    return path
+
+
+def _connectors(element: Element, variables: Iterable[Variable]) -> None:
+    found = [v for v in variables if not v.alias_of]
+    if not found:
+        return
+    ports = SubElement(element, f"{_SSD}Connectors")
+    for variable in found:
+        port = SubElement(ports, f"{_SSD}Connector", {"name": variable.name, "kind": variable.causality})
+        unit = {"unit": variable.unit} if variable.unit and variable.kind == "real" else {}
+        SubElement(port, f"{_SSC}{_TYPES[variable.kind]}", unit)
+
+
+def _bindings(element: Element, system: System, files: Iterable[str]) -> None:
+    """Bind the system's own values, then those of files, which win because they are later."""
+    bindings = Element(f"{_SSD}ParameterBindings")
+    if system.frame.values:
+        values = SubElement(SubElement(bindings, f"{_SSD}ParameterBinding"), f"{_SSD}ParameterValues")
+        values.append(parameter_set(dict(system.frame.values), system.name))
+    for source in files:
+        SubElement(bindings, f"{_SSD}ParameterBinding", {"source": source})
+    if len(bindings):
+        element.append(bindings)
+
+
+def _connection(parent: Element, link: Link, network: Network) -> None:
+    source = link.source.member
+    attributes = {} if source == SYSTEM else {"startElement": network.members[source].name}
+    attributes |= {
+        "startConnector": link.source.name,
+        "endElement": network.members[link.target.member].name,
+        "endConnector": link.target.name,
+        "suppressUnitConversion": "true",
+    }
+    connection = SubElement(parent, f"{_SSD}Connection", attributes)
+    if (link.factor, link.offset) != (1.0, 0.0):
+        numbers = {"factor": repr(link.factor), "offset": repr(link.offset)}
+        SubElement(connection, f"{_SSC}LinearTransformation", numbers)
+
+
+def _write(path: Path, root: Element, fmus: Mapping[str, Member], resources: Mapping[str, Path]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
+        text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+        package.writestr("SystemStructure.ssd", text)
+        for source, member in fmus.items():
+            package.write(member.path, source)
+        for name, file in resources.items():
+            package.write(file, f"resources/{name}")

@@ -1,5 +1,3 @@
-"""A component alone, with what it saw in the system, gives the same outputs."""
-
 import csv
 import json
 import zipfile
@@ -11,14 +9,17 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.export.components import FOLDER, write_components
+from falsifier.counterexamples.export.components import FOLDER, write_components, write_package
+from falsifier.counterexamples.export.tables import write_ssv
 from falsifier.evaluation.evaluate import simulate
 from falsifier.evaluation.input_file import read_inputs
-from falsifier.fmu import Component, Connection, Coupling, System
+from falsifier.fmu import Component, Connection, Coupling, System, read_package
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from tests.fmu.fixtures import path
-from tests.fmu.small_systems import LOOP, component, solved, system
+from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
+from tests.fmu.small_systems import LOOP, component, run, solved
+from tests.fmu.small_systems import system as built
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
 LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
@@ -58,7 +59,7 @@ def test_each_component_alone_does_what_it_did_in_the_system(
     coupling: Coupling,
     tmp_path: Path,
 ) -> None:
-    whole = problem_of(system({"plant": plant, "pi": pi}, links, coupling))
+    whole = problem_of(built({"plant": plant, "pi": pi}, links, coupling))
     write_components(whole, DRIVE, tmp_path)
     for name in ("plant", "pi"):
         folder = tmp_path / "components" / name
@@ -74,7 +75,7 @@ def test_each_component_alone_does_what_it_did_in_the_system(
 
 
 def test_a_constant_input_at_its_upper_limit_gets_a_range_that_the_fmu_allows(tmp_path: Path) -> None:
-    whole = problem_of(system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP))
+    whole = problem_of(built({"plant": "Plant_2", "pi": "Gain_2"}, LOOP))
     write_components(whole, Candidate({"pi.r": Signal((0.0,), (2.0,))}, {"plant.T": 1.5}), tmp_path)
     alone = load_problem(str(tmp_path / "components" / "pi" / "pi.toml"))
     assert alone.info["r"].high == 2.0
@@ -105,3 +106,55 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
     alone = load_problem(str(tmp_path / FOLDER / "plant" / "plant.toml"))
     assert [r.name for r in alone.space.inputs] == [odd["u"]]
     assert alone.requirement.formula.signals == (odd["y"],)
+
+
+def again(model: System, tmp_path: Path, resources: dict[str, Path] | None = None) -> System:
+    found = read_package(write_package(model, 3.0, resources or {}, tmp_path / "again.ssp"))
+    return found
+
+
+def test_trajectories_conversions_and_the_stop_time_stay(tmp_path: Path) -> None:
+    links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5, offset=0.1)}
+    model = built({"plant": "Plant_2", "pi": "Gain_3"}, links)
+    csv = tmp_path / "input.csv"
+    csv.write_text("time\n")
+    ssv = write_ssv({"plant.T": 3.0, "plant.x": 0.2}, "R", tmp_path / "start_values.ssv")
+    found = again(model, tmp_path, {csv.name: csv, ssv.name: ssv})
+    assert found.info.stop_time == 3.0 and found.info.connections == model.info.connections
+    given = {"plant.T": 3.0, "plant.x": 0.2}
+    np.testing.assert_array_equal(
+        run(found, "plant.x")["plant.x"], run(model, "plant.x", parameters=given)["plant.x"]
+    )
+    with zipfile.ZipFile(tmp_path / "again.ssp") as package:
+        assert {"resources/input.csv", "resources/start_values.ssv"} <= set(package.namelist())
+
+
+def test_inputs_and_values_of_the_whole_stay(tmp_path: Path) -> None:
+    ports = """<ssd:Connectors><ssd:Connector name="r" kind="input"><ssc:Real/></ssd:Connector>
+      </ssd:Connectors><ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"""
+    ports += f"{values('plant.T Real 4', 'r Real 0.5')}</ssd:ParameterValues></ssd:ParameterBinding>"
+    wire = '<ssd:Connection startConnector="r" endElement="pi" endConnector="r"/>'
+    ssd = structure(system(PLANT + PI, FEEDBACK + wire, before=f"{ports}</ssd:ParameterBindings>"))
+    model = read_package(write(tmp_path / "a.ssp", ssd, "Plant_2", "Gain_2"))
+    found = again(model, tmp_path)
+    assert [v.name for v in found.info.inputs] == ["r"] and found.frame.values == model.frame.values
+    np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
+
+
+def test_interfaces_stay(tmp_path: Path) -> None:
+    model = built({"plant": solved("Lag_2"), "pi": "Gain_3"}, LOOP)
+    found = again(model, tmp_path)
+    assert [m.interface for m in found.network.members] == ["model-exchange", "co-simulation"]
+    np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
+
+
+def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
+    from fmpy.ssp.ssd import read_ssd
+
+    links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5)}
+    ssv = write_ssv({"plant.T": 3.0}, "R", tmp_path / "start_values.ssv")
+    file = write_package(
+        built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
+    )
+    found = read_ssd(str(file), validate=True)
+    assert [e.name for e in found.system.elements] == ["plant", "pi"]

@@ -8,8 +8,7 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
 from falsifier.counterexamples.export import export_counterexample
-from falsifier.counterexamples.export.inputs import input_table, start_values
-from falsifier.counterexamples.export.tables import write_csv, write_json
+from falsifier.counterexamples.export.tables import input_table, start_values, write_csv, write_json
 from falsifier.counterexamples.store import FILE_NAME, to_store
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
