@@ -3,80 +3,64 @@
 from collections.abc import Mapping
 
 _SATURATION = ("LimitOutput", "UpperSaturationLimit", "LowerSaturationLimit")
-_TABLE = tuple(f"BreakpointsForDimension{i}" for i in range(1, 6))
-# By block type, with the names that the format gives them; the sample time is added to all.
+# Block types with the parameters that count, by the names that the format gives them; the sample time is
+# added to all.
+_LISTED = r"""
+    Abs Assertion DataTypeConversion Derivative Ground Mux Scope SignalConversion Signum SubSystem \
+        Terminator ZeroOrderHold:
+    Backlash: BacklashWidth InitialOutput
+    BusCreator Product Sum: Inputs
+    BusSelector: OutputSignals
+    Constant InitialCondition: Value
+    DataStoreMemory: DataStoreName InitialValue
+    DataStoreRead DataStoreWrite: DataStoreName
+    DeadZone: LowerValue UpperValue
+    Delay: DelayLength InitialCondition
+    Demux: Outputs
+    DiscreteFilter DiscreteTransferFcn: Numerator Denominator InitialStates
+    DiscreteIntegrator: gainval InitialCondition IntegratorMethod LimitOutput UpperSaturationLimit \
+        LowerSaturationLimit
+    DiscretePulseGenerator: Amplitude Period PulseWidth PhaseDelay
+    DiscreteStateSpace StateSpace: A B C D X0 InitialCondition
+    DiscreteZeroPole ZeroPole: Zeros Poles Gain
+    EnablePort: StatesWhenEnabling
+    Fcn: Expr
+    From: GotoTag
+    Gain: Gain
+    Goto: GotoTag TagVisibility
+    HitCross: HitCrossingOffset HitCrossingDirection
+    If: IfExpression ElseIfExpressions
+    Inport: OutMin OutMax
+    Integrator: InitialCondition ExternalReset LimitOutput UpperSaturationLimit LowerSaturationLimit
+    Logic Math RelationalOperator Rounding Trigonometry: Operator
+    Lookup: InputValues OutputValues Table
+    Lookup2D: RowIndex ColumnIndex Table
+    Lookup_n-D: BreakpointsForDimension1 BreakpointsForDimension2 BreakpointsForDimension3 \
+        BreakpointsForDimension4 BreakpointsForDimension5 Table InterpMethod ExtrapMethod
+    Memory UnitDelay: X0 InitialCondition
+    Merge: InitialOutput
+    MinMax: Function
+    MultiPortSwitch: DataPortIndices
+    Outport: InitialOutput OutMin OutMax
+    Quantizer: QuantizationInterval
+    RateLimiter: RisingSlewLimit FallingSlewLimit risingSlewLimit fallingSlewLimit
+    RateTransition: OutPortSampleTime
+    Relay: OnSwitchValue OffSwitchValue OnOutputValue OffOutputValue
+    Saturate Saturation: UpperLimit LowerLimit
+    Selector: Indices IndexOptions
+    Sin: Amplitude Frequency Phase Bias
+    Step: Time Before After
+    Switch: Criteria Threshold
+    ToWorkspace: VariableName
+    TransferFcn: Numerator Denominator
+    TransportDelay: DelayTime InitialOutput
+    TriggerPort: TriggerType
+    VariableTransportDelay: MaximumDelay InitialOutput
+"""
 _MEANINGFUL: Mapping[str, tuple[str, ...]] = {
-    "Abs": (),
-    "Assertion": (),
-    "Backlash": ("BacklashWidth", "InitialOutput"),
-    "BusCreator": ("Inputs",),
-    "BusSelector": ("OutputSignals",),
-    "Constant": ("Value",),
-    "DataTypeConversion": (),
-    "DataStoreMemory": ("DataStoreName", "InitialValue"),
-    "DataStoreRead": ("DataStoreName",),
-    "DataStoreWrite": ("DataStoreName",),
-    "DeadZone": ("LowerValue", "UpperValue"),
-    "Delay": ("DelayLength", "InitialCondition"),
-    "Demux": ("Outputs",),
-    "Derivative": (),
-    "DiscreteFilter": ("Numerator", "Denominator", "InitialStates"),
-    "DiscreteIntegrator": ("gainval", "InitialCondition", "IntegratorMethod", *_SATURATION),
-    "DiscretePulseGenerator": ("Amplitude", "Period", "PulseWidth", "PhaseDelay"),
-    "DiscreteStateSpace": ("A", "B", "C", "D", "X0", "InitialCondition"),
-    "DiscreteTransferFcn": ("Numerator", "Denominator", "InitialStates"),
-    "DiscreteZeroPole": ("Zeros", "Poles", "Gain"),
-    "EnablePort": ("StatesWhenEnabling",),
-    "Fcn": ("Expr",),
-    "From": ("GotoTag",),
-    "Gain": ("Gain",),
-    "Goto": ("GotoTag", "TagVisibility"),
-    "Ground": (),
-    "HitCross": ("HitCrossingOffset", "HitCrossingDirection"),
-    "If": ("IfExpression", "ElseIfExpressions"),
-    "InitialCondition": ("Value",),
-    "Inport": ("OutMin", "OutMax"),
-    "Integrator": ("InitialCondition", "ExternalReset", *_SATURATION),
-    "Logic": ("Operator",),
-    "Lookup": ("InputValues", "OutputValues", "Table"),
-    "Lookup2D": ("RowIndex", "ColumnIndex", "Table"),
-    "Lookup_n-D": (*_TABLE, "Table", "InterpMethod", "ExtrapMethod"),
-    "Math": ("Operator",),
-    "Memory": ("X0", "InitialCondition"),
-    "Merge": ("InitialOutput",),
-    "MinMax": ("Function",),
-    "MultiPortSwitch": ("DataPortIndices",),
-    "Mux": (),
-    "Outport": ("InitialOutput", "OutMin", "OutMax"),
-    "Product": ("Inputs",),
-    "Quantizer": ("QuantizationInterval",),
-    "RateLimiter": ("RisingSlewLimit", "FallingSlewLimit", "risingSlewLimit", "fallingSlewLimit"),
-    "RateTransition": ("OutPortSampleTime",),
-    "Relay": ("OnSwitchValue", "OffSwitchValue", "OnOutputValue", "OffOutputValue"),
-    "RelationalOperator": ("Operator",),
-    "Rounding": ("Operator",),
-    "Saturate": ("UpperLimit", "LowerLimit"),
-    "Saturation": ("UpperLimit", "LowerLimit"),
-    "Scope": (),
-    "Selector": ("Indices", "IndexOptions"),
-    "SignalConversion": (),
-    "Signum": (),
-    "Sin": ("Amplitude", "Frequency", "Phase", "Bias"),
-    "StateSpace": ("A", "B", "C", "D", "X0", "InitialCondition"),
-    "Step": ("Time", "Before", "After"),
-    "SubSystem": (),
-    "Sum": ("Inputs",),
-    "Switch": ("Criteria", "Threshold"),
-    "Terminator": (),
-    "ToWorkspace": ("VariableName",),
-    "TransferFcn": ("Numerator", "Denominator"),
-    "TransportDelay": ("DelayTime", "InitialOutput"),
-    "TriggerPort": ("TriggerType",),
-    "Trigonometry": ("Operator",),
-    "UnitDelay": ("X0", "InitialCondition"),
-    "VariableTransportDelay": ("MaximumDelay", "InitialOutput"),
-    "ZeroOrderHold": (),
-    "ZeroPole": ("Zeros", "Poles", "Gain"),
+    kind: tuple(names.split())
+    for kinds, _, names in (line.partition(":") for line in _LISTED.replace("\\\n", "").splitlines())
+    for kind in kinds.split()
 }
 # Of blocks that are not listed (masks, references, S-functions), everything counts but these.
 _DRAWN_NAMES = """
