@@ -37,7 +37,7 @@ def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | 
 
 
 def with_context(problem: Problem) -> Problem:
-    """Return the problem with what its context files say, cut to what its requirement depends on.
+    """Return the problem with what its context files say.
 
     Raises:
         SpecError: naming the file that cannot be read, or the line that looks like a secret.
