@@ -81,14 +81,6 @@ def test_what_goes_wrong_is_a_failed_simulation(
     assert caught.value.status == "failed"
 
 
-def test_info_finds_variables_by_name_and_role() -> None:
-    assert INFO["area"].start == 2.0
-    assert "level" in INFO and "pressure" not in INFO
-    assert [v.name for v in INFO.parameters] == ["area"]
-    with pytest.raises(KeyError, match="did you mean 'inflow'"):
-        INFO["inflwo"]
-
-
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [

@@ -115,12 +115,6 @@ def test_a_string_that_names_no_file_reaches_the_model_as_it_is() -> None:
     problem.model.close()
 
 
-def test_huge_limits_are_no_limits() -> None:
-    info = read_info(fixtures.path("HugeLimits_2"))
-    assert [(info[n].low, info[n].high) for n in ("u", "x")] == [(None, None)] * 2
-    assert not info["u"].is_bounded
-
-
 def test_two_names_of_one_input_are_one_input() -> None:
     info = read_info(fixtures.path("Aliases_3"))
     assert [v.name for v in info.inputs] == ["u"]

@@ -110,16 +110,6 @@ def test_a_saved_state_has_what_is_in_the_delays(build: Build, serialized: bool)
         target.fmu.freeFMUState(saved)
 
 
-def test_reset_empties_the_delays(build: Build) -> None:
-    with opened(build("Delays")) as [fmu]:
-        fmu.start(T=0.3)
-        expected = rows_from(fmu, 0.0, STOP)
-        for _ in range(2):
-            fmu.fmu.reset()
-            fmu.start(T=0.3)
-            assert np.array_equal(rows_from(fmu, 0.0, STOP), expected)
-
-
 def test_values_at_the_start_are_those_of_the_initial_system(build: Build) -> None:
     with opened(build("Delays")) as [fmu]:
         fmu.fmu.setupExperiment(startTime=0.0)
@@ -134,18 +124,6 @@ def test_values_at_the_start_are_those_of_the_initial_system(build: Build) -> No
         assert fmu.get("late") == 6
         fmu.step(0.2)
         assert fmu.get("late") == -1
-
-
-def test_instances_have_delays_of_their_own(build: Build) -> None:
-    with opened(build("Delays"), 2) as [one, two]:
-        one.start(u=1.0)
-        two.start(u=2.0)
-        for k in range(60):
-            one.set({"u": float(k)})
-            one.step(STEP)
-            two.step(STEP)
-        assert two.get("late") == 2
-        assert one.get("late") == pytest.approx(30, abs=1.01)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import zipfile
 
 import numpy as np
 import pytest
@@ -70,10 +69,6 @@ def test_sampling_is_exact(build: Build) -> None:
     assert rows[:, 2] == pytest.approx(k // 3 / 30, abs=1e-12)
     assert np.array_equal(rows[:, 3], 10 - np.searchsorted([0.25, 0.75, 1.25, 1.75], k / 90, side="right"))
     assert np.array_equal(rows[:, 4], rows[:, 1] % 2)
-
-
-def test_sampling_with_another_period(build: Build) -> None:
-    assert final(build, "Counter", ["ticks"], 1, period=0.125) == [9]
 
 
 def test_sampling_after_a_late_start(build: Build) -> None:
@@ -224,12 +219,6 @@ def test_enumerations_as_inputs_parameters_and_states(build: Build, fmi: int, in
     model.close()
 
 
-def test_an_enumeration_without_a_start_value_begins_with_its_first_item(build: Build) -> None:
-    with opened(build("Enumerated")) as [fmu]:
-        assert fmu.variables["command"].start == "1"
-        assert fmu.fmu.getInteger([fmu.variables["command"].valueReference]) == [1]
-
-
 NAMES = ("follower", "level", "slow", "echo", "turns")
 TIMES = np.linspace(0, 6, 61)
 
@@ -270,13 +259,3 @@ def test_the_other_interface_has_the_same_solution(build: Build) -> None:
     one, other = simulated(build, 1e-9), simulated(build, 1e-9, exchange=True)
     for name in NAMES:
         assert one[name] == pytest.approx(other[name], abs=1e-4), name
-
-
-def test_slopes_are_moved_in_groups(build: Build) -> None:
-    with zipfile.ZipFile(build("Stiff")) as archive:
-        sizes = archive.read("sources/sizes.h").decode()
-        assert "sources/implicit.h" in archive.namelist()
-        assert "sources/explicit.h" not in archive.namelist()
-    assert "#define MODEL_STATES 4\n" in sizes
-    assert "#define MODEL_GROUPS 2\n" in sizes
-    assert "#define MODEL_SLOPES_OF_TIME 1\n" in sizes

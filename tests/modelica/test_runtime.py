@@ -26,13 +26,6 @@ def test_reset_gives_the_same_run_again() -> None:
     assert first[-1, 3] > 1
 
 
-def test_reset_forgets_parameters(build: Build) -> None:
-    with opened(build("Decay")) as [fmu]:
-        fmu.start(k=5.0).step(0.1)
-        fmu.fmu.reset()
-        assert fmu.start().get("k") == 2
-
-
 @pytest.mark.parametrize("serialized", [False, True])
 def test_state_can_be_saved_and_restored(serialized: bool) -> None:
     with opened(AT, 2) as [one, two]:
@@ -69,15 +62,6 @@ def test_the_size_of_communication_steps_does_not_matter() -> None:
             results.append(fmu.start(throttle=77).run(["speed", "rpm", "gear"], 20, size)[-1, 1:])
     for other in results[1:]:
         assert other == pytest.approx(results[0], rel=1e-9)
-
-
-def test_steps_that_do_not_fit_the_solver_step() -> None:
-    with opened(AT) as [fmu]:
-        rows = fmu.start(throttle=77).run(["speed", "gear"], 20, 0.007)
-    with opened(AT) as [fmu]:
-        expected = fmu.start(throttle=77).run(["speed", "gear"], 20, 0.01)
-    assert rows[-1, 1] == pytest.approx(np.interp(rows[-1, 0], expected[:, 0], expected[:, 1]), abs=1e-4)
-    assert rows[-1, 2] == expected[-1, 2]
 
 
 @pytest.mark.parametrize(
@@ -142,13 +126,6 @@ def test_fixed_parameters_and_outputs_cannot_be_set_during_simulation(build: Bui
         for name in ("x0", "y", "twice"):
             with pytest.raises(FMICallException):
                 fmu.set({name: 1.0})
-
-
-def test_a_step_from_another_time_is_an_error(build: Build) -> None:
-    with opened(build("Decay")) as [fmu]:
-        fmu.start()
-        with pytest.raises(FMICallException):
-            fmu.fmu.doStep(0.5, 0.1)
 
 
 def test_thousands_of_instances_and_runs_leave_no_memory_behind() -> None:

@@ -82,14 +82,3 @@ def test_independent_baths(fmu: Driver) -> None:
             assert found[output][same] == pytest.approx(expected[same, k], abs=1e-6), output
         trips += int(found["trips"][-1])
     assert 20 < trips < 190
-
-
-def test_only_the_fault_makes_the_bath_too_hot(fmu: Driver) -> None:
-    rng = np.random.default_rng(40)
-    for _ in range(100):
-        pieces = rng.choice([5.0, 7.0, 0.2], 20)
-        inputs = {"disagreement": held(pieces.tolist())}
-        always_frozen = {"settling": 0.0}
-        rows = fmu.run(inputs, OUTPUTS, stop_time=STOP, samples=401, parameters=always_frozen)
-        assert rows[:, 0].max() < 62
-        assert rows[-1, 2] == 0

@@ -46,9 +46,3 @@ def test_golden_start(fmu: Driver) -> None:
     rows = fmu.run({"Ref": np.full(11, 2.0)}, ("NNPos", "Pos"), stop_time=0.1, samples=11)
     assert rows[[round(t * 100) for t in start["times"]], 0] == pytest.approx(start["NNPos"], abs=1e-5)
     assert rows[10, 1] == pytest.approx(start["Pos_at_0_1"], abs=1e-5)
-
-
-@pytest.mark.parametrize("reference", [1.0, 2.0, 3.0])
-def test_first_prediction_is_the_same_for_all_references(fmu: Driver, reference: float) -> None:
-    rows = fmu.run({"Ref": np.full(2, reference)}, ("NNPos",), stop_time=0.01, samples=2)
-    assert rows[0, 0] == pytest.approx(GOLDEN["start"]["NNPos_at_0"], abs=1e-7)

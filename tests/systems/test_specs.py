@@ -106,24 +106,6 @@ def test_each_piece_of_the_pedal_lasts_five_seconds() -> None:
     assert load_problem("AFC33").space.bounds[0].tolist() == [61.2, 81.2]
 
 
-def test_commands_are_those_of_the_enumeration() -> None:
-    [command] = load_problem("ChargerHandshake").space.inputs
-    names = ["Wait", "Lock", "Unlock", "Precharge", "Close", "Open", "Reset"]
-    assert [name for name, _ in command.items] == names
-    assert (command.low, command.high) == (1, 7)
-
-
-def test_requirement_named_as_its_system_is_meant_by_that_name() -> None:
-    assert load_problem("NN").name == "NN"
-    assert [p.name for p in load_problems("NN")] == ["NN", "NNb", "NNx"]
-
-
-def test_samples_of_f16_are_those_of_its_autopilot() -> None:
-    problem = load_problem("F16")
-    assert problem.experiment.samples == 451
-    assert problem.experiment.output_interval == pytest.approx(1 / 30, rel=1e-15)
-
-
 def test_published_tables_cover_the_specs() -> None:
     tables = published()
     names = {name for system in PUBLISHED for name in SYSTEMS[system][0].split()}

@@ -1,13 +1,11 @@
 import pickle
-from pathlib import Path
 
 import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu import Component, Coupling, System
-from tests.fmu.fixtures import path
+from falsifier.fmu import Coupling, System
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
 
@@ -85,9 +83,3 @@ def test_the_default_step_divides_the_steps_of_the_components(
 ) -> None:
     a, b = (component("Plant_2", step) for step in steps)
     assert system({"a": a, "b": b}, {}).info.step_size == pytest.approx(expected)
-
-
-def test_components_whose_names_make_two_variables_equal_are_refused() -> None:
-    aliases = Component(Path(path("Aliases_3")))  # has a variable plant.u
-    with pytest.raises(Exception, match=r"two variables of the system are named 'a\.plant\.u'"):
-        System({"a": aliases, "a.plant": path("Plant_2")})
