@@ -246,7 +246,7 @@ def test_starter_specs_of_any_fmu_are_toml(name: str, text: str, unit: str) -> N
 
 @given(names)
 def test_shell_commands_are_one_word_per_argument(name: str) -> None:
-    from falsifier.views.report.commands import run_command
+    from falsifier.views.report.wording import run_command
 
     request = RunRequest(problems=(ProblemSource(target=f"AT.toml:{name}"),))
     assert f"AT.toml:{name}" in shlex.split(run_command(request))

@@ -5,13 +5,14 @@ Both the matplotlib figures and the charts in reports are drawn from these panel
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
+from falsifier.record.manifest import InputRecord
 from falsifier.stl import Formula
 from falsifier.stl.breach import compared_sides
 from falsifier.stl.expression import Expression, unit_of
@@ -20,32 +21,10 @@ from falsifier.stl.monitor import Verdict
 
 Array = NDArray[np.float64]
 
+# A searched input, of a model or of a record.
+Range = InputRange | InputRecord
 # Values beyond this are drawn at this level: the height of a picture must not overflow.
 _LARGEST_DRAWN = 1e300
-
-
-class Range(Protocol):
-    """Name, bounds and unit of a searched input."""
-
-    @property
-    def name(self) -> str:
-        """Name of the input."""
-        ...
-
-    @property
-    def low(self) -> float:
-        """Lower bound."""
-        ...
-
-    @property
-    def high(self) -> float:
-        """Upper bound."""
-        ...
-
-    @property
-    def unit(self) -> str:
-        """Unit; empty if unknown."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,8 +8,8 @@ from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import plain
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.report.commands import replay_command, run_command
-from falsifier.views.report.content import searches, unshown
+from falsifier.views.report.content import searches
+from falsifier.views.report.wording import replay_command, run_command, unshown
 from falsifier.views.text import broken_lines
 
 

@@ -4,17 +4,15 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
-from falsifier.views.report.commands import replay_command, run_command
-from falsifier.views.report.content import (
-    Section,
-    Shown,
-    Side,
+from falsifier.views.report.content import Section, Shown, Side, gather
+from falsifier.views.report.wording import (
     advice,
     differences,
-    gather,
     input_table,
     limit_facts,
+    replay_command,
     result_text,
+    run_command,
     tried,
     trouble_lines,
     unshown_lines,

@@ -16,22 +16,17 @@ from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join, picture, table
-from falsifier.views.report.commands import replay_command, run_command
-from falsifier.views.report.content import (
-    Content,
-    Section,
-    Shown,
-    Side,
-    Status,
+from falsifier.views.report.content import Content, Section, Shown, Side, Status, gather, searches
+from falsifier.views.report.wording import (
     advice,
     differences,
-    gather,
     input_table,
     level_facts,
     limit_facts,
+    replay_command,
     result_text,
+    run_command,
     run_name,
-    searches,
     tried,
     trouble_lines,
     unshown_lines,

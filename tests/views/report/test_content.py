@@ -14,9 +14,9 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.report import junit_report, markdown_report
-from falsifier.views.report.commands import run_command
 from falsifier.views.report.content import gather
 from falsifier.views.report.page import html_report
+from falsifier.views.report.wording import run_command
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import hard, mostly_broken
 

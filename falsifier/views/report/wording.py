@@ -1,0 +1,260 @@
+"""What a report says of its content: phrases, facts, tables, and commands that repeat what it shows."""
+
+import shlex
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from falsifier.analyses.coverage import coverage_of
+from falsifier.campaigns.analysis import Run, Table
+from falsifier.campaigns.progress import total
+from falsifier.core.signals import Signal
+from falsifier.core.words import counted, listed
+from falsifier.problem.problem import held_text
+from falsifier.problem.refinement import without_limits
+from falsifier.problem.shorthand import options_from
+from falsifier.problem.source import ProblemSource
+from falsifier.record.journal import read_journal, recorded_candidates
+from falsifier.search.levels import level_results
+from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.stl import Verdict, parse
+from falsifier.stl.margins import is_on_limit, margin_words
+from falsifier.views.analyses_text import tried_facts
+from falsifier.views.report.content import Content, Section, Shown, searches
+from falsifier.views.text import Fact
+
+_BETWEEN = {
+    "constant": "held until the next row",
+    "linear": "linear between rows",
+    "pchip": "smooth between rows (pchip)",
+}
+# A run with more simulations is not searched for what it has tried: that takes a second per thousand.
+_MOST_COUNTED = 5000
+
+
+def differences(content: Content) -> Table:
+    """Return what the directories of a comparison differ in: files, formulas, engines, seeds and versions."""
+    columns: list[dict[str, list[str]]] = []
+    for side in content.sides:
+        told: dict[str, list[str]] = {}
+        for run in side.runs:
+            manifest = run.manifest
+            facts = {
+                "engine": run.method.label,
+                "seed": str(run.seed),
+                f"formula of {run.requirement}": manifest.requirement.formula,
+                **{Path(path).name: f"SHA-256 {digest[:12]}" for path, digest in manifest.hashes.items()},
+                "falsifier": manifest.falsifier,
+            }
+            for name, text in facts.items():
+                told.setdefault(name, [])
+                told[name] += [text] if text not in told[name] else []
+        columns.append(told)
+    names = dict.fromkeys(name for told in columns for name in told)
+    texts = {name: [", ".join(told.get(name, [])) for told in columns] for name in names}
+    differing = tuple((name, *cells) for name, cells in texts.items() if len(set(cells)) > 1)
+    return Table("What differs", ("", *(side.title for side in content.sides)), differing)
+
+
+def result_text(section: Section) -> str:
+    """Return in words what came of a requirement, over all its runs."""
+    runs = section.runs
+    found = [run for run in runs if run.falsified]
+    if found:
+        after = counted(min(run.simulations for run in found), "simulation")
+        if len(runs) == 1:
+            return f"violated: found after {after}"
+        return f"violated: found in {len(found)} of {len(runs)} runs, the quickest after {after}"
+    failed = [run for run in runs if run.status == "failed"]
+    if len(failed) == len(runs):
+        return f"failed: {failed[0].reason}"
+    count = counted(total(run.spent for run in searches(runs)).simulations, "simulation")
+    if not any(run.finished for run in runs):
+        return f"not finished: no violation in {count} so far"
+    tested = ""
+    if any(finding.untested for run in runs for finding in run.findings):
+        tested = ", and a part of it was not tested"
+    return f"no violation found in {count}{tested}"
+
+
+def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
+    """Return the limit, the value reached and when; without a violation, how near it came.
+
+    Args:
+        verdict: robustness, and what decided it.
+        units: units of the signals, by name.
+    """
+    if verdict.breach is not None:
+        main, never = verdict.breach.main, verdict.breach.main.never
+        unit = f" {main.unit}" if main.unit and main.part[-1].isdigit() else ""
+        span = f"from {main.start:.6g} s to {main.end:.6g} s" if main.start != main.end else ""
+        return [
+            ("required", f"{main.part}{unit}" + (" at some time" if never else "")),
+            ("nearest" if never else "reached", main.reading),
+            ("never held" if never else "violated", span or f"at {main.time:.6g} s"),
+            *([("worst", f"at {main.time:.6g} s")] if span and not never else []),
+            *(("", line) for line in verdict.breach.lines[1:]),
+        ]
+    signals = parse(verdict.predicate).signals
+    read = (f"{n} = {v:.6g} {units.get(n, '')}".strip() for n, v in verdict.values.items() if n in signals)
+    values = ", ".join(read)
+    robustness = f"{verdict.robustness:.6g} away from a violation"
+    if is_on_limit(verdict.robustness):
+        robustness = margin_words(verdict.robustness, verdict.predicate)
+    return [
+        ("required", verdict.predicate),
+        ("nearest", f"{robustness}: {values}" if values else robustness),
+        ("when", f"at {verdict.critical_time:.6g} s"),
+    ]
+
+
+def input_table(shown: Shown) -> Table:
+    """Return the inputs of a simulation as a table of their control points over time.
+
+    A cell is empty where an input has no control point; how it goes on between them stands in the header.
+    """
+    signals = {
+        name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal
+        for name, signal in shown.candidate.signals.items()
+    }
+    times = sorted({time for signal in signals.values() for time in signal.times})
+    points = {name: dict(zip(s.times, s.values, strict=True)) for name, s in signals.items()}
+    header = [f"{name}{_in_brackets(shown.units.get(name, ''))}, {_course(s)}" for name, s in signals.items()]
+    cells = {time: [points[name].get(time) for name in signals] for time in times}
+    rows = [
+        (f"{time:.6g}", *("" if value is None else f"{value:.6g}" for value in row))
+        for time, row in cells.items()
+    ]
+    return Table("Inputs", ("time [s]", *header), tuple(rows))
+
+
+def _in_brackets(unit: str) -> str:
+    return f" [{unit}]" if unit else ""
+
+
+def _course(signal: Signal) -> str:
+    """How an input goes on between its control points."""
+    if len(signal.times) == 1:
+        return "constant"
+    held = f", sampled every {signal.hold:g} s" if signal.hold and signal.interpolation != "constant" else ""
+    return f"{_BETWEEN[signal.interpolation]}{held}"
+
+
+def tried(section: Section) -> list[Fact]:
+    """Return what the run shown for a requirement has tried of what it searched, read from its record."""
+    if not section.shown or section.shown[0].run.simulations > _MOST_COUNTED:
+        return []
+    run = section.shown[0].run
+    candidates = recorded_candidates(read_journal(run.directory))
+    judged = [int(index) for index in np.flatnonzero(~np.isnan(run.robustness))]
+    return tried_facts(coverage_of(run.manifest, [(candidates[index], None) for index in judged]))
+
+
+def unshown(run: Run) -> list[str]:
+    """Return what a search could not show, one line each."""
+    texts = [*(finding.text for finding in run.findings), *(failure.text for failure in run.failures)]
+    held = held_text(h for h in run.manifest.not_searched if h.causality == "input")
+    return [*texts, *([f"not searched: {held}"] if held else [])]
+
+
+def unshown_lines(section: Section) -> list[str]:
+    """Return what the searches of a requirement could not show, one line each, with the runs that say so."""
+    told: dict[str, list[Run]] = {}
+    for run in section.runs:
+        for text in unshown(run):
+            told.setdefault(text, []).append(run)
+    return [
+        text if len(runs) == len(section.runs) else f"{listed(list(map(run_name, runs)))}: {text}"
+        for text, runs in told.items()
+    ]
+
+
+def trouble_lines(section: Section) -> Iterator[str]:
+    """Yield which runs failed or were interrupted, and which violations were not confirmed."""
+    for run in section.runs:
+        if run.status in ("failed", "interrupted"):
+            yield f"{run_name(run)}: {run.status}: {run.reason}"
+        for index, outcome in run.unconfirmed.items():
+            yield f"{run_name(run)}, simulation {index + 1}: {outcome}"
+
+
+def run_name(run: Run) -> str:
+    """What a run is called beside others: its method and its seed."""
+    return f"{run.method.label}, seed {run.seed}"
+
+
+def level_facts(run: Run) -> list[Fact]:
+    """Return what came of each level of a run that refined its inputs, and what the level searched."""
+    levels = run.manifest.levels
+    if not levels:
+        return []
+    found = level_results([level.first for level in levels], list(run.robustness), falsified=run.falsified)
+    return [(each.name, f"{each.text}: {level.searched}") for level, each in zip(levels, found, strict=True)]
+
+
+def advice(shown: Shown) -> str:
+    """Return the command that would simplify or explain a counterexample; empty if both are done."""
+    run = shown.run
+    if not run.falsified or (shown.is_shrunk and shown.explanation):
+        return ""
+    place = str(run.counterexample_file if run.shared else run.directory)
+    return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
+
+
+def replay_command(run: Run) -> str:
+    """Shell command that replays a run's counterexample."""
+    place = run.counterexample_file if run.shared else run.directory
+    return shlex.join(["falsifier", "replay", str(place)])
+
+
+def run_command(request: RunRequest, *, shared: bool = False) -> str:
+    """Shell command that repeats a run; shared: for all requirements of its spec.
+
+    >>> run_command(RunRequest(problems=(ProblemSource(target="AT1"),), engine="uniform"))
+    'falsifier run AT1 --engine uniform --budget 100 --seed 0'
+    """
+    problem, budget = request.source, request.budget
+    if problem is None:
+        return "(no command: the problem was made in Python)"
+    if shared and problem.stl is not None:
+        return "(no command: these requirements were searched together in Python)"
+    target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
+    options: list[tuple[str, object]] = [
+        ("--stl", problem.stl),
+        ("--parameterization", _parameterization(problem)),
+        *options_from(without_limits(problem.changes) if request.levels else problem.changes),
+        ("--engine", request.engine),
+        *(_llm_options(request.llm) if request.llm else ()),
+        ("--budget", budget.simulations),
+        ("--seconds", budget.seconds),
+        ("--max-tokens", budget.tokens),
+        ("--max-cost", budget.cost),
+        ("--seed", request.seed),
+        ("--jobs", request.jobs if request.jobs > 1 else None),
+        ("--refine", True if request.levels else None),
+    ]
+    words = ["falsifier", "run", target]
+    for name, value in options:
+        words += [] if value is None else [name] if value is True else [name, str(value)]
+    return shlex.join(words)
+
+
+def _parameterization(problem: ProblemSource) -> str | None:
+    kind = "fixed" if problem.parameterization == "fixed" else None
+    if problem.shortest_piece is not None:
+        kind = f"free:{problem.shortest_piece:g}"
+    return ",".join(word for word in (problem.profile, kind) if word) or None
+
+
+def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
+    return [
+        ("--llm", f"{llm.name}@{llm.effort}" if llm.effort else llm.name),
+        ("--api-base", llm.api_base),
+        ("--variant", llm.variant),
+        *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
+        ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
+        ("--llm-option", None if llm.reply == "json" else f"reply={llm.reply}"),
+        ("--anonymous", True if llm.anonymous else None),
+        ("--fallback", llm.fallback),
+    ]
