@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.store import Database, load, problem_of, replay, save, to_store
+from falsifier.counterexamples.store import Database, limited, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -175,3 +176,15 @@ def test_the_formula_is_kept_as_text() -> None:
 def test_a_path_may_be_a_text(tmp_path: Path) -> None:
     path = save(to_store(violation(lag_problem())), tmp_path / "counterexample.json")
     assert load(str(path)) == load(path) == load(str(tmp_path))
+
+
+def test_rights_move_with_the_file_and_a_spec_of_today_gives_no_more(folder: Path, tmp_path: Path) -> None:
+    problem = load_problem(f"{folder / 'my.toml'}:R", allow=[f"write:{folder}"])
+    path = save(to_store(violation(problem)), folder / "c.json")
+    assert json.loads(path.read_text())["allow"] == ["write:."]
+    folder.rename(tmp_path / "moved")
+    stored = load(tmp_path / "moved" / "c.json")
+    assert stored.allow is not None and [Path(w[6:]).name for w in stored.allow] == ["moved"]
+    found, withheld = limited(load_problem("AT1", allow=["programs"], deny=["network"]), stored.allow, ())
+    assert isinstance(found.model, FmuModel)
+    assert (found.model.allow, found.model.deny, withheld) == ((), ("network",), ("programs",))
