@@ -16,7 +16,6 @@ from falsifier.fmu.description import file_hash
 from falsifier.fmu.process import (
     REGISTRY,
     Policy,
-    Runner,
     Task,
     make_plan,
     make_task,
@@ -188,18 +187,6 @@ class System:
                     "another step here",
                     key=key,
                 )
-
-    def load(self) -> None:
-        """Load all libraries and make instances in a worker process, without simulating.
-
-        Raises:
-            ModelError: if that fails.
-        """
-        runner = Runner(REGISTRY.workplace, replace(_order(self), logging=True))
-        try:
-            runner.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
-        finally:
-            runner.close()
 
     def close(self) -> None:
         """End the worker processes; the next simulation starts again."""
