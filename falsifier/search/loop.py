@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -82,7 +82,9 @@ def search(
         _check_alike(problems[0], problem)
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     levels = tuple(levels) or (Level(0, problems[0].space),)
-    loop = _Loop(states, levels, budget, steps or Steps(), directory, tuple(listeners), prepared)
+    steps = steps or Steps()
+    began = perf_counter() - prepared - steps.seconds
+    loop = _Loop(states, levels, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
     status: ResultStatus
     try:
         loop.attach()
@@ -108,32 +110,25 @@ class _Started(NamedTuple):
     wait: Callable[[], Evaluation]
 
 
+@dataclass(slots=True)
 class _Loop:
     """State of a running search: the imperative shell around values and pure functions."""
 
-    def __init__(
-        self,
-        states: list[RequirementState],
-        levels: tuple[Level, ...],
-        budget: Budget,
-        steps: Steps,
-        directory: Path | None,
-        listeners: tuple[Listener, ...],
-        prepared: float,
-    ) -> None:
-        self.states = states
-        self.levels = levels
-        self.budget = budget
-        self.steps = steps
-        self.directory = directory
-        self.listeners = listeners
-        self.waiting: deque[_Started] = deque()
-        self.turns = self.count = 0
-        self.last_error = self.last_defect = ""
-        self.is_answered = False
-        self.started = perf_counter() - prepared - steps.seconds
-        self.spent = steps.unrepeated
-        self.unrecorded = ""
+    states: list[RequirementState]
+    levels: tuple[Level, ...]
+    budget: Budget
+    steps: Steps
+    directory: Path | None
+    listeners: tuple[Listener, ...]
+    started: float
+    spent: Spent
+    waiting: deque[_Started] = field(default_factory=deque)
+    turns: int = 0
+    count: int = 0
+    last_error: str = ""
+    last_defect: str = ""
+    is_answered: bool = False
+    unrecorded: str = ""
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
