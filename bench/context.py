@@ -1,7 +1,7 @@
 """How many simulations context saves, how long reading takes, and how many tokens it costs.
 
 HeaterLimpHome shows its fault only if limp-home mode begins again within 1.5 s after it ended. A scripted
-language model aims at these thresholds if its prompt tells them; the surrogate tries the levels that the
+language model aims at these thresholds if its prompt tells them; the surrogate tries the crossings that the
 files give. The Simulink files are the equivalent model of the tests.
 
     nice -n 15 python -m bench.context

@@ -4,7 +4,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from falsifier.context.levels import Definitions
+from falsifier.context.crossings import Definitions
 from falsifier.context.sources import Scope, Source, definitions_of, sides_of, split_at_commas
 from falsifier.context.thresholds import Threshold, thresholds, within
 

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from types import MappingProxyType
 
 from falsifier.context.c import c_comparisons
-from falsifier.context.levels import Definitions
+from falsifier.context.crossings import Definitions
 from falsifier.context.modelica import modelica_comparisons, roots_of
 from falsifier.context.simulink import Diagram, names_text, structure_text
 from falsifier.context.simulink.diagram import upstream

@@ -6,9 +6,9 @@ from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
 
+from falsifier.context.crossings import crossings_of
 from falsifier.context.excerpts import Readable, of_diagram, of_text, parsed
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
-from falsifier.context.levels import levels_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
 from falsifier.context.thresholds import Threshold
@@ -70,8 +70,8 @@ def gather(
         seeds: the requirement's signals: diagrams are cut to what they depend on.
         signals: all signals that the language model is told.
         checked: files with a line that looks like a secret and is none, by the names that messages give them.
-        ranges: bounds of the inputs and parameters whose levels are wanted.
-        is_told: whether anything is sent. If not, nothing is refused as a secret, and only levels are
+        ranges: bounds of the inputs and parameters whose crossings are wanted.
+        is_told: whether anything is sent. If not, nothing is refused as a secret, and only crossings are
             returned.
 
     Raises:
@@ -100,11 +100,13 @@ def gather(
     # Of the files inside an FMU, those with one form say nothing about the signals.
     contents = [(file, readable) for file, readable in contents if file.is_named or len(readable.forms) > 1]
     solved = (
-        level for _, readable in contents for level in levels_of(readable.found, readable.known, ranges)
+        crossing
+        for _, readable in contents
+        for crossing in crossings_of(readable.found, readable.known, ranges)
     )
-    levels = tuple(dict.fromkeys(solved))
+    crossings = tuple(dict.fromkeys(solved))
     if sentry is None:
-        return Context(levels=levels)
+        return Context(crossings=crossings)
     compared = tuple(_limited(_compared(contents, signals)))
     chosen = _fitting(contents, MAX_TOTAL - sum(_size(each) for each in compared))
     excerpts = []
@@ -116,7 +118,7 @@ def gather(
         form = f"{readable.forms[i].name}{', because the rest is too long' if i else ''}"
         excerpts.append(Excerpt(file.path, file.name, file.sha256, form, text))
     sentry.refuse_unused()
-    return Context(tuple(excerpts), compared, levels, (*left_out, *sentry.notes))
+    return Context(tuple(excerpts), compared, crossings, (*left_out, *sentry.notes))
 
 
 def _read(path: Path, name: str, sentry: Sentry | None) -> _File:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from falsifier.context.levels import Definitions
+from falsifier.context.crossings import Definitions
 from falsifier.context.sources import Component, Scope, Source, definitions_of
 from falsifier.context.thresholds import Threshold, at_breakpoints, number_in, thresholds, within
 

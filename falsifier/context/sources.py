@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from falsifier.context.levels import Definitions
+from falsifier.context.crossings import Definitions
 
 # Comments, texts and names in quotes may contain any sign. Patterns take what they have looked at, so that
 # time grows with the length of a file.

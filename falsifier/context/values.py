@@ -45,7 +45,7 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class Crossing:
     """A value of an input or parameter at which a comparison in a file changes.
 
     Attributes:
@@ -64,13 +64,13 @@ class Context:
     Attributes:
         excerpts: what is told of each file.
         comparisons: thresholds, signals of the model first.
-        levels: values of inputs and parameters at which a comparison changes; engines may try these.
+        crossings: values of inputs and parameters at which a comparison changes; engines may try these.
         notes: what a user should know of the reading: files left out, lines allowed. Not told.
     """
 
     excerpts: tuple[Excerpt, ...] = ()
     comparisons: tuple[Compared, ...] = ()
-    levels: tuple[Level, ...] = ()
+    crossings: tuple[Crossing, ...] = ()
     notes: tuple[str, ...] = ()
 
     def of(self, signal: str) -> tuple[str, ...]:

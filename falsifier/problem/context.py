@@ -70,8 +70,8 @@ def _gathered(problem: Problem, *, is_told: bool) -> Context:
     )
 
 
-def with_levels(problem: Problem) -> Problem:
-    """Return the problem with only the levels that its context files give: for engines, which send nothing.
+def with_crossings(problem: Problem) -> Problem:
+    """Return the problem with nothing of its context but the crossings: for engines, which send nothing.
 
     Raises:
         SpecError: naming the file that cannot be read.
@@ -79,7 +79,7 @@ def with_levels(problem: Problem) -> Problem:
     """
     if not problem.named_context or problem.context != Context():
         return problem
-    return replace(problem, context=Context(levels=_gathered(problem, is_told=False).levels))
+    return replace(problem, context=Context(crossings=_gathered(problem, is_told=False).crossings))
 
 
 @lru_cache(maxsize=1000)

@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.campaigns import Follower
 from falsifier.campaigns.directory import campaign_lock
-from falsifier.context.values import Level
+from falsifier.context.values import Crossing
 from falsifier.errors import JournalError, SpecError
 from falsifier.record import manifest
 from falsifier.record.run import falsify
@@ -40,7 +40,7 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
     result = command(*asked, "--context", "a.c", "--out", "c")
     assert result.exit_code == 0, result.output
     (place,) = (tmp_path / "c").rglob("manifest.json")
-    assert manifest.read(place.parent).contexts["AT1"].levels == (Level("throttle", 37.5),)
+    assert manifest.read(place.parent).contexts["AT1"].crossings == (Crossing("throttle", 37.5),)
     missing = command(*asked, "--context", "b.c", "--out", "d")
     assert isinstance(missing.exception, SpecError)
     assert "context b.c: cannot be read" in str(missing.exception)

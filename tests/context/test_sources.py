@@ -1,9 +1,9 @@
-"""What is compared in sources, by what each file says, and the levels that follow."""
+"""What is compared in sources, by what each file says, and the crossings that follow."""
 
 import pytest
 
+from falsifier.context.crossings import crossings_of
 from falsifier.context.excerpts import Readable, of_text, parsed
-from falsifier.context.levels import levels_of
 from falsifier.context.sources import Source
 from falsifier.core.files import bundled
 
@@ -24,8 +24,8 @@ def found(text: str, shown: str, seed: str, *more: str) -> list[str]:
     return [threshold.text for threshold in read(text, shown, seed, *more).found]
 
 
-def levels(readable: Readable) -> list[float]:
-    return [level.value for level in levels_of(readable.found, readable.known, {"u": (0.0, 10.0)})]
+def crossings(readable: Readable) -> list[float]:
+    return [crossing.value for crossing in crossings_of(readable.found, readable.known, {"u": (0.0, 10.0)})]
 
 
 def source(text: str, shown: str) -> Source:
@@ -86,7 +86,7 @@ def test_classes_conditions_and_sections_of_modelica() -> None:
     ]  # fmt: skip
     assert told.known.equal["w"] == "2 * u"
     assert not {"x", "mode"} & told.known.equal.keys()
-    assert levels(told) == [4.0, 4.25, 6.0, 7.0]
+    assert crossings(told) == [4.0, 4.25, 6.0, 7.0]
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_fields_of_generated_c_have_the_values_of_another_file(values: str) -> N
     assert [t.text for t in readable.found] == [
         "ctrl_U.u > ctrl_P.limit (limit = 9.5)", "ctrl_U.u < ctrl_P.inner.low (low = 0.5)"
     ]  # fmt: skip
-    assert levels(readable) == [0.5, 9.5]
+    assert crossings(readable) == [0.5, 9.5]
 
 
 def test_what_a_structure_gives_first_to_a_signal_is_no_constant() -> None:
@@ -164,7 +164,7 @@ def test_what_a_variable_equals_has_one_statement_under_no_condition() -> None:
     assert readable.known.equal["d"] == "2 * a"
     assert readable.known.equal["a"] == "u - 1"
     assert not {"e", "x"} & readable.known.equal.keys()
-    assert levels(readable) == [3.0, 6.0]  # d > 4, and the state x follows its input
+    assert crossings(readable) == [3.0, 6.0]  # d > 4, and the state x follows its input
 
 
 def test_values_that_modifiers_change_are_not_told_as_certain() -> None:
@@ -192,7 +192,7 @@ def test_a_variable_that_is_declared_before_it_is_set_gives_a_level(
     declared: str, expected: list[float]
 ) -> None:
     text = f"double f(double u) {{\n {declared}\n y = 2 * u;\n if (y > 0x5) out = 1;\n}}\n"
-    assert levels(read(text, "a.c", "out", "u")) == expected
+    assert crossings(read(text, "a.c", "out", "u")) == expected
 
 
 def test_variables_of_other_classes_are_not_the_signals_of_their_names() -> None:
@@ -240,7 +240,7 @@ def test_blocks_of_the_standard_library_compare_what_leads_to_them(
 ) -> None:
     readable = of_text(model(declared, equations), "a.mo", ["y"], ["y", "u"])
     assert [t.text for t in readable.found] == told
-    assert levels(readable) == pytest.approx(expected)
+    assert crossings(readable) == pytest.approx(expected)
 
 
 def test_a_component_is_not_the_signal_of_its_variable() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from falsifier.context.values import Context, Level, Named
+from falsifier.context.values import Context, Crossing, Named
 from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError, SpecError
@@ -100,7 +100,7 @@ def test_the_surrogate_alone_reads_levels_and_what_is_recorded_is_not_read_again
     )
     problem = replace(PROBLEM, named_context=Named((str(source),)))
     (read,) = told_problems(request(), [problem], {})
-    assert read.context == Context(levels=(Level(PROBLEM.space.inputs[0].name, 0.25),))
+    assert read.context == Context(crossings=(Crossing(PROBLEM.space.inputs[0].name, 0.25),))
     source.unlink()
     assert told_problems(request("cma"), [problem], {})[0].context == Context()
     (recorded,) = told_problems(request(), [problem], {problem.name: read.context})

@@ -69,7 +69,7 @@ class Explorer:
         self._interval = problem.experiment.output_interval
         levels: dict[str, list[float]] = defaultdict(list)
         searched = problem.space.names
-        for level in (found for found in problem.context.levels if found.signal in searched):
+        for level in (found for found in problem.context.crossings if found.signal in searched):
             levels[level.signal].append(level.value)
         self._aimed = Programs(layout, levels) if levels else None
         self._reached: dict[Mark, Reached] = {}

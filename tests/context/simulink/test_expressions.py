@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.context.levels import Definitions, levels_of
+from falsifier.context.crossings import Definitions, crossings_of
 from falsifier.context.simulink.diagram import (
     Block,
     BlockSystem,
@@ -142,8 +142,8 @@ def test_breakpoints_of_tables_are_levels_of_what_leads_there() -> None:
     wires = (Wire(End("u", "1"), (End("map", "1"), End("unknown", "1"))),)
     (found,) = diagram_thresholds(Diagram("m", BlockSystem(blocks, wires)))
     assert found.text == "u leads to a table with the breakpoints 0, 2.5, 1e1"
-    levels = levels_of([found], Definitions(), {"m.u": (1.0, 20.0)})
-    assert [level.value for level in levels] == [2.5, 10.0]
+    crossings = crossings_of([found], Definitions(), {"m.u": (1.0, 20.0)})
+    assert [crossing.value for crossing in crossings] == [2.5, 10.0]
 
 
 def test_names_stand_for_what_blocks_make() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from falsifier.context.values import Context, Level
+from falsifier.context.values import Context, Crossing
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines import make_engine
@@ -194,7 +194,7 @@ def test_switching_inputs_with_different_control_points_say_so_for_each() -> Non
     )
 
 
-def narrow_problem(levels: tuple[Level, ...] = ()) -> Problem:
+def narrow_problem(levels: tuple[Crossing, ...] = ()) -> Problem:
     """A counter of how often an input entered a band of 0.2 % of its range; three times violate."""
     info = ModelInfo(
         "narrow",
@@ -208,7 +208,7 @@ def narrow_problem(levels: tuple[Level, ...] = ()) -> Problem:
     problem = Problem(
         FunctionModel(_entered, info), Requirement("R", formula), space, Experiment(10.0, 0.1, ("n",))
     )
-    return replace(problem, context=Context(levels=levels))
+    return replace(problem, context=Context(crossings=levels))
 
 
 def _entered(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
@@ -217,14 +217,14 @@ def _entered(times: Array, inputs: dict[str, Array], parameters: dict[str, float
 
 
 def test_levels_of_context_files_are_tried() -> None:
-    levels = (Level("u", 0.617), Level("u", 0.619))
+    levels = (Crossing("u", 0.617), Crossing("u", 0.619))
     told = [simulations_until_violation(narrow_problem(levels), seed=s, budget=60) for s in range(3)]
     assert all(told)
     assert simulations_until_violation(narrow_problem(), seed=0, budget=30) is None
 
 
 def test_without_levels_nothing_changes() -> None:
-    plain, misplaced = narrow_problem(), narrow_problem((Level("other", 1.0),))
+    plain, misplaced = narrow_problem(), narrow_problem((Crossing("other", 1.0),))
     engine = make_engine("surrogate", plain, seed=1)
     assert [c.key for c in engine.ask(5)] == [
         c.key for c in make_engine("surrogate", misplaced, seed=1).ask(5)

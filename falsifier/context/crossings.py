@@ -1,4 +1,4 @@
-"""Levels of inputs and parameters at which a comparison in a file changes: solved for them where possible."""
+"""Values of inputs and parameters at which a comparison in a file changes: solved for them where possible."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.context.thresholds import Threshold, number_in, tokens_of
-from falsifier.context.values import Level
+from falsifier.context.values import Crossing
 from falsifier.errors import FormulaError
 from falsifier.stl import parse
 from falsifier.stl.expression import Expression
@@ -22,7 +22,7 @@ _SAMPLES, _HALVINGS = 257, 40
 # A constant that is given twice, "5 or 9", has two values; of several constants, so many combinations count.
 _MAX_COMBINATIONS = 24
 _MAX_DEPTH = 12
-_MAX_LEVELS = 24
+_MAX_CROSSINGS = 24
 _MAX_THRESHOLDS = 2000
 _MAX_LENGTH = 400
 # Functions by the name that formulas have. The last value of a signal, or its value in another type, is the
@@ -48,9 +48,9 @@ class Definitions:
     fed: Mapping[str, frozenset[str]] = field(default_factory=dict)
 
 
-def levels_of(
+def crossings_of(
     found: Iterable[Threshold], known: Definitions, ranges: Mapping[str, tuple[float, float]]
-) -> tuple[Level, ...]:
+) -> tuple[Crossing, ...]:
     """Return the values within their ranges at which signals make a comparison change.
 
     Args:
@@ -58,13 +58,15 @@ def levels_of(
         known: values of other variables in them.
         ranges: bounds of inputs and parameters, by their names in the model.
     """
-    levels: dict[str, set[float]] = {name: set() for name in ranges}
+    crossings: dict[str, set[float]] = {name: set() for name in ranges}
     for threshold in islice((each for each in found if _is_known(each, known)), _MAX_THRESHOLDS):
         for name, (low, high) in ranges.items():
-            if low < high and len(levels[name]) < _MAX_LEVELS:
+            if low < high and len(crossings[name]) < _MAX_CROSSINGS:
                 short = name.rpartition(".")[2].strip("'")
-                levels[name].update(_crossings(threshold, short, known, low, high))
-    return tuple(Level(name, value) for name, each in levels.items() for value in sorted(each)[:_MAX_LEVELS])
+                crossings[name].update(_solutions(threshold, short, known, low, high))
+    return tuple(
+        Crossing(name, value) for name, each in crossings.items() for value in sorted(each)[:_MAX_CROSSINGS]
+    )
 
 
 def _is_known(threshold: Threshold, known: Definitions) -> bool:
@@ -73,7 +75,7 @@ def _is_known(threshold: Threshold, known: Definitions) -> bool:
     return bool(threshold.names) or any(name in known.equal for name in inner)
 
 
-def _crossings(
+def _solutions(
     threshold: Threshold, name: str, known: Definitions, low: float, high: float
 ) -> Iterator[float]:
     constants = sorted(threshold.constants)

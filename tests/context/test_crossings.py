@@ -1,17 +1,19 @@
 import pytest
 
-from falsifier.context.levels import Definitions, levels_of
+from falsifier.context.crossings import Definitions, crossings_of
 from falsifier.context.thresholds import thresholds
 
 RANGES = {"plant.u": (0.0, 10.0)}
 
 
 def found(text: str, known: Definitions = Definitions(), **constants: str) -> list[float]:  # noqa: B008
-    return [level.value for level in levels_of(thresholds([(text, 1)], constants, "a.mo"), known, RANGES)]
+    return [
+        crossing.value for crossing in crossings_of(thresholds([(text, 1)], constants, "a.mo"), known, RANGES)
+    ]
 
 
 @pytest.mark.parametrize(
-    ("text", "levels"),
+    ("text", "crossings"),
     [
         ("u > 9.5", [9.5]),
         ("9.5 < u and u < 9.75", [9.5, 9.75]),
@@ -31,8 +33,8 @@ def found(text: str, known: Definitions = Definitions(), **constants: str) -> li
         ("(u > 3", [3.0]),
     ],
 )
-def test_comparisons_are_solved_for_the_signal(text: str, levels: list[float]) -> None:
-    assert found(text) == pytest.approx(levels)
+def test_comparisons_are_solved_for_the_signal(text: str, crossings: list[float]) -> None:
+    assert found(text) == pytest.approx(crossings)
 
 
 def test_a_constant_with_two_values_gives_two_levels() -> None:
