@@ -14,8 +14,8 @@ from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
+from falsifier.engines.known_first import KNOWN, KnownFirst
 from falsifier.engines.protocol import AsksLLM, Engine
-from falsifier.engines.starting import KNOWN, Starting
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -318,7 +318,7 @@ def carry_out(
         told = told_problems(request, problems, stated.contexts if stated else {})
         made = [engine] if engine is not None else make_engines(request, told, chat, levels)
         known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
-        engines: list[Engine] = [Starting(each, known) for each in made] if known else made
+        engines: list[Engine] = [KnownFirst(each, known) for each in made] if known else made
         for problem in problems:
             stack.callback(problem.model.close)
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))

@@ -8,9 +8,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
+from falsifier.engines.known_first import KNOWN
 from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
 from falsifier.engines.stand_ins import RANDOM_CHANGE
-from falsifier.engines.starting import KNOWN
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage

@@ -1,8 +1,8 @@
 from collections import deque
 
+from falsifier.engines.known_first import KnownFirst
 from falsifier.engines.protocol import Engine
 from falsifier.engines.simple import Uniform
-from falsifier.engines.starting import Starting
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.testing import EngineContract, lag_problem
@@ -10,14 +10,14 @@ from falsifier.testing import EngineContract, lag_problem
 
 class TestContract(EngineContract):
     def make(self, problem: Problem, seed: int) -> Engine:
-        return Starting(Uniform(problem, seed=seed), deque())
+        return KnownFirst(Uniform(problem, seed=seed), deque())
 
 
 def test_known_candidates_come_first_and_once_among_engines_that_share_them() -> None:
     problem = lag_problem()
     candidates = Uniform(problem, seed=9).ask(3)
     known = deque(candidates)
-    first, second = (Starting(Uniform(problem, seed=s), known) for s in (1, 2))
+    first, second = (KnownFirst(Uniform(problem, seed=s), known) for s in (1, 2))
     assert first.ask(2) == candidates[:2]
     assert second.ask(2) == candidates[2:]
     assert first.ask(1) == Uniform(problem, seed=1).ask(1)
@@ -32,6 +32,6 @@ def test_the_other_engine_is_told() -> None:
             told.extend(evaluations)
 
     problem = lag_problem()
-    engine = Starting(Listening(problem, seed=1), deque(Uniform(problem, seed=9).ask(1)))
+    engine = KnownFirst(Listening(problem, seed=1), deque(Uniform(problem, seed=9).ask(1)))
     engine.tell([Evaluation(engine.ask()[0], "failed")])
     assert len(told) == 1

@@ -14,7 +14,7 @@ from falsifier.llm.messages import Chat
 KNOWN = "known"
 
 
-class Starting:
+class KnownFirst:
     """Proposes known candidates first, then what another engine suggests, which learns from all of them.
 
     Args:
