@@ -59,24 +59,3 @@ def best_of(name: str, *, simulations: int) -> float:
         assert evaluation.robustness is not None
         found.append(evaluation.robustness)
     return min(found)
-
-
-def assert_learns(name: str, *, simulations: int) -> None:
-    """It gets deeper into the bowl than random points do."""
-    assert best_of(name, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
-
-
-def assert_batch_differs(name: str) -> None:
-    """Candidates that are asked for at once are all different."""
-    assert len({c.key for c in make_engine(name, box_problem(), seed=3).ask(12)}) == 12
-
-
-def assert_batch_spreads(name: str) -> None:
-    """In a valley that it knows it does not ask for the same place several times at once."""
-    problem = box_problem()
-    engine = make_engine(name, problem, seed=2)
-    for _ in range(20):
-        engine.tell([bowl(problem, *engine.ask())])
-    batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
-    distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
-    assert distances.min() > 5e-3

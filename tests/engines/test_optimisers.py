@@ -1,0 +1,192 @@
+"""The general optimisers on the fixed control points: what they share, and what only one of them does."""
+
+import gc
+import threading
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from falsifier.engines import make_engine
+from falsifier.engines.bayesian import log_improvement
+from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.stl import Verdict
+from falsifier.testing import drive, lag_problem
+from tests.engines.support import NamedEngine, best_of, bowl, box_problem, needs_botorch
+from tests.patience import HANG
+
+
+class TestAnnealing(NamedEngine):
+    engine = "annealing"
+
+
+class TestCMA(NamedEngine):
+    engine = "cma"
+
+
+class TestBayesian(NamedEngine):
+    engine = "bayesian"
+
+
+class TestOptuna(NamedEngine):
+    engine = "optuna"
+
+
+class TestBoTorch(NamedEngine):
+    engine = "botorch"
+    # Enough to get beyond the Sobol points, which are twice the coordinates and two.
+    rounds = 15
+
+    @pytest.fixture(autouse=True)
+    def _installed(self) -> None:
+        needs_botorch()
+
+
+def made_if_installed(name: str) -> None:
+    if name == "botorch":
+        needs_botorch()
+
+
+@pytest.mark.parametrize(
+    ("name", "simulations"), [("cma", 150), ("bayesian", 40), ("optuna", 80), ("botorch", 30)]
+)
+def test_it_gets_deeper_into_a_bowl_than_random_points(name: str, simulations: int) -> None:
+    made_if_installed(name)
+    assert best_of(name, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
+
+
+def test_annealing_gets_deeper_than_a_few_random_points() -> None:
+    assert best_of("annealing", simulations=150) < best_of("uniform", simulations=10)
+
+
+@pytest.mark.parametrize("name", ["annealing", "cma", "bayesian", "optuna", "botorch"])
+def test_candidates_that_are_asked_for_at_once_are_all_different(name: str) -> None:
+    made_if_installed(name)
+    assert len({c.key for c in make_engine(name, box_problem(), seed=3).ask(12)}) == 12
+
+
+@pytest.mark.parametrize("name", ["optuna", "botorch"])
+def test_in_a_known_valley_it_does_not_ask_for_the_same_place_several_times_at_once(name: str) -> None:
+    made_if_installed(name)
+    problem = box_problem()
+    engine = make_engine(name, problem, seed=2)
+    for _ in range(20):
+        engine.tell([bowl(problem, *engine.ask())])
+    batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
+    distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
+    assert distances.min() > 5e-3
+
+
+def test_annealing_goes_one_step_at_a_time_and_bridges_the_wait_with_random_points() -> None:
+    problem = box_problem()
+    engine = make_engine("annealing", problem, seed=0)
+    first, second = engine.ask(2)
+    assert (first.rationale, second.rationale) == (
+        "a step of simulated annealing",
+        "uniform random, while annealing waits",
+    )
+    engine.tell([bowl(problem, second)])
+    assert engine.ask()[0].rationale == "uniform random, while annealing waits"
+    engine.tell([Evaluation(first, "failed", reason="diverged")])
+    assert engine.ask()[0].rationale == "a step of simulated annealing"
+
+
+def test_annealing_that_nobody_holds_any_more_ends_its_thread() -> None:
+    before = set(threading.enumerate())
+    engine = make_engine("annealing", box_problem(), seed=0)
+    assert np.isfinite(engine.ask()[0].parameters["x0"])
+    (thread,) = set(threading.enumerate()) - before
+    del engine
+    gc.collect()
+    thread.join(HANG)
+    assert not thread.is_alive()
+
+
+def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() -> None:
+    problem = box_problem()
+    engine, other = (make_engine("cma", problem, seed=s) for s in (0, 1))
+    asked = engine.ask(20)
+    own = [c for c in asked if c.rationale.startswith("generation 1 ")]
+    waiting = {c.rationale for c in asked[len(own) :]}
+    assert waiting == {"uniform random, while a generation is simulated"}
+    engine.tell([bowl(problem, c) for c in own[:-1]])
+    assert not engine.ask()[0].rationale.startswith("generation")
+    engine.tell([Evaluation(own[-1], "failed", reason="diverged")])
+    engine.tell([bowl(problem, c) for c in other.ask(2)])
+    assert engine.ask()[0].rationale.startswith("generation 2 ")
+
+
+def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
+    problem = box_problem()
+    engine = make_engine("cma", problem, seed=0)
+    generations = set()
+    for _ in range(100):
+        (candidate,) = engine.ask()
+        generations.add(int(candidate.rationale.split()[1]))
+        engine.tell([Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))])
+    assert generations == {1}, "a plateau ends a start after its first generation"
+
+
+def test_a_single_coordinate_can_be_searched() -> None:
+    problem = lag_problem(points=1)
+    engine = make_engine("cma", problem, seed=0)
+    values = [c.signals["u"].values[0] for c in drive(engine, lambda c: evaluate(problem, c), rounds=40)]
+    assert max(values) == pytest.approx(1.0, abs=0.1), "x is highest where u is"
+
+
+def test_optuna_learns_from_candidates_of_others_and_announces_nothing(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    problem = box_problem()
+    alone, taught = (make_engine("optuna", problem, seed=1) for _ in range(2))
+    for candidate in make_engine("sobol", problem, seed=5).ask(60):
+        taught.tell([bowl(problem, candidate)])
+    found = [min(bowl(problem, c).robustness or 9.0 for c in engine.ask(5)) for engine in (taught, alone)]
+    assert found[0] < found[1]
+    taught.tell([Evaluation(c, "failed") for c in taught.ask(2)])
+    assert capfd.readouterr() == ("", "")
+
+
+def test_log_improvement_is_the_logarithm_and_finite_where_that_underflows() -> None:
+    z = np.array([-8.0, -4.0, -2.9, 0.0, 3.0])
+    exact = np.log(norm.pdf(z[1:]) + z[1:] * norm.cdf(z[1:]))
+    values = log_improvement(-z, np.ones(5), 0.0)
+    assert values[1:] == pytest.approx(exact, abs=1e-6)
+    far = log_improvement(np.array([20.0, 40.0, 400.0]), np.ones(3), 0.0)
+    assert np.isfinite(far).all() and (np.diff(far) < 0).all()
+
+
+def test_a_process_interpolates_and_is_unsure_far_away() -> None:
+    points = np.linspace(0, 1, 9)[:, None]
+    targets = np.sin(5 * points[:, 0])
+    process = fit_lengths(points, targets, np.array([0.3]), np.random.default_rng(0), noise=1e-6)
+    mean, deviation = process.predict(np.array([[0.5], [0.44], [3.0]]))
+    assert mean[0] == pytest.approx(np.sin(2.5), abs=1e-3)
+    assert mean[1] == pytest.approx(np.sin(2.2), abs=0.05)
+    assert deviation[0] < 0.01 and deviation[2] > 0.5
+
+
+def test_evidence_prefers_the_right_length_scale() -> None:
+    points = np.random.default_rng(1).random((40, 2))
+    targets = np.sin(9 * points[:, 0])
+    along, across = (
+        GaussianProcess.fit(points, targets, np.array(lengths), noise=1e-4).evidence
+        for lengths in ([0.4, 5.0], [5.0, 0.4])
+    )
+    assert along > across
+
+
+def test_one_huge_cost_does_not_hide_small_differences_and_equal_ones_are_no_trouble() -> None:
+    assert np.diff(standardised(np.array([1.0, 1.1, 1.2, 1e9]))).min() > 0.1
+    assert np.isfinite(standardised(np.full(5, 3.0))).all()
+    assert np.isfinite(standardised(np.array([2.0]))).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_length_scales_that_shrink_from_fit_to_fit_leave_a_covariance_that_can_be_factored(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    apart = 10.0 ** -rng.uniform(3, 12) * rng.standard_normal((80, 8))
+    points = rng.random((5, 8))[rng.integers(0, 5, 80)] + apart
+    process = fit_lengths(points, rng.standard_normal(80), np.full(8, 1e-8), rng, noise=1e-4)
+    assert np.isfinite(process.weights).all()
