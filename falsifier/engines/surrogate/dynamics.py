@@ -25,8 +25,9 @@ _WIDENING = 0.5
 _FAR = 30.0
 # An input that has hardly varied so far would otherwise become a huge deviation as soon as it does.
 _LEAST_INPUT_UNIT = 0.05
-# Products of a regression: rows times the square of the features. Limits the time of a fit.
-_MOST_PRODUCTS = 3e7
+# Maximum number of rows of a regression, and of products: rows times the square of the features. They limit
+# the time of a fit.
+_MOST_ROWS, _MOST_PRODUCTS = 3000, 3e7
 # Number of the last predictions whose median error is the recent error.
 _RECENT = 4
 # Recent error, as a share of the margins' spread, below which predictions are trusted.
@@ -71,7 +72,7 @@ class LinearDynamics:
         weights = rng.exponential(size=int(others.sum())) + 0.2
         features = self._lags * (dy.shape[2] + du.shape[2])
         cells = inputs.shape[1]
-        rows = _drawn(len(dy) * cells, int(min(settings.most_rows, _MOST_PRODUCTS / features**2)), rng)
+        rows = _drawn(len(dy) * cells, int(min(_MOST_ROWS, _MOST_PRODUCTS / features**2)), rng)
         which, at = rows // cells, rows % cells
         x = np.concatenate([_lagged(part, self._lags, which, at) for part in (dy, du)], axis=1)
         linear = ridge(x, dy[which, at + self._lags], weights[which], settings.ridge).T

@@ -12,6 +12,8 @@ from falsifier.engines.surrogate.variation import mutations, random_points
 
 # Two points that differ by less than this in every coordinate count as the same simulation.
 _SAME_POINT = 1e-3
+# Number of blocks of coordinates by which a gradient is taken; more take longer.
+_DIRECTIONS = 60
 
 
 def plan(
@@ -44,7 +46,7 @@ def plan(
         ]
     )
     pool, costs = _best(layout, children, predict(children), settings.parents)
-    blocks = _blocks(layout, settings.directions)
+    blocks = _blocks(layout, _DIRECTIONS)
     for step in range(settings.generations + settings.bound_steps):
         if step < settings.generations:
             children = mutations(layout, rng, pool, settings.children)

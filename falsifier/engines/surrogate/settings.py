@@ -17,10 +17,8 @@ class Settings:
         pauses: number of constant extremes between these.
         probes: number of stepping inputs, instead of constant extremes, if a violation requires several
             conditions at once: no single extreme causes it, and dynamics are worth more than steady states.
-        probe_pieces: number of levels of a stepping input.
         lags: number of cells that the dynamics look back; hidden states need several.
         ridge: relative regularisation of the dynamics, small because deviations are small.
-        most_rows: maximum number of rows of a regression; limits the time per proposal.
         most_traces: maximum number of simulations from which dynamics are learnt, the best and the latest.
         base_rank: mean rank, from 0, of the simulation from which deviations are learnt.
         most_signals: number of inputs and outputs up to which a plan has all of its candidates; with more,
@@ -30,7 +28,6 @@ class Settings:
         parents: number of survivors per generation.
         generations: number of generations of a plan, after the first candidates.
         bound_steps: number of gradient steps towards bounds after the generations.
-        directions: number of blocks of coordinates by which a gradient is taken; more take longer.
         elites: number of best simulated inputs from which the first candidates are bred.
         at_bounds: probability that a level of a new input, or of a constant end, is a bound.
         memory: factor by which what an arm brought counts less with each of its later proposals.
@@ -48,10 +45,8 @@ class Settings:
     bangs: int = 2
     pauses: int = 2
     probes: int = 2
-    probe_pieces: int = 12
     lags: int = 6
     ridge: float = 1e-7
-    most_rows: int = 3000
     most_traces: int = 60
     base_rank: float = 1.0
     most_signals: int = 8
@@ -60,7 +55,6 @@ class Settings:
     parents: int = 30
     generations: int = 4
     bound_steps: int = 4
-    directions: int = 60
     elites: int = 8
     at_bounds: float = 0.8
     memory: float = 0.9

@@ -28,6 +28,8 @@ from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
 _DRAWS = 100
+# Number of levels of an input that steps through many.
+_LEVELS_OF_STEPS = 12
 # Maximum number of switching inputs: if that many random ones did not violate, more will not.
 _MOST_SWITCHING = 8
 # Share of each range within which another engine's constant input stands for the extreme.
@@ -234,7 +236,7 @@ class Surrogate:
             case "switching":
                 return self._switch(rng)
             case "stepping":
-                point = stepping(self.layout, rng, self.settings.probe_pieces)
+                point = stepping(self.layout, rng, _LEVELS_OF_STEPS)
                 return self._made(arm, point, "steps through many levels of each input")
             case "dynamics":
                 return self._plan(rng)

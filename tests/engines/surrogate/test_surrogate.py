@@ -229,3 +229,10 @@ def test_without_levels_nothing_changes() -> None:
     assert [c.key for c in engine.ask(5)] == [
         c.key for c in make_engine("surrogate", misplaced, seed=1).ask(5)
     ]
+
+
+def test_plans_try_fewer_candidates_where_there_are_many_signals() -> None:
+    problem = lag_problem(free=FREE)
+    engine = Surrogate(problem, seed=0)
+    few, many = (engine._plan_settings(outputs) for outputs in (3, 31))
+    assert (few.pool, many.pool) == (engine.settings.pool, engine.settings.pool // 4)
