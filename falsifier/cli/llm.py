@@ -30,6 +30,7 @@ from falsifier.problem.loading import load_source
 if TYPE_CHECKING:
     from falsifier.llm.messages import Message, Tool
     from falsifier.problem.problem import Problem
+    from falsifier.record.records import Record
 
 
 @command()
@@ -102,6 +103,7 @@ def prompt(
         reply=reply,
         simulations=limit,
         doubtful=doubtful_confirmations(problem, records, evaluations),
+        lessons=_lessons(records) if at is None else "",
     )
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
@@ -110,6 +112,17 @@ def prompt(
         )
         tools = (tool,)
     say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+
+
+def _lessons(records: Sequence["Record"]) -> str:
+    """What the language model wrote down last in a run."""
+    from falsifier.llm.messages import Exchange
+    from falsifier.llm.replies import lessons_in
+    from falsifier.record.records import ExchangeRecord
+
+    exchanges = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
+    told = (lessons_in(e.reply.text) for e in reversed(exchanges) if e.reply is not None and not e.problem)
+    return next((lessons for lessons in told if lessons), "")
 
 
 def _limit(directory: Path | None) -> int | None:

@@ -146,8 +146,7 @@ class ReplyForm:
         Raises:
             RejectedReplyError: if none is valid and none is kept; states what is wrong with each.
         """
-        beside = _beside(text) if self.lessons or self.keepable else {}
-        lessons = str(beside.get("lessons") or "")[:_LONGEST_RATIONALE] if self.lessons else ""
+        beside = _beside(text) if self.keepable else {}
         kept = tuple(n for n in _whole_numbers(beside.get("keep")) if 1 <= n <= self.keepable)
         try:
             found = self.read_each(text, origin=origin)
@@ -161,7 +160,7 @@ class ReplyForm:
             raise RejectedReplyError(
                 "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
             )
-        return Answer(tuple(candidates), printable(lessons), kept)
+        return Answer(tuple(candidates), lessons_in(text) if self.lessons else "", kept)
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
         """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.
@@ -410,6 +409,11 @@ def _candidate_objects(text: str) -> list[dict[str, Any]]:
         if candidates := _candidates_of(found):
             return candidates
     return _candidates_of(repaired(text))
+
+
+def lessons_in(text: str) -> str:
+    """What an LLM wrote down for its next question; empty if it did not."""
+    return printable(str(_beside(text).get("lessons") or "")[:_LONGEST_RATIONALE])
 
 
 def _beside(text: str) -> dict[str, Any]:

@@ -146,6 +146,24 @@ def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_d
     assert len(script.notes) > 2, "it was asked again"
 
 
+def test_an_answer_on_which_the_model_insists_is_simulated_although_predictions_are_poor() -> None:
+    class Insists(Script):
+        def propose(
+            self, count: int, notes: Sequence[str] = (), *, predicted: Sequence[Candidate] = (), **_: Any
+        ) -> Advice:
+            if predicted:
+                assert any('"keep": [1]' in note for note in notes)
+                return Advice([], kept=[predicted[0]])
+            return super().propose(count, notes)
+
+    problem = wide_problem()
+    script = Insists([[-1.0], [0.0], [-0.5]], problem)
+    engine = Hybrid(problem, seed=0, adviser=script, surrogate_settings=SETTINGS)
+    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=40)
+    assert course(asked).count("L") > 2
+    assert any(c.signals["u"].values[0] == pytest.approx(-0.5, abs=0.01) for c in asked)
+
+
 def test_after_the_trial_an_answer_is_simulated_while_predictions_are_not_trusted() -> None:
     problem = wide_problem()
     script = Script([[-1.0], [0.0], [-0.5]], problem)

@@ -412,3 +412,50 @@ class TestContract(EngineContract):
 
     def make(self, problem: Problem, seed: int) -> Engine:
         return make_llm_engine(problem, ScriptedChat(counting_script(seed)))
+
+
+def test_lessons_and_the_reason_are_told_back() -> None:
+    problem = lag_problem()
+
+    def answer(level: float, lessons: str) -> str:
+        signal = {"name": "u", "values": [level] * 4}
+        return json.dumps({"lessons": lessons, "rationale": f"try {level}", "signals": [signal]})
+
+    chat = ScriptedChat([answer(0.1, "x follows u"), answer(0.2, ""), answer(0.3, "")])
+    engine = make_llm_engine(problem, chat)
+    for _ in range(3):
+        engine.tell([evaluate(problem, *engine.ask())])
+    first, second, third = (r.messages[1].content for r in chat.requests)
+    assert "lessons" not in first
+    for later in (second, third):  # an empty field takes nothing back
+        assert "Your lessons so far: x follows u" in later
+        assert "chosen because: try 0.1" in later
+    assert third.startswith(second[: chat.requests[1].messages[1].stable])
+
+
+def test_an_llm_insists_by_number_or_by_repeating_a_candidate_that_was_predicted() -> None:
+    problem = lag_problem()
+
+    def candidates(*levels: float, **more: object) -> str:
+        found = [{"rationale": "", "signals": [{"name": "u", "values": [v] * 4}]} for v in levels]
+        return json.dumps({"lessons": "", "candidates": found, **more})
+
+    for insisting, kept in (
+        (json.dumps({"lessons": "", "candidates": [], "keep": [2]}), [1]),
+        (candidates(0.1), [0]),
+        (candidates(0.5, keep=[1, 9]), [0]),
+    ):
+        chat = ScriptedChat([candidates(0.1, 0.2), insisting])
+        engine = make_llm_engine(problem, chat)
+        first = engine.propose(3).candidates
+        advice = engine.propose(3, ["they are poor"], predicted=first)
+        assert [c.key for c in advice.kept] == [first[k].key for k in kept]
+        assert len(advice.candidates) == (1 if "0.5" in insisting else 0)
+        asked = chat.requests[-1]
+        assert "Proposed and not simulated" not in asked.messages[1].content
+        assert asked.reply_schema is not None and "keep" in asked.reply_schema["properties"]
+    chat = ScriptedChat([candidates(0.1, 0.2), candidates(0.1), candidates(0.3)])
+    engine = make_llm_engine(problem, chat)
+    engine.propose(3)
+    engine.propose(3)
+    assert len(chat.requests) == 3, "without predictions, a repetition is rejected"
