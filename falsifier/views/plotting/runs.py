@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Run, Statistics, group, statistics
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import EACH, OUTPUT, QUIET, VIOLATED, caption, figure_of, own_axes
+from falsifier.views.plotting.axes import (
+    EACH,
+    OUTPUT,
+    QUIET,
+    VIOLATED,
+    caption,
+    figure_of,
+    own_axes,
+    whole_ticks,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +50,7 @@ def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
             ax.plot(found + 1, run.robustness[found], "o", color=VIOLATED, label="counterexample")
     ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
     ax.set(xlabel="simulation", ylabel="robustness")
+    whole_ticks(ax.xaxis, {})
     if runs:
         ax.set_title(caption(f"{runs[0].requirement}: {runs[0].method.label}"))
     entries = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
@@ -60,6 +70,7 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         name = caption(f"{label} ({counted(len(members), 'run')})")
         ax.step(counts, shares, where="post", linewidth=1.6, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
+    whole_ticks(ax.xaxis, {})
     if by_method:
         ax.legend()
     return figure_of(ax)

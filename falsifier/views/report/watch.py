@@ -42,8 +42,9 @@ from falsifier.views.text import Fact, llm_use, seconds_text
 if TYPE_CHECKING:
     from aiohttp.web import Application, Request, Response, StreamResponse
 
-# Time in s that one answer may spend on reading: a journal of 100,000 evaluations takes some ten.
-_READING = 0.7
+# Time in s that the first answer may spend on reading, and each later one: a journal of 100,000 evaluations
+# takes some ten, and the figures of an answer one.
+_READING, _READING_ON = 0.3, 2.0
 # Maximum number of candidates kept of a run, evenly spaced, to show what was tried.
 _MOST_KEPT = 300
 # Maximum number of rows of a campaign's table; running ones first.
@@ -150,10 +151,12 @@ class Watch:
         behind = False
         if chosen:
             place = places[chosen]
+            seconds = _READING_ON
             if place not in self._watched:
+                seconds = _READING
                 self._watched = {place: _Watched(place, manifests.read(place))}  # one at a time is in memory
             watched = self._watched[place]
-            watched.read(monotonic() + _READING)
+            watched.read(monotonic() + seconds)
             behind = watched.is_behind
             parts += [self._state(watched), *(_run_html(run, watched) for run in watched.runs())]
         return join(*parts), behind

@@ -72,7 +72,8 @@ def test_what_a_model_was_asked_last_is_shown(tmp_path: Path) -> None:
 
 
 def test_a_long_journal_is_read_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_READING", 0.0)
+    for limit in ("_READING", "_READING_ON"):
+        monkeypatch.setattr(module, limit, 0.0)
     monkeypatch.setattr(module, "_MOST_KEPT", 4)
     for where in ("watch", "page"):  # drawing takes most of the time
         monkeypatch.setattr(f"falsifier.views.report.{where}.drawn", lambda make, description: Html(""))
