@@ -34,16 +34,15 @@ def llm_option(*, multiple: bool = False) -> Decorator:
     )
 
 
-def context_option(command: Function) -> Function:
-    return click.option(
-        "--context",
-        "context",
-        multiple=True,
-        metavar="FILE|fmu|none|checked:FILE",
-        help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
-        "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
-        "checked:FILE: a line of this file looks like a key and is none. Repeatable.",
-    )(command)
+context_option = click.option(
+    "--context",
+    "context",
+    multiple=True,
+    metavar="FILE|fmu|none|checked:FILE",
+    help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
+    "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
+    "checked:FILE: a line of this file looks like a key and is none. Repeatable.",
+)
 
 
 def variant_option(*, multiple: bool = False) -> Decorator:
@@ -59,24 +58,21 @@ def variant_option(*, multiple: bool = False) -> Decorator:
     )
 
 
-def api_base_option(command: Function) -> Function:
-    return click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")(command)
+api_base_option = click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
 
 
-def anonymous_option(command: Function) -> Function:
-    return click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")(command)
+anonymous_option = click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")
 
 
-def llm_option_option(command: Function) -> Function:
-    return click.option(
-        "--llm-option",
-        "llm_options",
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="How it is asked: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
-        "tokens, cache=no, reply=points in place of json; all other names go to the provider unchanged, e.g. "
-        "max_tokens=4000. Repeatable.",
-    )(command)
+llm_option_option = click.option(
+    "--llm-option",
+    "llm_options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="How it is asked: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
+    "tokens, cache=no, reply=points in place of json; all other names go to the provider unchanged, e.g. "
+    "max_tokens=4000. Repeatable.",
+)
 
 
 def connection_options(command: Function) -> Function:

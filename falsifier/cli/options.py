@@ -156,14 +156,22 @@ def _seconds(text: str, seconds: str) -> float:
     return value
 
 
-def template_option(command: Function) -> Function:
-    return click.option(
-        "--template",
-        multiple=True,
-        callback=_only_one,
-        metavar="'NAME KEY=VALUE ...'",
-        help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
-    )(command)
+def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
+    if len(formulas) > 1:
+        raise click.UsageError(
+            f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
+            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml"
+        )
+    return formulas[0] if formulas else None
+
+
+template_option = click.option(
+    "--template",
+    multiple=True,
+    callback=_only_one,
+    metavar="'NAME KEY=VALUE ...'",
+    help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
+)
 
 
 def policy_options(command: Function) -> Function:
@@ -261,15 +269,6 @@ def requirement_options(command: Function) -> Function:
     return add(command, stl_option(), template_option, problem_options)
 
 
-def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
-    if len(formulas) > 1:
-        raise click.UsageError(
-            f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
-            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml"
-        )
-    return formulas[0] if formulas else None
-
-
 def problem_source(options: dict[str, Any]) -> "ProblemSource":
     """Take the values of requirement_options out of a command's keyword arguments.
 
@@ -361,17 +360,15 @@ _TOTALS: dict[str, Callable[[str], float]] = {
 }
 
 
-def total_option(command: Function) -> Function:
-    """Add the limits of a campaign."""
-    return click.option(
-        "--total",
-        "totals",
-        multiple=True,
-        metavar="|".join(f"{name}=N" for name in _TOTALS),
-        callback=lambda _context, _option, given: _total(given),
-        help="Limit of all runs of a campaign together: simulations, seconds from this start, tokens, US "
-        "dollars. Repeatable.",
-    )(command)
+total_option = click.option(
+    "--total",
+    "totals",
+    multiple=True,
+    metavar="|".join(f"{name}=N" for name in _TOTALS),
+    callback=lambda _context, _option, given: _total(given),
+    help="Limit of all runs of a campaign together: simulations, seconds from this start, tokens, US "
+    "dollars. Repeatable.",
+)
 
 
 def _total(given: Iterable[str]) -> "Budget | None":
@@ -405,13 +402,12 @@ def jobs_option(what: str) -> Decorator:
     )
 
 
-def executor_option(command: Function) -> Function:
-    return click.option(
-        "--executor",
-        metavar="dask:tcp://HOST:PORT",
-        help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice --total "
-        "only between runs.",
-    )(command)
+executor_option = click.option(
+    "--executor",
+    metavar="dask:tcp://HOST:PORT",
+    help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice --total "
+    "only between runs.",
+)
 
 
 def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
@@ -429,37 +425,30 @@ def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
     )
 
 
-def run_argument(command: Function) -> Function:
-    return click.argument("run", metavar="RUN", type=click.Path(path_type=Path))(command)
+run_argument = click.argument("run", metavar="RUN", type=click.Path(path_type=Path))
 
 
-def directory_argument(command: Function) -> Function:
-    return click.argument("directory", type=click.Path(path_type=Path))(command)
+directory_argument = click.argument("directory", type=click.Path(path_type=Path))
 
 
-def requirement_option(command: Function) -> Function:
-    return click.option(
-        "--requirement", metavar="NAME", help="Which one, if a run searched several requirements."
-    )(command)
+requirement_option = click.option(
+    "--requirement", metavar="NAME", help="Which one, if a run searched several requirements."
+)
 
 
 def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
     return click.option("-o", "--out", type=click.Path(path_type=Path), metavar=metavar, help=text)
 
 
-def json_option(command: Function) -> Function:
-    return click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")(
-        command
-    )
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 
 
-def quiet_option(command: Function) -> Function:
-    return click.option(
-        "--quiet",
-        is_flag=True,
-        callback=lambda context, _option, quiet: _silence(context, quiet=quiet),
-        help="Do not show progress.",
-    )(command)
+quiet_option = click.option(
+    "--quiet",
+    is_flag=True,
+    callback=lambda context, _option, quiet: _silence(context, quiet=quiet),
+    help="Do not show progress.",
+)
 
 
 def _silence(context: click.Context, *, quiet: bool) -> bool:

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from io import StringIO
 from math import isfinite, nan
@@ -31,11 +30,9 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.evaluate import simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
-from falsifier.fmu import is_package, read_info, read_package
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.sections import InputSection
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_json, evaluation_lines
@@ -57,7 +54,7 @@ def simulate(*, known: Path | None, out: Path | None, as_json: bool, **options: 
     given = _numbers(options)
     source = problem_source(options)
     file, stored = _split(known, source)
-    problem = _loaded(source, file, {**stored.signals} | {n: _constant(v) for n, v in given.items()})
+    problem = load_source(source, searches=False)
     for note in rights_notes(problem.model):
         warn(note)
     try:
@@ -123,19 +120,6 @@ def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
     if found.end < stop_time and any(len(s.times) > 1 for s in found.signals.values()):
         warn(f"{file}: ends at {found.end:g} s; the last values are kept until {stop_time:g} s")
     return dict(found.signals)
-
-
-def _loaded(source: ProblemSource, file: Path | None, given: Mapping[str, Signal]) -> Problem:
-    """Load the problem; the inputs themselves give the ranges that an FMU without a spec needs."""
-    if source.parts.kind != "fmu" or source.stl is None or not Path(source.parts.file).is_file():
-        return load_source(source, searches=False)
-    given_file = Path(source.parts.file)
-    info = read_package(given_file).info if is_package(given_file) else read_info(given_file)
-    signals = dict(read_inputs(file, info).signals) if file else {}
-    signals |= {v.name: given[v.name] for v in info.inputs if v.name in given}
-    own = {name: InputSection(range=_range(info[name], signal)) for name, signal in signals.items()}
-    changes = source.changes.model_copy(update={"inputs": own | source.changes.inputs})
-    return load_source(source.model_copy(update={"changes": changes}), searches=False)
 
 
 def _range(variable: Variable, signal: Signal) -> tuple[float, float]:
