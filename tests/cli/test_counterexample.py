@@ -183,16 +183,6 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_of_several_counterexamples_one_must_be_named(together: Path) -> None:
-    done = run(together, "explain", "run")
-    assert done.code == 2
-    assert "searched AT1, AT2; choose one with --requirement NAME" in done.err
-    for name in ("AT1", "AT2"):
-        done = run(together, "replay", f"run/counterexample-{name}.json")
-        assert done.code == 1
-        assert done.out.startswith(f"{name}: still violated: ") and " was violated from " in done.out
-
-
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:
     for name in ("AT1", "AT2"):
         assert run(together, "export", f"run/counterexample-{name}.json").code == 0

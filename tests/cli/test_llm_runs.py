@@ -33,13 +33,6 @@ def test_two_replies_falsify_at1(tmp_path: Path) -> None:
     assert b"sk-test-not-a-key" not in everything + done.err.encode() + done.out.encode()
 
 
-def test_points_between_tags_are_understood(tmp_path: Path) -> None:
-    point = Step(f"I go to the limit. <point>{', '.join(map(str, [*FULL, 0, 0, 0]))}</point>")
-    with serving(point) as server:
-        done = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
-    assert done.code == 1, done.err
-
-
 def test_bad_replies_are_answered_with_what_was_wrong(tmp_path: Path) -> None:
     with serving(Step("no idea"), reply([120, *FULL[1:]]), reply(FULL)) as server:
         done = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
