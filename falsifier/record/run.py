@@ -400,8 +400,8 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
     spent = sum(isinstance(record, EvaluatedRecord) for record in records)
     if given.simulations is not None and given.simulations < spent:
         raise SpecError(
-            f"{place}: this run has {counted(spent, 'simulation')} already, which count in the budget: give "
-            f"more than {given.simulations}"
+            f"{place}: this run has {counted(spent, 'simulation')} already, which count in the budget of "
+            f"{given.simulations}: give at least {spent}"
         )
     return given
 
