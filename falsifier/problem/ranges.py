@@ -145,7 +145,7 @@ def fixed_value(variable: Variable, value: float | str) -> float:
             )
         _check_limits(variable, f"{value:g}", value, value)
         if not _contains_a_number(variable, value, value):
-            expected = "one of " + _items(variable) if variable.literals else "an integer"
+            expected = "one of " + items_text(variable) if variable.literals else "an integer"
             raise SpecError(f"{value:g}: expected {expected} for {variable.name!r}")
     return value
 
@@ -169,7 +169,9 @@ def _check_limits(variable: Variable, shown: str, low: float, high: float) -> No
             f"[{known[0]}, {known[1]}]"
         )
     if numbers and not min(numbers) <= low <= high <= max(numbers):
-        raise SpecError(f"{shown} exceeds the items of the enumeration {variable.name!r}: {_items(variable)}")
+        raise SpecError(
+            f"{shown} exceeds the items of the enumeration {variable.name!r}: {items_text(variable)}"
+        )
     if (variable.low is not None and low < variable.low) or (
         variable.high is not None and high > variable.high
     ):
@@ -187,7 +189,8 @@ def _contains_a_number(variable: Variable, low: float, high: float) -> bool:
     return floor(high) >= ceil(low)
 
 
-def _items(variable: Variable) -> str:
+def items_text(variable: Variable) -> str:
+    """Return the numbers and names of an enumeration's items."""
     return ", ".join(f"{number} = {name}" for name, number in variable.literals.items())
 
 

@@ -21,7 +21,7 @@ from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec, load_source
 from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
-from falsifier.problem.ranges import DEFAULT_POINTS
+from falsifier.problem.ranges import DEFAULT_POINTS, items_text
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import FreeSection
 from falsifier.problem.source import MODEL_FILES, ProblemSource
@@ -70,7 +70,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     if tunable:
         document.add("parameters", _parameters_table(tunable, searched=() if inputs else tunable[:1]))
     requirements = tomlkit.table(is_super_table=True)
-    requirements.add("R1", _requirement_table(info))
+    requirements.add(_STARTED, _requirement_table(info))
     document.add("requirements", requirements)
     return tomlkit.dumps(document)
 
@@ -128,7 +128,7 @@ def _experiment_table(table: Table, info: ModelInfo) -> Table:
 def _input_table(v: Variable, free: FreeSection) -> Table:
     table = tomlkit.table()
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
-    for line in (meaning, _items(v) if v.literals else ""):
+    for line in (meaning, items_text(v) if v.literals else ""):
         if line:
             table.add(_comment(line))
     low, high = _guessed(v)
@@ -186,10 +186,6 @@ def _parameters_table(tunable: Sequence[Variable], *, searched: Iterable[Variabl
 def _range(v: Variable, low: float, high: float) -> list[float]:
     """Return a range; with integer bounds if the variable has only integer values."""
     return [float(low), float(high)] if v.kind == "real" else [floor(low), ceil(high)]
-
-
-def _items(v: Variable) -> str:
-    return ", ".join(f"{number} = {name}" for name, number in v.literals.items())
 
 
 def _requirement_table(info: ModelInfo) -> Table:
@@ -364,7 +360,7 @@ def with_requirement(
     if name in requirements:
         raise SpecError(f"the spec has a requirement {name!r} already; choose another --name")
     table = tomlkit.table()
-    table.add("formula", tomlkit.string(formula, literal=formula.isprintable() and "'" not in formula))
+    table.add("formula", _formula_item(formula))
     table.add("description", description)
     requirements[name] = table
     text = tomlkit.dumps(document)
