@@ -1,8 +1,13 @@
+"""Tokens and what they cost."""
+
+import socket
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from falsifier.llm import usage as tokens
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.usage import Price, count_tokens, usage_of
 from tests.llm.support import QUESTION
@@ -50,3 +55,38 @@ def test_tools_and_calls_are_sent_too() -> None:
         for r in (QUESTION, plain)
     )
     assert with_tools > without + 20
+
+
+NUMBERS = "speed: 0:0 2.5:34.7 5:54.21 20:119.581"
+
+
+@pytest.fixture(autouse=True)
+def _fresh() -> Iterator[None]:
+    tokens._encoding.cache_clear()
+    yield
+    tokens._encoding.cache_clear()
+
+
+def test_words_and_numbers_are_counted_without_a_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise AssertionError("tokens must be counted offline")
+
+    monkeypatch.setattr(socket.socket, "connect", refuse)
+    assert count_tokens("") == 0
+    assert count_tokens("The requirement is violated.") == 5
+    assert count_tokens("119.581") == 3, "three digits are one token"
+
+
+def test_an_unlisted_llm_is_counted_as_if_each_digit_were_a_token() -> None:
+    assert count_tokens("119.581", "openai/gpt-5-mini") == 3
+    assert count_tokens("119.581", "ollama/gpt-oss:20b") == 3
+    assert count_tokens("119.581", "ollama/qwen3:8b") == 7
+    assert count_tokens("a word", "ollama/qwen3:8b") == count_tokens("a word")
+
+
+def test_without_a_vocabulary_numbers_are_not_counted_as_english(monkeypatch: pytest.MonkeyPatch) -> None:
+    exact = count_tokens(NUMBERS)
+    tokens._encoding.cache_clear()
+    monkeypatch.setattr(tokens, "find_spec", lambda _: None)
+    assert count_tokens(NUMBERS) == len(NUMBERS) / 2
+    assert 0.6 * exact < count_tokens(NUMBERS) < 1.7 * exact
