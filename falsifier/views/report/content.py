@@ -12,7 +12,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
 from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError
-from falsifier.record.journal import read_journal, recorded_candidates
+from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
 from falsifier.record.trajectory_files import recorded_trajectory
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.monitor import Verdict
@@ -47,9 +47,12 @@ class Shown:
 
     @property
     def explanation(self) -> str:
-        """What ``falsifier explain`` has found out; empty if nobody asked."""
+        """What ``falsifier explain`` has found out; empty if nobody asked, or if the run went on since."""
         file = beside(self.run.counterexample_file, EXPLANATION)
-        return file.read_text(encoding="utf-8").strip() if file.is_file() else ""
+        journal = self.run.directory / JOURNAL
+        if not file.is_file() or file.stat().st_mtime < journal.stat().st_mtime:
+            return ""
+        return file.read_text(encoding="utf-8").strip()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -138,11 +138,9 @@ class Watch:
         places = {place.name: place for place in run_directories(self.directory)}
         parts, rows = [], list[RunProgress]()
         if self._follower is not None:
-            rows = list(self._follower.look().runs)
-            working = is_worked_on(self.directory)
-            parts.append(
-                el("p", overall_line(self._follower.look(), None, stopped=not working), class_="result")
-            )
+            progress, working = self._follower.look(), is_worked_on(self.directory)
+            rows = list(progress.runs)
+            parts.append(el("p", overall_line(progress, None, stopped=not working), class_="result"))
         if chosen not in places:
             running = [run.name for run in rows if run.status == "running" and run.name in places]
             chosen = next(iter([*running, *places]), "")

@@ -8,6 +8,8 @@ from matplotlib.patches import Rectangle
 from falsifier.campaigns.analysis import load
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.views.plotting import plot_comparison, plot_history, plot_iteration_times, plot_rates
+from falsifier.views.plotting.axes import figure_of
+from falsifier.views.plotting.runs import falsification_curve, improvements, thinned
 from tests.views.plotting.support import xs, ys
 
 
@@ -64,3 +66,22 @@ def test_iteration_times_are_wall_clock_time_per_simulation(campaign: Path) -> N
     assert len(bars) == 2
     assert bars[0].get_height() == pytest.approx(np.mean(uniform))
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["uniform", "corners"]
+
+
+def test_curves(campaign: Path) -> None:
+    runs = [run for run in load(campaign) if run.method.engine == "uniform"]
+    counts, shares = falsification_curve(runs)
+    found = sorted(run.simulations for run in runs if run.falsified)
+    assert counts.tolist() == [0, *found, 20]
+    assert shares.tolist() == [0, 0.25, 0.5, 0.5]
+    values = np.array([3.0, np.nan, 4.0, 1.0, 1.0, 0.5])
+    assert [c.tolist() for c in improvements(values)] == [[1, 4, 6], [3, 1, 0.5]]
+    assert [c.tolist() for c in improvements(np.array([np.nan, 2.0]))] == [[2], [2]]
+    assert [c.tolist() for c in thinned(values, 2)] == [[4, 6], [1, 0.5]]
+    assert len(thinned(values, 10)[0]) == 5
+
+
+def test_the_figure_of_a_part_is_the_whole() -> None:
+    figure = Figure()
+    part = figure.add_subfigure(figure.add_gridspec(1, 2)[0])
+    assert figure_of(part.subplots()) is figure

@@ -75,6 +75,8 @@ def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> 
     assert decided.startswith("robustness -")
     assert (formula, parameters) == ("G[0,10] (x <= 0.9)", "x0 = 0.25")
     assert [text.get_text() for text in output.texts] == ["x <= 0.9"]
+    keys = ["limit", "violated", "farthest off", "control point of an input"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == keys
 
 
 def test_what_broke_is_marked_and_what_decided_is_only_a_ring() -> None:
@@ -118,6 +120,8 @@ def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
     assert figure.get_suptitle().startswith("LAG: not violated, robustness +0.9")
     dots = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o"]
     assert [dot.get_color() for dot in dots] == ["#b35900"]
+    keys = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "nearest to a violation" in keys and "violated" not in keys
 
 
 def test_a_margin_that_the_scale_hides_is_enlarged() -> None:
