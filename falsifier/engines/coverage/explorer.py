@@ -81,12 +81,6 @@ class Explorer:
         self._seen = 0
 
     @property
-    def has_modes(self) -> bool:
-        """Whether a discrete output has changed so far."""
-        kinds = self._marker.kinds
-        return any(mark.what[0] == "changes" and mark.source in kinds for mark in self._reached)
-
-    @property
     def has_levels(self) -> bool:
         """Whether levels are known at which something changes."""
         return self._aimed is not None

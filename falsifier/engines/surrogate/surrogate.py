@@ -262,7 +262,7 @@ class Surrogate:
                 break
             verdict = Verdict(known.robustness, 0.0, "")
             engine.tell([Evaluation(candidate, verdict=verdict)])
-        return Pending(arm, candidate, point)
+        return Pending(arm, replace(candidate, origin=self.name), point)
 
     def _made(self, arm: str, point: Array, why: str, forecast: Forecast | None = None) -> Pending:
         candidate = self.layout.candidate(point, origin=self.name, rationale=why)

@@ -114,7 +114,9 @@ def test_where_discrete_signals_do_new_things_what_they_did_is_gone_on_from_and_
 
 
 def test_no_simple_way_loses_all_of_its_turns() -> None:
-    found = arms(lag_problem("G[0,10] (x <= 1.25)", free=FREE), rounds=120)
+    problem = lag_problem("G[0,10] (x <= 1.25)", free=FREE)
+    found = arms(problem, rounds=120)
+    assert {c.origin for c in Surrogate(problem, seed=0, settings=HASTY).ask(4)} == {"surrogate"}
     assert min(found["uniform random"], found["generation 1 of the "]) >= 3
 
 
