@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from falsifier.analyses.range_parts import labels_of
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.core.candidate import Candidate
@@ -251,10 +252,12 @@ def _drawn(
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
     formula, components = parse(run.manifest.requirement.formula), run.manifest.components
+    labels = {mode.name: labels_of(mode.kind, mode.items) for mode in run.manifest.modes}
+    labels |= {r.name: labels_of(r.kind, r.items) for r in run.manifest.inputs if r.kind != "real"}
     drawn = (
         []
         if trajectory is None
-        else panels(formula, trajectory, candidate, run.manifest.inputs, verdict, components=components)
+        else panels(formula, trajectory, candidate, run.manifest.inputs, verdict, labels, components)
     )
     return Shown(
         run=run,

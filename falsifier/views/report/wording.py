@@ -103,7 +103,7 @@ def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
     if is_on_limit(verdict.robustness):
         robustness = margin_words(verdict.robustness, verdict.predicate)
     return [
-        ("required", verdict.predicate),
+        ("decided by", verdict.predicate),
         ("nearest", f"{robustness}: {values}" if values else robustness),
         ("when", f"at {verdict.critical_time:.6g} s"),
     ]
