@@ -181,7 +181,7 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
         preexec_fn=listen_to_interrupts,
     )
     journal = tmp_path / "run" / "journal.jsonl"
-    wait_until(lambda: journal.exists() and journal.read_text().count('"evaluated"') > 5)
+    wait_until(lambda: journal.exists() and journal.read_text().count('"kind":"evaluated"') > 8)
     process.send_signal(signal.SIGINT)
     out, _ = process.communicate(timeout=HANG)
     assert process.returncode == 130
