@@ -137,15 +137,17 @@ def formalize(
         if choose is not None:
             raise click.UsageError("--choose: there are readings only with --llm NAME")
         from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
+        from falsifier.problem.unit_check import defined_units
 
-        advice = advised_templates(sentence, subject_of(target).problem.info)
+        problem = subject_of(target).problem
+        advice = advised_templates(sentence, problem.info, defined_units(problem.model))
         if as_json:
             say(json.dumps(advice_json(sentence, advice), indent=2))
         elif advice:
             say(advice_text(sentence, advice))
         if not advice:
             raise SpecError(
-                f"no template fits the words of this sentence; {ENGLISH_ONLY}"
+                f"no template has a place for all words and numbers of this sentence; {ENGLISH_ONLY}"
                 + (f"\nnote: {note}" if (note := hint(sentence)) else "")
             )
         return

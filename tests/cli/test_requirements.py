@@ -128,13 +128,13 @@ def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None
     assert falsifier("formalize", "AT1", "x", "--choose", "1", cwd=tmp_path).code == 2
 
 
-@pytest.mark.parametrize("sentence", ["Die Drehzahl bleibt unter 5000 U/min.", "The gear changes."])
+@pytest.mark.parametrize("sentence", ["Die Drehzahl bleibt unter 5000 U/min.", "The speed stays within 5 m."])
 def test_without_a_template_that_fits_the_exit_code_is_two_and_a_line_says_so(
     tmp_path: Path, sentence: str
 ) -> None:
     done = falsifier("formalize", "AT1", sentence, cwd=tmp_path)
     assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
-    assert "no template fits" in done.err and "without --llm NAME only English" in done.err
+    assert "no template has a place" in done.err and "without --llm NAME only English" in done.err
     listed = falsifier("formalize", "AT1", sentence, "--json", cwd=tmp_path)
     assert (listed.code, listed.json["templates"]) == (2, [])
 
