@@ -41,7 +41,7 @@ _LARGE = ("falsifier", "openai.resources")
 _NEVER = (
     "falsifier.__main__",
     "falsifier.core.windows",
-    "falsifier.engines.botorch_gp",
+    "falsifier.engines.optimisers.botorch_gp",
 )
 _PROGRAM = """
 import sys

@@ -19,7 +19,6 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm import ReplyKind
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.llm.prompts import (
     DEFAULT_PROMPT_TOKENS,
@@ -28,6 +27,7 @@ from falsifier.llm.prompts import (
     View,
     choices,
 )
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.replies import Answer
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted
 from falsifier.problem.problem import Problem

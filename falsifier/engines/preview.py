@@ -7,9 +7,9 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.initial import start_values
 from falsifier.llm import ReplyKind
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import Message, Tool
 from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, View, variant_named
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.tools import MOST_CANDIDATES, what_if_tool
 from falsifier.problem.problem import Problem
 

@@ -76,16 +76,18 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
         "corners": Registered(
             "falsifier.engines.simple:Corners", "constant extremes first, then random", uses_robustness=False
         ),
-        "annealing": Registered("falsifier.engines.annealing:Annealing", "scipy's dual annealing"),
-        "cma": Registered("falsifier.engines.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
+        "annealing": Registered("falsifier.engines.optimisers.annealing:Annealing", "scipy's dual annealing"),
+        "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(
-            "falsifier.engines.bayesian:Bayesian", "Gaussian process with expected improvement"
+            "falsifier.engines.optimisers.bayesian:Bayesian", "Gaussian process with expected improvement"
         ),
         "optuna": Registered(
-            "falsifier.engines.optuna_tpe:TPE", "optuna's tree-structured Parzen estimator", extra="optuna"
+            "falsifier.engines.optimisers.optuna_tpe:TPE",
+            "optuna's tree-structured Parzen estimator",
+            extra="optuna",
         ),
         "botorch": Registered(
-            "falsifier.engines.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
+            "falsifier.engines.optimisers.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
         ),
         "hybrid": Registered(
             "falsifier.engines.hybrid:Hybrid", "a language model with the surrogate", is_free=True

@@ -7,8 +7,8 @@ from falsifier.context.values import NOTHING
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.llm import CONTEXT_VARIANT, ReplyKind
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import Variant, View, variant_named
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.replies import ReplyForm
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem

@@ -8,8 +8,8 @@ import pytest
 from scipy.stats import norm
 
 from falsifier.engines import make_engine
-from falsifier.engines.bayesian import log_improvement
-from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.engines.optimisers.bayesian import log_improvement
+from falsifier.engines.optimisers.gaussian_process import GaussianProcess, fit_lengths, standardised
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.stl import Verdict
 from falsifier.testing import drive, lag_problem

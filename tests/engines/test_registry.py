@@ -23,7 +23,7 @@ def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
     engine: str, module: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, engine, None)
-    monkeypatch.delitem(sys.modules, f"falsifier.engines.{module}", raising=False)
+    monkeypatch.delitem(sys.modules, f"falsifier.engines.optimisers.{module}", raising=False)
     with pytest.raises(SpecError, match=rf"'{engine}' needs a package.*pip install 'falsifier\[{engine}\]'"):
         make_engine(engine, lag_problem(), seed=0)
 

@@ -9,8 +9,8 @@ from falsifier.engines.told import doubts_told, reply_form, told_context, told_v
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import View, variant_named
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import FREE, lag_problem
 

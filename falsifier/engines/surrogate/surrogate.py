@@ -9,9 +9,9 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import Array, BoxEngine
-from falsifier.engines.cma import CMA
 from falsifier.engines.coverage import Explorer
 from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecast, Forecaster
 from falsifier.engines.surrogate.feasibility import Feasibility

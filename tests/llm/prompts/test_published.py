@@ -7,8 +7,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.prompts import View
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import lag_problem

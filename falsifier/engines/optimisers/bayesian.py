@@ -8,7 +8,7 @@ from scipy.special import log_ndtr, ndtr
 from scipy.stats import qmc
 
 from falsifier.engines.box import BoxEngine, Proposal, Vector
-from falsifier.engines.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.engines.optimisers.gaussian_process import GaussianProcess, fit_lengths, standardised
 from falsifier.problem.problem import Problem
 
 # Maximum number of points of the process, whose cost grows with their cube: half the best, half the latest.

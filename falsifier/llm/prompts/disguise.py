@@ -34,8 +34,7 @@ from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.observations import monitor_for
-from falsifier.llm.prompts.view import View
-from falsifier.llm.scaling import (
+from falsifier.llm.prompts.scaling import (
     MIDDLE,
     Scale,
     compared_numbers,
@@ -46,6 +45,7 @@ from falsifier.llm.scaling import (
     real_value,
     with_predicates,
 )
+from falsifier.llm.prompts.view import View
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
 from falsifier.stl.expression import Name, Number

@@ -15,8 +15,8 @@ from botorch.sampling import SobolQMCNormalSampler
 from botorch.utils.sampling import manual_seed
 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-from falsifier.engines.bayesian import GaussianProcessEngine
 from falsifier.engines.box import Proposal, Vector
+from falsifier.engines.optimisers.bayesian import GaussianProcessEngine
 from falsifier.problem.problem import Problem
 
 # Starts of the acquisition's optimisation, and the number of Sobol points from which they are chosen.

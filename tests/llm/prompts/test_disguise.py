@@ -18,9 +18,9 @@ from falsifier.engines.preview import preview
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.initial import start_values
-from falsifier.llm.disguise import Disguise
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.observations import monitor_for
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.replay import ScriptedChat

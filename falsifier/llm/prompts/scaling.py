@@ -1,4 +1,4 @@
-"""Neutral scales: numbers between 0 and 1 without units; ``falsifier.llm.disguise`` states the rules."""
+"""Neutral scales: numbers between 0 and 1 without units; ``disguise`` states the rules."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
