@@ -1,13 +1,12 @@
 """Whose turn it is: shares of turns by what each arm's latest proposals brought."""
 
-from bisect import bisect_left, insort
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
 
 from falsifier.engines.surrogate.settings import Settings
+from falsifier.evaluation.levels import Levels
 
 # What a new lowest robustness is worth at least; all the way to 0, it is worth 1.
 _STEP_DOWN = 0.5
@@ -19,47 +18,17 @@ _NEW_MARK = 0.1
 _PRIOR_WEIGHT = 2.0
 # Rating of an arm of which nothing is known or remembered, and as how many proposals that always counts.
 _UNKNOWN, _UNKNOWN_WEIGHT = 0.05, 1.0
-# Two values of robustness that differ by less than this share of the larger one are the same level.
-_SAME = 1e-6
-# Robustness is a staircase if it has at most one value per so many simulations, from so many values on.
-_PER_LEVEL, _FEWEST = 4, 2
 
 
-@dataclass
-class Levels:
-    """The different values of robustness so far, in order."""
-
-    values: list[float] = field(default_factory=list)
-    simulations: int = 0
-
-    @property
-    def lowest(self) -> float:
-        """The lowest robustness; inf before the first one."""
-        return self.values[0] if self.values else inf
-
-    @property
-    def is_plateau(self) -> bool:
-        """Whether all of several simulations had the same robustness."""
-        return self.simulations >= _PER_LEVEL and len(self.values) == 1
-
-    @property
-    def is_staircase(self) -> bool:
-        """Whether many simulations had few different values of robustness, which lead down in steps."""
-        count = len(self.values)
-        return count >= _FEWEST and self.simulations >= _PER_LEVEL * count
-
-    def add(self, robustness: float) -> float:
-        """Add a simulation; return from 0 to 1 what its robustness is worth."""
-        self.simulations += 1
-        lowest, place = self.lowest, bisect_left(self.values, robustness)
-        near = self.values[max(0, place - 1) : place + 1]
-        if any(abs(robustness - v) <= _SAME * max(abs(v), abs(robustness)) for v in near):
-            return 0.0
-        insort(self.values, robustness)
-        if place == 0 and lowest < inf:
-            way = 1.0 - max(robustness, 0.0) / lowest if lowest > 0.0 else 1.0
-            return _STEP_DOWN + (1.0 - _STEP_DOWN) * way
-        return _NEAR if 0 < place < _LOWEST else 0.0
+def worth(levels: Levels, robustness: float) -> float:
+    """Add a simulation to the levels; return from 0 to 1 what its robustness is worth."""
+    lowest, place = levels.lowest, levels.add(robustness)
+    if place is None:
+        return 0.0
+    if place == 0 and lowest < inf:
+        way = 1.0 - max(robustness, 0.0) / lowest if lowest > 0.0 else 1.0
+        return _STEP_DOWN + (1.0 - _STEP_DOWN) * way
+    return _NEAR if 0 < place < _LOWEST else 0.0
 
 
 class Policy:

@@ -18,11 +18,12 @@ from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.history import History, Sample
 from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
 from falsifier.engines.surrogate.planning import is_seen, plan
-from falsifier.engines.surrogate.policy import Levels, Policy
+from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.levels import Levels
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 
@@ -118,16 +119,16 @@ class Surrogate:
             self.feasibility.add(self.layout, point, failed=sample is None)
             for engine in self._engines.values():
                 engine.tell([evaluation])
-            worth, is_new = 0.0, False
+            brought, is_new = 0.0, False
             if sample is None:
                 self._failed.append(point)
             else:
-                worth = self._levels.add(sample.robustness)
+                brought = worth(self._levels, sample.robustness)
                 assert evaluation.trajectory is not None, "a sample has one"
                 critical = sample.critical * self.grid.step * self.grid.cells
                 is_new = self._explorer.learn(point, evaluation.trajectory, sample.robustness, critical)
             if pending is not None:
-                self._policy.learn(pending.arm, worth, is_new=is_new)
+                self._policy.learn(pending.arm, brought, is_new=is_new)
                 self._judge(pending, sample)
             elif sample is not None and self.layout.nearest_extreme(point, within=_NEAR_EXTREME):
                 self._corners.hear(self._corners.box.point(evaluation.candidate), sample.robustness)

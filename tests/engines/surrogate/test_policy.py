@@ -3,18 +3,19 @@
 import numpy as np
 import pytest
 
-from falsifier.engines.surrogate.policy import Levels, Policy
+from falsifier.engines.surrogate.policy import Policy, worth
+from falsifier.evaluation.levels import Levels
 from tests.engines.surrogate.support import SETTINGS
 
 
 def told(*robustness: float) -> tuple[Levels, list[float]]:
     levels = Levels()
-    return levels, [levels.add(r) for r in robustness]
+    return levels, [worth(levels, r) for r in robustness]
 
 
 def test_steps_down_count_by_how_far_they_go() -> None:
-    _, worth = told(4.0, 3.0, 1.5, 1.5, 3.0, 2.0, -1.0)
-    assert worth == [0.0, 0.625, 0.75, 0.0, 0.0, 0.25, 1.0]
+    _, brought = told(4.0, 3.0, 1.5, 1.5, 3.0, 2.0, -1.0)
+    assert brought == [0.0, 0.625, 0.75, 0.0, 0.0, 0.25, 1.0]
 
 
 def test_many_simulations_with_few_levels_are_a_staircase_and_with_one_a_plateau() -> None:
