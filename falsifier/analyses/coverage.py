@@ -5,7 +5,7 @@ time. Trajectories are read one by one: a long run's would not fit in memory tog
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 from os import PathLike
 from pathlib import Path
@@ -28,6 +28,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
+from falsifier.evaluation.levels import Climb
 from falsifier.record import manifest
 from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.record.manifest import InputRecord, Manifest
@@ -35,6 +36,7 @@ from falsifier.record.records import EvaluatedRecord
 from falsifier.record.trajectory_files import recorded_trajectory
 from falsifier.search.findings import Failure
 from falsifier.search.findings import failures as by_cause
+from falsifier.stl import parse
 
 # Slices of the simulated time in which the values of an input are counted.
 SLICES = 40
@@ -171,6 +173,7 @@ class Coverage:
         pairs: all pairs of them, the least tried first.
         outputs: recorded real outputs.
         modes: recorded and searched integers, Booleans and enumerations.
+        climbs: levels of robustness and what is missing for a lower one, by requirement, as far as known.
     """
 
     simulations: int
@@ -181,6 +184,7 @@ class Coverage:
     pairs: tuple[PairCoverage, ...]
     outputs: tuple[OutputCoverage, ...]
     modes: tuple[ModeCoverage, ...]
+    climbs: Mapping[str, Climb] = field(default_factory=dict)
 
 
 def coverage(directory: str | PathLike[str]) -> Coverage:
@@ -202,10 +206,21 @@ def coverage(directory: str | PathLike[str]) -> Coverage:
     described, records = manifest.read(place), read_journal(place)
     candidates = recorded_candidates(records)
     ended = [r for r in records if isinstance(r, EvaluatedRecord)]
-    judged = [r for r in ended if any(r.verdicts.values())]
-    tried = ((candidates[r.index], recorded_trajectory(place, r.trajectory)) for r in judged)
+    counting = {m.name: labels_of(m.kind, m.items) for m in described.modes if m.kind != "boolean"}
+    climbs = {name: Climb(counting) for name in described.names}
+    predicates = {r.name: parse(r.formula).predicates for r in described.requirements}
+
+    def tried() -> Iterator[tuple[Candidate, Trajectory | None]]:
+        for record in ended:
+            if any(record.verdicts.values()):
+                trajectory = recorded_trajectory(place, record.trajectory)
+                for name, verdict in record.verdicts.items():
+                    if verdict is not None:
+                        climbs[name].add(record.index + 1, verdict, trajectory, predicates[name])
+                yield candidates[record.index], trajectory
+
     reasons = ((r.index, r.reason) for r in ended if not any(r.verdicts.values()))
-    return coverage_of(described, tried, failures=by_cause(reasons))
+    return replace(coverage_of(described, tried(), failures=by_cause(reasons)), climbs=climbs)
 
 
 def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, ...] = ()) -> Coverage:

@@ -1,13 +1,37 @@
-"""The different values of robustness of a search."""
+"""The different values of robustness of a search; where they are few, what is missing for a lower one."""
 
+import operator
 from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import counted
+from falsifier.stl.breach import compared_sides
+from falsifier.stl.diagnosis import valued
+from falsifier.stl.formula import Comparison, Predicate, negated
+from falsifier.stl.margins import signed
+from falsifier.stl.monitor import Verdict
 
 # Two values of robustness that differ by less than this share of the larger one are the same level.
 _SAME = 1e-6
 # Robustness is a staircase if it has at most one value per so many simulations, from so many values on.
 _PER_LEVEL, _FEWEST = 4, 2
+# The lowest levels that are told.
+_TOLD = 5
+# A signal without names of its values that makes more steps counts something without an end, such as events.
+_MOST_STEPS = 12
+_HOLDS: Mapping[Comparison, Callable[[Any, Any], Any]] = {
+    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq,
+    "!=": operator.ne,
+}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -63,3 +87,136 @@ class Levels:
                 return None
         self.found.insert(place, Level(robustness, number or self.simulations))
         return place
+
+    def told(self, noun: str) -> str:
+        """Say how many simulations had each of the lowest levels, and which was the first.
+
+        Args:
+            noun: what a simulation is called.
+        """
+        parts = [
+            f"{signed(level.robustness)} in {level.simulations}, first in {noun} {level.first}"
+            for level in self.found[:_TOLD]
+        ]
+        more = [counted(len(self.found) - _TOLD, "higher value")] if len(self.found) > _TOLD else []
+        return f"robustness in {counted(self.simulations, noun)}: {'; '.join([*parts, *more])}"
+
+
+@dataclass(slots=True)
+class Climb:
+    """What simulations show of the way down a staircase of robustness: how far it led, and what is missing.
+
+    Attributes:
+        labels: the discrete signals that may count up, and the names of their values as far as they have any.
+        noun: what a simulation is called.
+        levels: the values of robustness.
+        trajectories: number of simulations whose trajectory is known.
+    """
+
+    labels: Mapping[str, Mapping[int, str]]
+    noun: str = "simulation"
+    levels: Levels = field(default_factory=Levels)
+    trajectories: int = 0
+    _lowest: tuple[Predicate, Verdict] | None = None
+    # Numbers of the simulations in which a predicate was so, and in which a signal had a value.
+    _met: defaultdict[tuple[str, bool], list[int]] = field(default_factory=lambda: defaultdict(list))
+    _values: defaultdict[tuple[str, int], list[int]] = field(default_factory=lambda: defaultdict(list))
+    _rises: defaultdict[str, set[tuple[int, int]]] = field(default_factory=lambda: defaultdict(set))
+
+    def add(
+        self,
+        number: int,
+        verdict: Verdict,
+        trajectory: Trajectory | None,
+        predicates: Sequence[Predicate],
+    ) -> None:
+        """Add a simulation.
+
+        Args:
+            number: its number, from 1.
+            verdict: its verdict.
+            trajectory: its trajectory; None if it is not known.
+            predicates: those of the requirement.
+        """
+        if self.levels.add(verdict.robustness, number) == 0:
+            known = _known(predicates, verdict.values)  # engines may be told verdicts without values
+            decider = next((p for p in known if str(p) == verdict.predicate), None)
+            self._lowest = None if decider is None else (decider, verdict)
+        if trajectory is None:
+            return
+        self.trajectories += 1
+        for predicate in _known(predicates, trajectory.columns):
+            for truth in np.unique(_truths(predicate, trajectory.columns)).tolist():
+                self._met[str(predicate), truth].append(number)
+        for name in self.labels.keys() & trajectory.columns.keys():
+            column = trajectory[name]
+            kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))]
+            if np.array_equal(kept, np.round(kept)):
+                values = kept.astype(int).tolist()
+                for value in set(values):
+                    self._values[name, value].append(number)
+                self._rises[name].update((a, b) for a, b in pairwise(values) if a < b)
+            else:  # such as one that is told in another scale; this rise says that it does not count
+                self._rises[name].add((0, 2))
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there are few levels, and no violation."""
+        return self.levels.lowest >= 0 and (self.levels.is_plateau or self.levels.is_staircase)
+
+    @property
+    def lines(self) -> list[str]:
+        """What is missing for a lower level."""
+        return [*self._decided(), *self._counting()]
+
+    def _decided(self) -> Iterator[str]:
+        """The comparison that decides the lowest level, and whether what a violation needs ever held."""
+        if self._lowest is None:
+            return
+        predicate, verdict = self._lowest
+        is_true = bool(_truths(predicate, verdict.values))
+        needed = negated(predicate) if is_true else predicate
+        value = valued(compared_sides(predicate)[0], verdict.values, verdict.robustness)
+        met = self._met[str(predicate), not is_true]
+        text = f"{predicate} decided the lowest robustness, with {value}; a violation there takes {needed}"
+        if met:
+            text += f", which held in {self._of(met)}, but not when that violates the requirement"
+        elif self.trajectories:
+            text += f", which held in none of {self._all}"
+        yield f"{text}."
+
+    def _counting(self) -> Iterator[str]:
+        """Signals that only ever rose by one, and the next step that was never made."""
+        for name, rises in sorted(self._rises.items()):
+            if not rises or any(after - before != 1 for before, after in rises):
+                continue
+            labels, top = self.labels[name], max(after for _, after in rises)
+            reached = self._values[name, top]
+            # Without names of values, nothing says that a signal that always gets so far could go further.
+            is_rare = 2 * len(reached) <= self.trajectories
+            is_hindered = is_rare and _FEWEST <= len(rises) <= _MOST_STEPS
+            if top + 1 in labels if labels else is_hindered:
+                here, following = (labels.get(value, str(value)) for value in (top, top + 1))
+                yield (
+                    f"{name} counts up: it reached {here} in {self._of(reached)}; the step from {here} to "
+                    f"{following} was never made."
+                )
+
+    @property
+    def _all(self) -> str:
+        kept = "" if self.trajectories == self.levels.simulations else " whose trajectories were kept"
+        return f"{counted(self.trajectories, self.noun)}{kept}"
+
+    def _of(self, numbers: Sequence[int]) -> str:
+        return f"{len(numbers)} of {self._all}, first in {self.noun} {numbers[0]}"
+
+
+def _known(predicates: Sequence[Predicate], values: Mapping[str, Any]) -> list[Predicate]:
+    """Return those whose signals all have values."""
+    return [p for p in predicates if values.keys() >= set(p.signals)]
+
+
+def _truths(predicate: Predicate, values: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Whether a comparison holds, for values at one time or over time."""
+    left, right = (side.evaluate(values) for side in (predicate.left, predicate.right))
+    return np.asarray(_HOLDS[predicate.operator](left, right))

@@ -48,6 +48,11 @@ def coverage_text(found: Coverage, name: str) -> str:
         )
     if found.modes:
         lines += ["modes", *_aligned([_mode_row(m) for m in found.modes])]
+    for requirement, climb in found.climbs.items():
+        if climb.is_told:
+            of = f"{requirement}: " if len(found.climbs) > 1 else ""
+            lines.append(f"{of}few values of robustness, and what is missing for a lower one")
+            lines += [f"  {line}" for line in (climb.levels.told("simulation"), *climb.lines)]
     return "\n".join(map(one_line, lines))
 
 
@@ -97,6 +102,11 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
                 "changes": [[_label(m, a), _label(m, b)] for a, b in sorted(m.changes)],
             }
             for m in found.modes
+        ],
+        "levels": [
+            {"requirement": name, "levels": [asdict(x) for x in climb.levels.found], "missing": climb.lines}
+            for name, climb in found.climbs.items()
+            if climb.is_told
         ],
     }
 

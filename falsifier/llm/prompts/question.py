@@ -13,6 +13,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.levels import Climb
 from falsifier.llm import ReplyKind
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import choices
@@ -101,6 +102,7 @@ class Questions:
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
+        self._climb = Climb(_counting(view), "sample")
 
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
         """Add a sample.
@@ -221,30 +223,34 @@ class Questions:
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 
     def _standings(self) -> Iterator[str]:
-        """Which samples are the best; where the robustness says nothing, which got furthest."""
+        """Which samples are the best, or got furthest; where robustness says little, what is missing."""
         judged = [s for s in self._samples if s.robustness is not None]
+        levels = self._climb.levels
         if len(judged) < 2:
             return
         if self._is_flat():
             yield (
-                f"The robustness is flat: it was {signed(judged[0].robustness, 3)} in all {len(judged)} "
+                f"The robustness is flat: it was {signed(levels.lowest, 3)} in all {levels.simulations} "
                 "samples, so its value gives no direction. Look instead at how close a condition came to "
                 "being true, how briefly a discrete value was held, and how far a signal was from its "
                 "switching point."
             )
             ranked = sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
             yield f"By what the recorded signals did, these got furthest: {self._named(ranked)}."
-            return
-        ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
-        yield f"Lowest robustness so far: {self._named(ranked)}."
+        else:
+            ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
+            yield f"Lowest robustness so far: {self._named(ranked)}."
+        if self._climb.is_told:
+            few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
+            yield "\n".join((*few, *self._climb.lines))
 
     def _named(self, ranked: Sequence[_Sample]) -> str:
         return listed([f"sample {s.number}" for s in ranked[:_NAMED]])
 
     def _is_flat(self) -> bool:
-        """Whether several samples have the same robustness, and none has another."""
-        values = [s.robustness for s in self._samples if s.robustness is not None]
-        return len(values) > 1 and len({f"{v:.9g}" for v in values}) == 1
+        """Whether several samples had the same robustness, and none had another."""
+        levels = self._climb.levels
+        return levels.simulations > 1 and len(levels.found) == 1
 
     def _left(self, budget: int | None) -> str:
         if budget is None:
@@ -279,6 +285,8 @@ class Questions:
             Progress() if evaluation.trajectory is None else Progress.of(self.view, evaluation.trajectory)
         )
         news = self._reached.news(progress)
+        predicates = self.view.requirement.formula.predicates
+        self._climb.add(self._told, verdict, evaluation.trajectory, predicates)
         found = observed(self.view, evaluation)
         best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
         robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
@@ -361,6 +369,15 @@ def _texts(
 
 def _text(inputs: Sequence[str], *lines: str) -> str:
     return "\n  ".join(("; ".join(inputs), *(line for line in lines if line)))
+
+
+def _counting(view: View) -> dict[str, dict[int, str]]:
+    """Recorded signals that may count up, with the names of their values; none where no types are told."""
+    return {
+        name: {number: item for item, number in view.info[name].literals.items()}
+        for name in view.experiment.outputs
+        if view.tells_kinds and view.kind(name) in ("integer", "enumeration") and name in view.info
+    }
 
 
 def _shortened(why: str) -> str:
