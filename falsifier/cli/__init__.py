@@ -46,11 +46,11 @@ _EXHAUSTED = {
 _Table = dict[str, "tuple[str | _Table, str]"]
 _LLM: _Table = {
     "check": ("falsifier.cli.llm", "Check name and key of a language model with one short request."),
-    "prompt": ("falsifier.cli.llm", "Print what would be sent to a language model, or what was sent."),
+    "prompt": ("falsifier.cli.llm", "Print the prompt that a language model would get, or was sent."),
 }
 _TOOLS: _Table = {
     "build": ("falsifier.cli.tools", "Compile an FMU's C sources for this platform."),
-    "repair": ("falsifier.cli.tools", "Drop what is damaged in the files of a run or campaign."),
+    "repair": ("falsifier.cli.tools", "Remove damaged parts from the files of a run or campaign."),
     "validate": ("falsifier.cli.tools", "Re-simulate counterexamples in ARCH-COMP format."),
     "schema": ("falsifier.cli.tools", "Print the JSON Schema of spec files or run records."),
 }
@@ -74,7 +74,7 @@ _COMMANDS: _Table = {
     "init": ("falsifier.cli.inspect", "Write a starter spec for an FMU."),
     "check": ("falsifier.cli.requirements", "Check a spec file, and find requirements that say nothing."),
     "formalize": ("falsifier.cli.requirements", "Turn a requirement in words into formulas."),
-    "llm": (_LLM, "Language models: check one, print prompts."),
+    "llm": (_LLM, "Check a language model, or print prompts."),
     "tools": (_TOOLS, "Build FMUs, repair records, validate results, print schemas."),
 }
 
@@ -125,7 +125,7 @@ _HELP = """Find inputs that make an FMU violate a requirement.
 
 \b
 falsifier run AT1                                      a bundled problem
-falsifier run my.toml:REQ --budget 300                 a requirement of your own
+falsifier run my.toml:REQ --budget 300                 your own requirement
 falsifier run my.fmu --stl 'G[0,10] (h >= 0)' --search u=-1:1:5
 
 Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or spec, 3 simulator, language model or machine

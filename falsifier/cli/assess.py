@@ -61,9 +61,9 @@ def assess(
 ) -> None:
     """Bound the probability of a violation by simulating at random.
 
-    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or the
-    directory of a run, whose search space is drawn from and whose findings are stated beside the
-    bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or a run
+    directory: then inputs are drawn from the search space of the run, and its findings are stated beside
+    the bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
     uniform. The upper bound is exact (Clopper and Pearson).
 
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
@@ -122,8 +122,8 @@ def margin(
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU. The formula replaces
     its requirement. Every simulation is judged for all thresholds.
 
-    Exit codes: 0 not falsified at any threshold, 1 falsified at one, 2 wrong usage or spec, 3 the simulations
-    failed, 130 interrupted, after which the searches so far count.
+    Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
+    simulations failed, 130 interrupted, after which the searches so far count.
     """
     from falsifier.analyses.margin import LIMIT
     from falsifier.analyses.margin import margin as find_margin
@@ -161,7 +161,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     place = Path(options["target"])
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
-            raise click.UsageError("--requirement chooses from a run directory; TARGET is none")
+            raise click.UsageError("--requirement applies to run directories only; TARGET is not one")
         return load_source(problem_source(options)), []
     unset = {"target": None, "parameterized": Parameterized(kind=DEFAULT_PARAMETERIZATION)}
     changed = [
@@ -170,7 +170,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     if changed:
         stated = {p.name: p.opts[0] for p in click.get_current_context().command.params}
         what = ", ".join(stated.get(name, name) for name in changed)
-        raise click.UsageError(f"{place}: a run is assessed as it was searched; drop {what}")
+        raise click.UsageError(f"{place}: the search space of a run cannot be changed; drop {what}")
     described = read_manifest(place)
     if requirement is None and described.shared:
         raise click.UsageError(
@@ -179,7 +179,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     described = described.of(requirement or described.requirement.name)
     source = described.request.source
     if source is None:
-        raise SpecError(f"{place}: the problem of this run was made in Python: call assess() there")
+        raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
     evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
     return load_source(source), list(evaluations.values())
 

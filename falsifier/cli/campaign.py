@@ -76,7 +76,7 @@ _WATCH_PERIOD = 0.5
 
 _BENCH_HELP = """Run requirements x methods x seeds and print a table in the format of the ARCH-COMP category.
 
-TARGETS are requirements (AT1) or specs with all their requirements (my.toml); without any, give --suite.
+TARGETS are requirements (AT1) or specs with all their requirements (my.toml); without targets, give --suite.
 Each run has the defaults of falsifier run; with --suite, those of the competition.
 
 \b
@@ -189,13 +189,13 @@ def bench(
 @command()
 @directory_argument
 @click.option("--once", is_flag=True, help="Print the current progress and exit.")
-@click.option("--page", is_flag=True, help="Serve a page that shows it, on this machine only, until Ctrl-C.")
-@click.option("--allow-stop", is_flag=True, help="With --page: a button that stops the run, as Ctrl-C does.")
+@click.option("--page", is_flag=True, help="Serve a web page of it, on this machine only, until Ctrl-C.")
+@click.option("--allow-stop", is_flag=True, help="With --page: add a button that stops the run, like Ctrl-C.")
 def watch(*, directory: Path, once: bool, page: bool, allow_stop: bool) -> None:
     """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
-    This writes nothing to DIRECTORY, except if somebody presses the button of --allow-stop. The page of
-    --page can also be opened after the end.
+    This writes nothing to DIRECTORY unless somebody presses the button of --allow-stop. The page of --page
+    can also be opened after the run has ended.
     """
     if page:
         if once:
@@ -291,7 +291,7 @@ def _kinds(
     """
     profiles = {chosen.profile for chosen in given}
     if len(profiles) > 1:
-        raise click.UsageError("--parameterization: one profile for all runs of a campaign")
+        raise click.UsageError("--parameterization: all runs of a campaign must have the same profile")
     if any(chosen.shortest_piece is not None for chosen in given):
         raise click.UsageError("--parameterization free:SECONDS: applies to single runs only; write free")
     kinds = tuple(dict.fromkeys(chosen.kind or default for chosen in given))

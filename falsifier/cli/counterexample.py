@@ -50,8 +50,12 @@ _MAP_SAMPLES, _MAP_POINTS = 256, 441
 
 @command()
 @run_argument
-@click.option("--shrink", "shrunk", is_flag=True, help="Write the simplest one near it that still violates.")
-@click.option("--map", "mapped", is_flag=True, help="Change all inputs at random; draw where it violates.")
+@click.option(
+    "--shrink", "shrunk", is_flag=True, help="Write the simplest counterexample near it that still violates."
+)
+@click.option(
+    "--map", "mapped", is_flag=True, help="Change all inputs at random; draw which changes still violate."
+)
 @budget_option(
     shown=f"{_SHRINK_BUDGET}; with --map {_MAP_SAMPLES + _MAP_POINTS}", note=" of --shrink or --map"
 )
@@ -59,14 +63,14 @@ _MAP_SAMPLES, _MAP_POINTS = 256, 441
     "--at-most",
     type=float,
     metavar="ROBUSTNESS",
-    help="With --shrink: robustness that the simpler one may have; 0: any violation. Default: half of a "
-    "counterexample's, a tenth more than a nearest miss's.",
+    help="With --shrink: maximum robustness of the simpler one; 0: any violation. Default: half of that of "
+    "a counterexample, or a tenth more than that of a nearest miss.",
 )
 @llm_option()
 @api_base_option
 @requirement_option
 @out_option(
-    "File to write; default: shrunk.json, of a nearest miss shrunk.csv; with --map robustness-map.png."
+    "File to write; default: shrunk.json, or shrunk.csv for a nearest miss; with --map robustness-map.png."
 )
 @policy_options
 @json_option
@@ -84,14 +88,14 @@ def explain(
     as_json: bool,
     **rights: Any,
 ) -> None:
-    """Say why a counterexample violates, simplify it, or map what is around it.
+    """Say why a counterexample violates, simplify it, or map the robustness around it.
 
-    RUN is a run directory or a counterexample file. Of a run that falsified nothing, this is about the
-    simulation that came nearest to a violation.
+    RUN is a run directory or a counterexample file. If a run falsified nothing, this is about its nearest
+    miss, the simulation that came nearest to a violation.
 
-    Without --shrink and --map: what broke, and what resetting each input alone comes to; of a nearest miss
-    also its picture, nearest-miss.png. With --llm, a language model describes it in its own words, too.
-    Except with --shrink, a run's shrunk counterexample is taken if there is one.
+    Without --shrink and --map: says what broke, and what happens if each input alone is reset; for a nearest
+    miss it also draws nearest-miss.png. With --llm, a language model describes it in its own words, too.
+    Except with --shrink, the shrunk counterexample of a run is used if there is one.
     """
     _check_parts(
         shrunk=shrunk,
@@ -113,7 +117,7 @@ def explain(
 
 @command()
 @run_argument
-@interface_option("FMI interface through which it is simulated; default: that of the run.")
+@interface_option("FMI interface to simulate with; default: that of the run.")
 @policy_options
 @json_option
 def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights: Any) -> None:
@@ -144,7 +148,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
     "--store",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Only keep the counterexample in this folder of counterexamples, for pytest --falsifier.",
+    help="Only store the counterexample in this folder, for pytest --falsifier.",
 )
 @policy_options
 def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) -> None:
@@ -173,7 +177,7 @@ def _check_parts(*, shrunk: bool, mapped: bool, **groups: Mapping[str, object]) 
         click.UsageError: naming those that were given.
     """
     if shrunk and mapped:
-        raise click.UsageError("--shrink and --map: give one after the other")
+        raise click.UsageError("--shrink and --map cannot be combined; run one after the other")
     applies = {"other": shrunk or mapped, "simpler": shrunk, "words": not (shrunk or mapped)}
     reasons = {
         "other": "add --shrink or --map",
@@ -339,7 +343,7 @@ def _loaded(case: Case, rights: Mapping[str, Any]) -> Iterator[Problem]:
     for note in rights_notes(problem.model):
         warn(note)
     if withheld:
-        warn(f"not allowed, as it was not when this was recorded: {', '.join(withheld)}; --allow grants it")
+        warn(f"not allowed, as when this was recorded: {', '.join(withheld)}; --allow grants it")
     try:
         yield problem
     finally:

@@ -47,9 +47,9 @@ _PICTURES = (".svg", ".png", ".pdf")
     "--check",
     "checked",
     is_flag=True,
-    help="Simulate with the step and with half of it, and show the largest differences of the outputs.",
+    help="Simulate at the step and at half of it, and show the largest differences between the outputs.",
 )
-@click.option("--names", is_flag=True, help="Of a Simulink file: show only the names.")
+@click.option("--names", is_flag=True, help="For a Simulink file: show only the names.")
 @click.option(
     "--diagram",
     "drawn",
@@ -72,8 +72,8 @@ def info(
 ) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
-    FILE is an FMU, the name of a bundled one (AT) or of a bundled requirement (AT1), or a spec file; the last
-    two stand for their FMU or system. Of a Simulink file (.slx, .mdl) it shows the blocks, lines and charts.
+    FILE is an FMU, the name of a bundled FMU (AT) or of a bundled requirement (AT1), or a spec file; for the
+    last two, their FMU or system is shown. A Simulink file (.slx, .mdl) is shown as blocks, lines and charts.
     """
     from falsifier.fmu import read_info
 
@@ -143,7 +143,7 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
 @click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
-    """Write a starter spec: fill in ranges and the requirement.
+    """Write a starter spec, in which you fill in ranges and the requirement.
 
     FMU is an FMU or an SSP package. Several FMUs become the components of a system, to be connected in the
     spec.

@@ -44,13 +44,13 @@ if TYPE_CHECKING:
     "directory",
     type=click.Path(path_type=Path),
     metavar="RUN",
-    help="Run whose samples the prompt contains, whichever engine made them; default: none.",
+    help="Run whose samples the prompt contains, whatever its engine; default: none.",
 )
 @click.option(
     "--at",
     type=click.IntRange(min=1),
     metavar="N",
-    help="The question for sample N: with --after, after the N-1 samples before it; if TARGET is a run "
+    help="Question for sample N: with --after, the one after the N-1 samples before it; if TARGET is a run "
     "directory, the one that was sent, with its reply.",
 )
 @click.option(  # only these two engines write prompts
@@ -74,7 +74,7 @@ def prompt(
 ) -> None:
     """Print exactly what would be sent to a language model next, without sending it.
 
-    With --at, print what a run sent.
+    With --at, print a question that a run sent.
     """
     from falsifier.engines.hybrid import Settings as HybridSettings
     from falsifier.engines.preview import preview, preview_tool
@@ -209,10 +209,10 @@ def _size(messages: Sequence["Message"]) -> str:
 @click.argument("name")
 @connection_options
 def check(*, name: str, **options: Any) -> None:
-    """Check name and key of a language model, and what runs need of it, with a few short requests.
+    """Check the name and key of a language model and the features that runs need, with a few short requests.
 
-    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. Exits with 3 if no usable answer
-    comes.
+    NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. The exit code is 3 if there is
+    no usable answer.
     """
     from falsifier.llm.check import check_llm
     from falsifier.llm.usage import Price

@@ -41,7 +41,7 @@ context_option = click.option(
     metavar="FILE|fmu|none|checked:FILE",
     help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
     "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
-    "checked:FILE: a line of this file looks like a key and is none. Repeatable.",
+    "checked:FILE: a line of this file looks like a key but is not. Repeatable.",
 )
 
 
@@ -69,8 +69,8 @@ llm_option_option = click.option(
     "llm_options",
     multiple=True,
     metavar="NAME=VALUE",
-    help="How it is asked: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
-    "tokens, cache=no, reply=points in place of json; all other names go to the provider unchanged, e.g. "
+    help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
+    "tokens, cache=no, reply=points instead of json; all other names go to the provider unchanged, e.g. "
     "max_tokens=4000. Repeatable.",
 )
 
@@ -218,7 +218,7 @@ def _timeout(text: str, value: str) -> float:
 
 def _cache(text: str, value: str) -> bool:
     if value not in ("yes", "no"):
-        raise click.UsageError(f"--llm-option {text}: expected yes, or no to ask again what was answered")
+        raise click.UsageError(f"--llm-option {text}: expected yes, or no to ignore stored replies")
     return value == "yes"
 
 

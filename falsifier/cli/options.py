@@ -106,8 +106,8 @@ def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PA
         default=None if multiple else default,
         show_default=default if multiple else True,
         help=repeatable(
-            "free: engines may choose control points within the spec's limits, with SECONDS of every input "
-            "and in pieces of at least this; fixed: the spec's own. PROFILE: one of the spec.",
+            "free: engines may choose control points within the spec's limits; with SECONDS, those of every "
+            "input, in pieces at least this long; fixed: the spec's own. PROFILE: a profile of the spec.",
             multiple=multiple,
         ),
     )
@@ -135,7 +135,7 @@ def parameterized(text: str) -> Parameterized:
         if not word or (found.kind if is_kind else found.profile):
             raise click.UsageError(
                 f"--parameterization {text}: expected free, free:SECONDS or fixed, after the name of a "
-                "profile and a comma if the spec has one, for example instance2,fixed"
+                "profile and a comma if the spec has profiles, for example instance2,fixed"
             )
         if said != word:
             found = found._replace(kind="free", shortest_piece=_seconds(text, said))
@@ -182,8 +182,8 @@ def policy_options(command: Function) -> Function:
             "--allow",
             multiple=True,
             metavar="write:PATH|read:PATH|programs",
-            help="What the FMU may do beyond changing its own folders: change PATH, read PATH although it "
-            "may hold keys, execute programs. In addition to the spec's. Repeatable.",
+            help="What the FMU may do besides changing its own folders: change PATH, read PATH even if it "
+            "may contain keys, execute programs. Adds to what the spec allows. Repeatable.",
         ),
         click.option(
             "--deny",
@@ -242,7 +242,7 @@ def problem_options(command: Function) -> Function:
             multiple=True,
             metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
             help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or "
-            "between the FMU's min and max. Repeatable.",
+            "the FMU's min and max. Repeatable.",
         ),
         parameterization_option(),
         interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
@@ -418,7 +418,7 @@ def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
         multiple=multiple,
         metavar="u.csv|counterexample.json|RUN",
         help=repeatable(
-            f"{text}: of a CSV file (time in s, then a column for each input), a counterexample, or the best "
+            f"{text}: a CSV file (time in s, then a column for each input), a counterexample, or the best "
             "sample of a run.",
             multiple=multiple,
         ),
@@ -432,7 +432,7 @@ directory_argument = click.argument("directory", type=click.Path(path_type=Path)
 
 
 requirement_option = click.option(
-    "--requirement", metavar="NAME", help="Which one, if a run searched several requirements."
+    "--requirement", metavar="NAME", help="Which requirement, if a run searched several."
 )
 
 

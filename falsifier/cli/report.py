@@ -51,7 +51,7 @@ def report(
 ) -> None:
     """Report on the run or campaign in DIRECTORY: one self-contained HTML page.
 
-    Several are compared side by side: the same requirement before and after a change, or two engines.
+    Several directories are compared side by side: for example before and after a change, or two engines.
     """
     first, *others = directories
     if others and (junit is not None or arch_comp is not None):
@@ -79,10 +79,10 @@ def report(
 @out_option("Picture to write; default: coverage.png in DIRECTORY.")
 @json_option
 def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
-    """Show which part of the search space the run in DIRECTORY has tried, and what the system did.
+    """Show which part of the search space the run in DIRECTORY has tried, and how the system responded.
 
-    Ranges of inputs and parameters, how fast inputs changed, combinations of two at the same time, values
-    that outputs reached, modes and changes of mode. Nothing is simulated.
+    This covers ranges of inputs and parameters, how fast inputs changed, combinations of two at the same
+    time, values that outputs reached, modes and changes of mode. Nothing is simulated.
     """
     from falsifier.views.plotting import plot_coverage
 

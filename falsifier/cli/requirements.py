@@ -45,16 +45,17 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 @target_argument
 @parameterization_option()
 @template_option
-@budget_option(0, note=" that measure whether inputs move a requirement; 0: what the FMU declares counts")
+@budget_option(0, note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares")
 @json_option
 def check(
     *, target: str, parameterized: Parameterized, template: str | None, budget: int, as_json: bool
 ) -> None:
     """Check a spec file, and find requirements that say nothing.
 
-    First keys, signals, ranges and formulas. Then what cannot fail or hold, what nothing moves, windows and
-    parts that do not matter, units that do not fit, and requirements that repeat others. With --template,
-    only the requirement that the template makes of TARGET, a spec or FMU.
+    First, keys, signals, ranges and formulas are checked. Then it looks for parts that cannot fail or hold,
+    signals that no input moves, windows and parts that do not matter, units that do not fit, and requirements
+    that repeat others. With --template, only the requirement made from the template is checked; TARGET is
+    then a spec or an FMU.
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
@@ -106,11 +107,9 @@ def _lines(finding: LintFinding) -> list[str]:
 @llm_option()
 @connection_options
 @click.option(
-    "--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec, without asking."
+    "--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec without asking."
 )
-@click.option(
-    "--name", help="Name of the requirement in the spec; default: the first free one of R1, R2, ..."
-)
+@click.option("--name", help="Name of the requirement in the spec; default: the first unused of R1, R2, ...")
 @out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
 @json_option
 def formalize(
@@ -126,7 +125,7 @@ def formalize(
     """Turn a requirement in words into formulas, and write the chosen one into a spec.
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
-    checked, said back in words, told apart from the others by an example and judged on one simulation.
+    checked, restated in words, distinguished from the others by an example and judged on one simulation.
     Without --llm, templates that fit an English sentence are shown, and nothing is written.
     """
     from falsifier.problem.writing import subject_of, with_requirement
@@ -135,7 +134,7 @@ def formalize(
     settings = connection_settings(options)
     if settings is None:
         if choose is not None:
-            raise click.UsageError("--choose: there are readings only with --llm NAME")
+            raise click.UsageError("--choose requires --llm NAME, which proposes the readings")
         from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
         from falsifier.problem.unit_check import defined_units
 
@@ -147,7 +146,7 @@ def formalize(
             say(advice_text(sentence, advice))
         if not advice:
             raise SpecError(
-                f"no template has a place for all words and numbers of this sentence; {ENGLISH_ONLY}"
+                f"no template fits all words and numbers of this sentence; {ENGLISH_ONLY}"
                 + (f"\nnote: {note}" if (note := hint(sentence)) else "")
             )
         return
@@ -207,7 +206,7 @@ def _write(found: "Formalized", number: int, name: str | None, out: Path | None)
 
 def _file(subject: "Subject", out: Path | None) -> Path:
     if out is None and subject.spec is None:
-        raise SpecError("a bundled spec stays as it is: give another file with --out")
+        raise SpecError("a bundled spec is not changed: give another file with --out")
     file = out or subject.spec or Path()
     if out is None and subject.is_new and file.exists():
         raise SpecError(

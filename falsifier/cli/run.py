@@ -59,8 +59,8 @@ class _OneTarget(Command):
             if "unexpected extra argument" not in error.message:
                 raise
             raise click.UsageError(
-                f"{error.message}; one run searches one target: for several, falsifier bench TARGET "
-                "TARGET ..., and for all requirements of one spec in one search, falsifier run SPEC",
+                f"{error.message}; a run searches one target: for several, use falsifier bench TARGET "
+                "TARGET ...; for all requirements of a spec in one search, falsifier run SPEC",
                 ctx,
             ) from None
 
@@ -78,7 +78,7 @@ class _OneTarget(Command):
 @click.option(
     "--refine",
     is_flag=True,
-    help="Search the spec's own control points first, then faster inputs, in up to three levels. Each gets "
+    help="Search the spec's own control points first, then faster inputs, in up to three levels, each with "
     "the same share of the budget.",
 )
 @quiet_option
@@ -109,8 +109,8 @@ def run(
 ) -> None:
     """Search for inputs that violate a requirement.
 
-    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Of a spec
-    with several requirements, all are searched together unless one is named.
+    TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. If a spec
+    has several requirements, all are searched together unless one is named.
 
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
@@ -158,7 +158,7 @@ def run(
 @directory_argument
 @jobs_option("runs")
 @executor_option
-@click.option("--budget", type=int, help="Maximum number of simulations of the run, with those before.")
+@click.option("--budget", type=int, help="Maximum number of simulations, including those already done.")
 @total_option
 @quiet_option
 @json_option
@@ -172,9 +172,9 @@ def resume(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Continue the run or campaign in DIRECTORY; nothing that is recorded is simulated or asked again.
+    """Continue the run or campaign in DIRECTORY; no recorded simulation or question is repeated.
 
-    A run keeps its limits, except that --budget replaces that on simulations, also of a run that has ended.
+    A run keeps its limits; only --budget replaces the limit on simulations, even if the run has ended.
     --jobs, --executor and --total apply to campaigns only. Totals of simulations, tokens and cost include
     what was spent before.
     """
@@ -185,14 +185,16 @@ def resume(
 
     if is_campaign(directory):
         if budget is not None:
-            raise click.UsageError("--budget: the runs of a campaign keep theirs; --total simulations=N")
+            raise click.UsageError(
+                "--budget: the runs of a campaign keep their limit; --total simulations=N limits all of them"
+            )
         resume_campaign(directory, jobs=jobs, executor=executor, limits=totals, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
     if totals is not None or executor is not None or jobs > 1:
         raise click.UsageError(
-            f"{directory}: --jobs, --executor and --total apply to campaigns only; a run continues with the "
-            "jobs and the limits that it began with, except for --budget"
+            f"{directory}: --jobs, --executor and --total apply to campaigns only; a run keeps its number of "
+            "jobs and its limits, except --budget"
         )
     results: list[Result] = []
     with make_display(quiet=quiet) as display:

@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 def repair(*, directory: Path) -> None:
     """Repair the run or campaign in DIRECTORY after its files were damaged.
 
-    Says what is wrong, keeps a copy of every file that is changed, and drops what is damaged; falsifier
-    resume repeats it. A campaign's run that cannot be repaired is set aside, so that the campaign repeats it.
+    Says what is wrong, keeps a copy of every file that it changes, and removes damaged parts; falsifier
+    resume repeats them. A run of a campaign that cannot be repaired is set aside, and the campaign repeats
+    it.
     """
     findings = _repair_campaign(directory) if is_campaign(directory) else _repair_run(directory)
     for finding in findings:
@@ -85,7 +86,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
 def schema(*, what: str) -> None:
     """Print the JSON Schema of spec files, for editors, or of a file in run directories.
 
-    Of a journal, it describes one line.
+    The schema of a journal describes a single line.
     """
     models: dict[str, type[BaseModel]] = {"spec": Spec, "manifest": Manifest, "campaign": CampaignRecord}
     found = RECORDS.json_schema() if what == "journal" else models[what].model_json_schema()

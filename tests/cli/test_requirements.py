@@ -134,7 +134,7 @@ def test_without_a_template_that_fits_the_exit_code_is_two_and_a_line_says_so(
 ) -> None:
     done = falsifier("formalize", "AT1", sentence, cwd=tmp_path)
     assert (done.code, done.out, done.err.count("\n")) == (2, "", 1)
-    assert "no template has a place" in done.err and "without --llm NAME only English" in done.err
+    assert "no template fits" in done.err and "without --llm NAME only English" in done.err
     listed = falsifier("formalize", "AT1", sentence, "--json", cwd=tmp_path)
     assert (listed.code, listed.json["templates"]) == (2, [])
 

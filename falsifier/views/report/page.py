@@ -219,7 +219,7 @@ def _found(shown: Shown) -> list[Html]:
         el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else Html(""),
         el("h3", named),
         seen,
-        el("h3", "Inputs, as they are entered in a simulator"),
+        el("h3", "Inputs to enter in a simulator"),
         listed if inputs.rows else Html(""),
         parameters if shown.candidate.parameters else Html(""),
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else Html(""),

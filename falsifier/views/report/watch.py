@@ -165,9 +165,7 @@ class Watch:
 
     def _state(self, watched: _Watched) -> Html:
         working = is_worked_on(self.directory) or is_worked_on(watched.directory)
-        text = (
-            "reading the journal" if watched.is_behind else "running" if working else "no process works here"
-        )
+        text = "reading the journal" if watched.is_behind else "running" if working else "not running"
         button = (
             el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
         )

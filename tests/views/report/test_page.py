@@ -151,7 +151,7 @@ def test_each_requirement_has_a_card_with_its_verdict_first(page: Element) -> No
 
 def test_the_order_is_verdict_picture_inputs_confirmation_and_the_rest_is_folded(page: Element) -> None:
     text = page.all("article")[0].content
-    order = ["required", "The counterexample", "Inputs, as they are entered", "confirmed", "Formula, 4 runs"]
+    order = ["required", "The counterexample", "Inputs to enter", "confirmed", "Formula, 4 runs"]
     places = [text.index(part) for part in order]
     assert places == sorted(places)
     (more,) = page.all("article")[0].all("details", "more")

@@ -61,7 +61,7 @@ def test_a_run_is_shown_as_in_its_report_with_how_the_search_goes(tmp_path: Path
     for title in ("Robustness over simulations", "What was tried", "What it costs"):
         assert f"<h3>{title}</h3>" in text
     assert text.count("data:image/svg+xml") == 3
-    assert "no process works here" in text and "<button" not in text
+    assert "not running" in text and "<button" not in text
 
 
 def test_what_a_model_was_asked_last_is_shown(tmp_path: Path) -> None:
@@ -112,9 +112,9 @@ def test_of_a_campaign_each_run_can_be_chosen(campaign: Path) -> None:
     names = re.findall(r'href="\?run=([^"]*)"', text)
     assert len(names) == 8
     chosen = [watch.look(name)[0] for name in (names[-1], "../../etc", names[0])]
-    assert f"{names[-1]}: no process works here" in chosen[0]
+    assert f"{names[-1]}: not running" in chosen[0]
     assert "../../etc" not in chosen[1]
-    assert f"{names[0]}: no process works here" in chosen[2]
+    assert f"{names[0]}: not running" in chosen[2]
 
 
 def test_a_folder_without_a_run_is_named(tmp_path: Path) -> None:
