@@ -277,7 +277,8 @@ class Surrogate:
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
-            "changes": differs,
+            # Where levels lead, going on from the lowest one does what a change would.
+            "changes": differs and not (has_inputs and self._levels.is_staircase),
             "region": differs,
             "cma": differs,
             "corners": not self._corners.is_done,

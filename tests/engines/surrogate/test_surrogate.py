@@ -220,9 +220,9 @@ def _entered(times: Array, inputs: dict[str, Array], parameters: dict[str, float
 
 def test_levels_of_context_files_are_tried() -> None:
     levels = (Crossing("u", 0.617), Crossing("u", 0.619))
-    told = [simulations_until_violation(narrow_problem(levels), seed=s, budget=60) for s in range(3)]
+    told = [simulations_until_violation(narrow_problem(levels), seed=s, budget=100) for s in range(3)]
     assert all(told)
-    assert simulations_until_violation(narrow_problem(), seed=0, budget=30) is None
+    assert simulations_until_violation(narrow_problem(), seed=0, budget=100) is None
 
 
 def test_without_levels_nothing_changes() -> None:
