@@ -178,7 +178,7 @@ class Sentry:
         if file not in self._checked:
             raise SpecError(
                 f"context {shown}: line {line} looks like a key, token or password, so nothing is sent; "
-                f"{otherwise}; if it is none, allow this file with --context 'checked:{file}', or with "
+                f"{otherwise}; if it is not, allow this file with --context 'checked:{file}', or with "
                 f"checked = ['{file}'] in the spec's [context]"
             )
         note = f"context {shown}: line {line} looks like a key, token or password, and was allowed"

@@ -169,7 +169,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     """
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
-            raise SpecError(f"{place}: --requirement chooses from a run directory; this is none")
+            raise SpecError(f"{place}: --requirement applies to run directories only; this is not one")
         return counterexample_case(place)
     keep_recorded(place)
     described = manifest.read(place)

@@ -183,7 +183,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         stated = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
         if stated != allowed:
             raise SpecError(
-                f"{source.target}: a problem made in Python takes no options; change it where it is made"
+                f"{source.target}: options cannot change a problem made in Python; change it in its module"
             )
         problem = replace(_with_limits(_python_problem(source.target), freed), source=source)
     elif kind == "fmu":

@@ -194,7 +194,7 @@ class ContextSection(Strict):
         default=False, description="Also documentation, sources, texts and annotations inside the FMU."
     )
     checked: tuple[str, ...] = Field(
-        (), description="Of these files, those with a line that looks like a key or password and is none."
+        (), description="Of these files, those with a line that looks like a key or password but is not."
     )
 
 

@@ -308,7 +308,7 @@ def carry_out(
             )
         if directory is not None and not begun and holds_lines(directory):
             raise JournalError(
-                f"{directory} contains a journal without its manifest, so nobody knows what it belongs to: "
+                f"{directory} contains a journal without its manifest, so its run is unknown: "
                 "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
