@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.core import posix, posix_files
-from falsifier.fmu.process.policy import Policy, encoded
 from falsifier.fmu.process.program import worker_program
+from falsifier.fmu.process.rights import Policy, encoded
 from tests.patience import HANG
 
 

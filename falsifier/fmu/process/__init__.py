@@ -6,8 +6,8 @@ from falsifier.fmu.process.folders import WorkFolder
 from falsifier.fmu.process.order import FmuOrder, Order, is_held, library_of, value_checks
 from falsifier.fmu.process.patience import watching
 from falsifier.fmu.process.plan import Plan, Task, make_plan, make_task, room_for, run_task, solver_tolerance
-from falsifier.fmu.process.policy import Policy, resolved
 from falsifier.fmu.process.registry import REGISTRY, rights_text, stop_simulations
+from falsifier.fmu.process.rights import Policy, resolved
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.shared import Room
 

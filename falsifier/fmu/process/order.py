@@ -16,7 +16,7 @@ from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Request
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.plan import Plan, solver_tolerance
-from falsifier.fmu.process.policy import Policy
+from falsifier.fmu.process.rights import Policy
 from falsifier.fmu.process.shared import Room
 
 _DEFAULT = Policy()

@@ -9,7 +9,7 @@ from falsifier.core import operating_system
 from falsifier.errors import ModelError
 from falsifier.fmu.process import start
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.policy import Policy
+from falsifier.fmu.process.rights import Policy
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.start import Workplace
 

@@ -17,8 +17,8 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
 from falsifier.fmu.process import folders
 from falsifier.fmu.process.encoding import text
-from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
 from falsifier.fmu.process.program import protect_secrets, worker_environment, worker_program
+from falsifier.fmu.process.rights import Policy, encoded, hidden_places, policy_text, read_told
 from falsifier.fmu.process.shared import Memory, Output
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.

@@ -23,7 +23,7 @@ from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.patience import SHARES, Patience
 from falsifier.fmu.process.plan import Plan
-from falsifier.fmu.process.policy import Told, read_told
+from falsifier.fmu.process.rights import Told, read_told
 from falsifier.fmu.process.shared import Room
 from falsifier.fmu.process.start import Started, Workplace, crash_code
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from falsifier.core.model import ModelInfo
 from falsifier.fmu.description import Description, Slot
 from falsifier.fmu.process import encoding
-from falsifier.fmu.process.policy import Policy, encoded, hidden_places, policy_text, read_told
 from falsifier.fmu.process.program import MORE, worker_environment
+from falsifier.fmu.process.rights import Policy, encoded, hidden_places, policy_text, read_told
 
 ALL = 15
 
