@@ -71,8 +71,10 @@ def compile_sources(path: Path, out: Path) -> Path:
 def _compile(path: Path, folder: Path, sources: Sources, target: Path, major: int) -> None:
     defines = [f"-D{name}={value}" if value else f"-D{name}" for name, value in sources.defines.items()]
     # FMI 2 and 3 sources may put a prefix before all function names, which libraries must not have. It has no
-    # effect if the header is read before the sources define it.
-    header = ("-include", f"fmi{major}Functions.h") if major > 1 else ()
+    # effect if the header is read before the sources define it. Sources that never include the header may
+    # declare the standard's types on their own, which it would contradict.
+    standard = f"fmi{major}Functions.h"
+    header = ("-include", standard) if major > 1 and _includes(folder, standard) else ()
     compile_c(
         path,
         folder,
@@ -82,6 +84,16 @@ def _compile(path: Path, folder: Path, sources: Sources, target: Path, major: in
             *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
         ],
     )  # fmt: skip
+
+
+def _includes(folder: Path, header: str) -> bool:
+    """Return whether a file of the sources, headers too, includes this header."""
+    directive = re.compile(rf'^\s*#\s*include\s*["<](?:[^">]*/)?{re.escape(header)}[">]', re.MULTILINE)
+    return any(
+        directive.search(file.read_text(encoding="utf-8", errors="replace"))
+        for file in folder.rglob("*.[ch]")
+        if file.is_file()
+    )
 
 
 def _headers() -> Path:

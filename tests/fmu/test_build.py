@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.compiler import compiler
+from falsifier.core.signals import Signal
 from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
 from falsifier.fmu.build import compile_sources
@@ -90,6 +91,22 @@ def test_function_prefixes_of_the_sources_have_no_effect(
     source = rearranged(tmp_path, name, **{file: text}, **extra)
     built = compile_sources(source, tmp_path / "out.fmu")
     assert simulates_like_the_fixture(built, name.removesuffix("sources"))
+
+
+@needs_compiler
+def test_sources_that_declare_the_standards_types_on_their_own_are_compiled(tmp_path: Path) -> None:
+    source = tmp_path / "AT.fmu"
+    bundled = Path(__file__).parents[2] / "fmus" / "AT.fmu"
+    with zipfile.ZipFile(bundled) as packed, zipfile.ZipFile(source, "w") as without_libraries:
+        for entry in packed.namelist():
+            if not entry.startswith("binaries/"):
+                without_libraries.writestr(entry, packed.read(entry))
+    compile_sources(source, tmp_path / "out.fmu")
+    inputs = {"throttle": Signal((0.0, 1.0), (100.0, 0.0), "linear")}
+    found = [
+        run(FmuModel(path), ("speed",), signals=inputs)["speed"] for path in (bundled, tmp_path / "out.fmu")
+    ]
+    assert found[0].max() > 0 and found[1] == pytest.approx(found[0])
 
 
 @needs_compiler
