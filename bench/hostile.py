@@ -235,7 +235,7 @@ def kill_dask(random: Random, place: Path, kind: str) -> str:
 
 
 def damage(random: Random, place: Path, kind: str) -> str:
-    """Damage any file of a record; resume; if that is refused, repair and resume."""
+    """Damage any file of a record; resume; if that is refused, `tools repair` and resume."""
     shutil.copytree(unhurt(kind), place)
     files = sorted(p for p in place.rglob("*") if p.is_file() and p.stat().st_size)
     suffix = random.choice((".jsonl", ".jsonl", *{p.suffix for p in files}))
@@ -254,7 +254,7 @@ def damage(random: Random, place: Path, kind: str) -> str:
         refused(str(error))
     if path.name == "counterexample.json":
         return ONE_LINE
-    code, said = command("repair", str(place))
+    code, said = command("tools", "repair", str(place))
     if code:
         refused(said)
         return ONE_LINE

@@ -1,4 +1,4 @@
-"""Why a robustness value is what it is: the path to what decided it, in words and as data for plots.
+"""Critical time and diagnosis: when and by what a robustness was decided, in words and as data for plots.
 
 At each operator the path continues with the operand whose value became the operator's value. Ties go to the
 earliest sample and the left operand; ``or`` and ``->`` are treated as negated conjunctions, so their ties go
