@@ -71,7 +71,7 @@ def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--set", "u=high"], "takes no options"),
+        (["--set", "u=high"], "options cannot change"),
         (["--set", "w=1"], "no parameter 'w'"),
         (["--inputs", "none.csv"], "none.csv"),
     ],

@@ -87,7 +87,7 @@ ALARM = "gain = 3\npassword: operators know it\n"
 
 def test_a_line_like_a_key_is_refused_with_what_to_do() -> None:
     with pytest.raises(
-        SpecError, match=r"a\.md: line 2 looks like a key.*leave it out; if it is none.*checked:a\.md"
+        SpecError, match=r"a\.md: line 2 looks like a key.*leave it out; if it is not.*checked:a\.md"
     ):
         Sentry(()).look(ALARM, "a.md", "a.md", "leave it out")
 

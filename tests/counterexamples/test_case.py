@@ -47,7 +47,7 @@ def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
     assert found.beside("a.png").name == "a-FAR.png"
     with pytest.raises(JournalError, match="this run searched HARD, NEVER, FAR, not OTHER"):
         case_of(tmp_path, "OTHER")
-    with pytest.raises(SpecError, match="this is none"):
+    with pytest.raises(SpecError, match="this is not one"):
         case_of(tmp_path / "counterexample-HARD.json", "FAR")
 
 
