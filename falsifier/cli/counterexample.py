@@ -4,13 +4,13 @@ import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
-from math import isqrt
+from math import ceil, isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.files import check_out, draw_evaluation, write_counterexample
+from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
 from falsifier.cli.llm_options import api_base_option, llm_option, name_and_effort
 from falsifier.cli.options import (
     budget_option,
@@ -46,6 +46,9 @@ if TYPE_CHECKING:
 _SHRINK_BUDGET = 500
 # Simulations of a map: random changes, and the points of a square grid.
 _MAP_SAMPLES, _MAP_POINTS = 256, 441
+_MAP_BUDGET = _MAP_SAMPLES + _MAP_POINTS
+# With fewer, that share of them is no grid of two points by two.
+_LEAST_MAP_BUDGET = ceil(4 * _MAP_BUDGET / _MAP_POINTS)
 
 
 @command()
@@ -56,9 +59,7 @@ _MAP_SAMPLES, _MAP_POINTS = 256, 441
 @click.option(
     "--map", "mapped", is_flag=True, help="Change all inputs at random; draw which changes still violate."
 )
-@budget_option(
-    shown=f"{_SHRINK_BUDGET}; with --map {_MAP_SAMPLES + _MAP_POINTS}", note=" of --shrink or --map"
-)
+@budget_option(shown=f"{_SHRINK_BUDGET}; with --map {_MAP_BUDGET}", note=" of --shrink or --map")
 @click.option(
     "--at-most",
     type=float,
@@ -107,10 +108,12 @@ def explain(
     if llm is None and api_base is not None:
         raise click.UsageError("--api-base requires --llm NAME")
     case = case_of(run, requirement, shrunk=not shrunk)
+    if budget is None:
+        budget = _SHRINK_BUDGET if shrunk else _MAP_BUDGET
     if shrunk:
-        _shrink(case, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json, **rights)
+        _shrink(case, budget=budget, at_most=at_most, out=out, as_json=as_json, **rights)
     elif mapped:
-        _map(case, run, budget=budget or _MAP_SAMPLES + _MAP_POINTS, out=out, as_json=as_json, **rights)
+        _map(case, run, budget=budget, out=out, as_json=as_json, **rights)
     else:
         _explain(case, run, llm=llm, api_base=api_base, as_json=as_json, **rights)
 
@@ -301,12 +304,16 @@ def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool,
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
-    points = isqrt(budget * _MAP_POINTS // (_MAP_SAMPLES + _MAP_POINTS))
+    if budget < _LEAST_MAP_BUDGET:
+        raise click.UsageError(
+            f"--budget {budget}: a map needs at least {_LEAST_MAP_BUDGET} simulations; {_MAP_BUDGET} is usual"
+        )
+    picture = case.beside("robustness-map.png") if out is None else checked_picture(out)
+    points = isqrt(budget * _MAP_POINTS // _MAP_BUDGET)
     with _loaded(case, rights) as problem:
         found = robustness_map(
             problem, case.simulated(problem), samples=budget - points * points, points=points
         )
-    picture = out or case.beside("robustness-map.png")
     save_figure(plot_robustness_map(found, problem.name), picture)
     if as_json:
         content = {

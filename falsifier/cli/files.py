@@ -12,6 +12,9 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.views.terminal import warn
 
+# File name extensions of pictures that users name.
+PICTURES = (".svg", ".png", ".pdf")
+
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
     """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
@@ -52,6 +55,17 @@ def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = 
         begins = file.read(max(map(len, beginnings)))
     if begins and not begins.startswith(beginnings):
         raise SpecError(f"{path} exists and is not such a file: choose another --out, or delete it")
+
+
+def checked_picture(path: Path) -> Path:
+    """Return the path of a picture to write.
+
+    Raises:
+        SpecError: if its ending states no format that can be drawn.
+    """
+    if path.suffix.lower() in PICTURES:
+        return path
+    raise SpecError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
 
 
 def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.cli.files import checked_picture
 from falsifier.cli.options import (
     command,
     json_option,
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
 _CHECKED_VARIABLES = 50
 # What halving the step may change in a system, as a share of an output's range, and how often it is halved.
 _COUPLING_SHARE, _HALVINGS = 0.01, 6
-# File name extensions of a diagram.
-_PICTURES = (".svg", ".png", ".pdf")
 
 
 @command()
@@ -107,9 +106,7 @@ def _check_diagram(fmu: Path, *, drawn: bool, alone: bool, out: Path | None) -> 
         raise SpecError("--out names the picture of --diagram; add --diagram")
     if not alone:
         raise SpecError("--diagram shows connections only; leave out --json, --check and --all")
-    if out is not None and out.suffix.lower() not in _PICTURES:
-        raise SpecError(f"{out}: expected a file name that ends in {', '.join(_PICTURES)}")
-    if out is not None and out.absolute() == fmu.absolute():
+    if out is not None and checked_picture(out).absolute() == fmu.absolute():
         raise SpecError(f"{out} is the original, which is kept: choose another --out")
 
 
@@ -151,6 +148,8 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     from falsifier.problem.writing import problem_of_starter
 
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
+    if not path.parent.is_dir():
+        raise SpecError(f"{path}: no such folder {path.parent}: choose another --out, or make it first")
     if path.exists():
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)

@@ -43,7 +43,23 @@ _MANY = 12
 
 
 class Command(click.Command):
-    """A command whose help lists many options in groups."""
+    """A command whose help lists many options in groups, and that refuses empty arguments."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments.
+
+        Raises:
+            click.UsageError: if one is empty: as a path it would mean the current folder.
+        """
+        for before, given in zip(["", *args], args, strict=False):
+            if not given or (given.startswith("--") and given.find("=") == len(given) - 1):
+                option = given.removesuffix("=") or (before if before.startswith("-") else "")
+                empty = f"{option}: the value is empty" if option else "an argument is empty"
+                raise click.UsageError(
+                    f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)",
+                    ctx,
+                )
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options below their headings."""
@@ -326,13 +342,17 @@ def engine_option(*, multiple: bool = False) -> Decorator:
     )
 
 
+# More simulations than any machine gets through; some analyses draw all their samples first.
+_MOST_SIMULATIONS = 10_000_000
+
+
 def budget_option(
-    default: int = DEFAULT_SIMULATIONS, *, shown: str | None = None, note: str = ""
+    default: int | None = DEFAULT_SIMULATIONS, *, least: int = 1, shown: str | None = None, note: str = ""
 ) -> Decorator:
     """Option --budget; shown: its default in words if that depends on other options."""
     return click.option(
         "--budget",
-        type=int,
+        type=click.IntRange(least, _MOST_SIMULATIONS),
         default=default if shown is None else None,
         show_default=True if shown is None else shown,
         help=f"Maximum number of simulations{note}.",

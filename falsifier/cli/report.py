@@ -7,7 +7,7 @@ import click
 
 from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.archcomp import export
-from falsifier.cli.files import check_out, draw
+from falsifier.cli.files import check_out, checked_picture, draw
 from falsifier.cli.options import command, directory_argument, json_option, out_option
 from falsifier.cli.output import say
 from falsifier.record import manifest
@@ -86,12 +86,13 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     """
     from falsifier.views.plotting import plot_coverage
 
+    picture = directory / "coverage.png" if out is None else checked_picture(out)
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
-    picture = draw(lambda: plot_coverage(found, name), out or directory / "coverage.png")
+    drawn = draw(lambda: plot_coverage(found, name), picture)
     if as_json:
-        content = {"requirements": name, **coverage_json(found), "picture": picture and str(picture)}
+        content = {"requirements": name, **coverage_json(found), "picture": drawn and str(drawn)}
         say(json.dumps(content, indent=2))
         return
     say(coverage_text(found, name))
-    if picture is not None:
-        say(f"picture: {picture}")
+    if drawn is not None:
+        say(f"picture: {drawn}")

@@ -45,7 +45,11 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 @target_argument
 @parameterization_option()
 @template_option
-@budget_option(0, note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares")
+@budget_option(
+    0,
+    least=0,
+    note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares",
+)
 @json_option
 def check(
     *, target: str, parameterized: Parameterized, template: str | None, budget: int, as_json: bool

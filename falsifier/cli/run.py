@@ -158,7 +158,7 @@ def run(
 @directory_argument
 @jobs_option("runs")
 @executor_option
-@click.option("--budget", type=int, help="Maximum number of simulations, including those already done.")
+@budget_option(None, note=", including those already done")
 @total_option
 @quiet_option
 @json_option

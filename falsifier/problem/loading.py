@@ -10,11 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from traceback import extract_tb
 
 from falsifier.core.files import bundled
+from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
 from falsifier.core.space import Freedom
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import FalsifierError, SpecError, did_you_mean
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import join, join_formula
@@ -58,6 +60,11 @@ def find_spec(target: str) -> tuple[Path, str | None]:
     for path in (bundled("specs") / f"{stem}.toml" for stem in tuple(names)):
         requirements = read_spec(path).requirements
         if name in requirements:
+            if requirement:
+                raise SpecError(
+                    f"{target}: no requirement {requirement!r}: {name} is itself a requirement, of "
+                    f"{path.stem}; give {name} or {path.stem}:NAME; {did_you_mean(requirement, requirements)}"
+                )
             return path, name
         names.extend(requirements)
     if Path(target).is_dir():
@@ -277,10 +284,25 @@ def _python_problem(target: str) -> Problem:
         found = getattr(import_module(module), name)
     except (ImportError, ValueError, AttributeError) as error:
         raise SpecError(f"{target}: expected python:MODULE:NAME that can be imported: {error}") from None
-    problem = found() if callable(found) else found
+    except Exception as error:  # whatever the user's module does
+        raise SpecError(_raised(f"{target}: importing {module}", error)) from error
+    try:
+        problem = found() if callable(found) else found
+    except FalsifierError:
+        raise
+    except Exception as error:  # whatever the user's function does
+        raise SpecError(_raised(f"{target}: {name}()", error)) from error
     if not isinstance(problem, Problem):
         raise SpecError(f"{target}: expected a Problem or a function that returns one")
     return problem
+
+
+def _raised(what: str, error: Exception) -> str:
+    """Say what a user's code raised, and where."""
+    theirs = extract_tb(error.__traceback__)[1:]
+    where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
+    said = one_line(f"{type(error).__name__}: {error}")
+    return f"{what} raised {said}{where}; expected a Problem or a function without arguments that returns one"
 
 
 def formula_of_template(source: ProblemSource, text: str) -> str:

@@ -141,6 +141,31 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
     assert {OUTPUT, CRITICAL} <= colours(folder / done.json["picture"])
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["explain", "run", "--map", "--budget", "-5"], "-5 is not in the range 1<="),
+        (["explain", "run", "--shrink", "--budget", "0"], "0 is not in the range 1<="),
+        (["explain", "run", "--map", "--budget", "99999999999"], "is not in the range 1<="),
+        (["explain", "run", "--map", "--budget", "6"], "a map needs at least 7 simulations"),
+        (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
+        (["coverage", "run", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
+        (["coverage", "run", "--out", "x"], "x: expected a file name that ends in .svg"),
+    ],
+)
+def test_budgets_and_pictures_that_cannot_be_are_refused(
+    folder: Path, arguments: list[str], message: str
+) -> None:
+    done = run(folder, *arguments)
+    assert (done.code, message in done.err, done.out) == (2, True, ""), done.err
+
+
+def test_the_smallest_map_is_drawn(folder: Path) -> None:
+    done = run(folder, "explain", "run", "--map", "--budget", "7", "--out", "small.svg")
+    assert done.code == 0, done.err
+    assert (folder / "small.svg").exists()
+
+
 def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "AT.fmu")
     spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
