@@ -6,17 +6,16 @@ Prints the table; it needs numba (``pip install numba``). Committed result: benc
 
 from __future__ import annotations
 
+import argparse
 import ctypes
 import platform
 import shutil
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import PchipInterpolator
 
 RUNS = 30
@@ -44,6 +43,8 @@ def _bind(library: Any, name: str, arguments: list[Any], result: Any = ctypes.c_
 
 def make_loop(library: Any) -> Any:
     """Return a compiled communication loop over the functions of one FMU."""
+    from numba import njit
+
     array = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
     set_real = _bind(library, "fmi2SetReal", array)
     get_real = _bind(library, "fmi2GetReal", array)
@@ -142,9 +143,15 @@ def _can_be_measured(description: Any) -> bool:
 
 def main() -> None:
     """Measure, and print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("fmus", nargs="*", type=Path, metavar="FMU")
+    arguments = parser.parse_args()
+
     from fmpy import read_model_description
 
-    given = [Path(name) for name in sys.argv[1:]] or sorted((ROOT / "fmus").glob("*.fmu"))
+    given = arguments.fmus or sorted((ROOT / "fmus").glob("*.fmu"))
     paths = [path for path in given if _can_be_measured(read_model_description(str(path)))]
     processor = platform.processor() or platform.machine()
     print("# Time inside the FMUs\n")
