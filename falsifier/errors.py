@@ -90,6 +90,12 @@ class ModelError(FalsifierError):
     exit_code = 3
 
 
+class ModelFileError(ModelError):
+    """A file that is given as a model is none, such as a text that is called .fmu."""
+
+    exit_code = 2
+
+
 class SimulationError(FalsifierError):
     """A simulation did not produce a complete trajectory.
 

@@ -45,6 +45,8 @@ COLUMNS = (
     "robustness",
     "stop time",
 )
+# Columns without which a file claims nothing.
+_READ = ("property", "input", "falsified", "simulations")
 _PROFILES = {"1": None, "2": "instance2"}
 # The competition's names of our requirements: (system, property).
 _NAMES = {
@@ -138,7 +140,15 @@ def read_rows(path: Path) -> list[Row]:
     """
     csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
     with path.open(newline="", encoding="utf-8") as file:
-        return [_row(number, cells, path) for number, cells in enumerate(csv.DictReader(file), start=1)]
+        table = csv.DictReader(file)
+        missing = [name for name in _READ if name not in (table.fieldnames or ())]
+        if missing:
+            raise SpecError(
+                f"expected a CSV file in the ARCH-COMP validation format, as falsifier report DIR "
+                f"--arch-comp FILE writes it; columns that are missing: {', '.join(missing)}",
+                file=str(path),
+            )
+        return [_row(number, cells, path) for number, cells in enumerate(table, start=1)]
 
 
 def validate(
@@ -213,6 +223,18 @@ def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
     def cell(name: str) -> str:
         return (cells.get(name) or "").strip()
 
+    def number_in(name: str) -> float:
+        try:
+            return float(cell(name))
+        except ValueError:
+            raise ValueError(f"column {name}: expected a number, got {cell(name)!r}") from None
+
+    def matrix_in(name: str) -> Matrix:
+        try:
+            return _matrix(cell(name))
+        except ValueError as error:
+            raise ValueError(f"column {name}: expected a matrix such as [0 50; 10 20]: {error}") from None
+
     try:
         instance = cell("instance") or "1"
         if instance not in _PROFILES:
@@ -221,12 +243,12 @@ def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
             number,
             _our_name(cell("property")),
             instance,
-            _matrix(cell("input")),
-            tuple(_matrix(cell("parameters")).ravel().tolist()),
+            matrix_in("input"),
+            tuple(matrix_in("parameters").ravel().tolist()),
             cell("falsified").lower() in ("yes", "true", "1"),
-            int(float(cell("simulations"))),
-            float(cell("robustness")) if cell("robustness") else None,
-            float(cell("stop time")) if cell("stop time") else None,
+            int(number_in("simulations")),
+            number_in("robustness") if cell("robustness") else None,
+            number_in("stop time") if cell("stop time") else None,
         )
     except ValueError as error:
         raise SpecError(f"row {number}: {error}", file=str(path)) from None

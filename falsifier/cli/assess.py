@@ -23,6 +23,7 @@ from falsifier.cli.options import (
     stl_option,
 )
 from falsifier.cli.output import INTERRUPTED, conclude
+from falsifier.core.arguments import finite
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
@@ -186,7 +187,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
 
 def _between(text: str) -> tuple[float, float]:
     try:
-        low, high = (float(part) for part in text.split(":"))
-    except ValueError:
+        low, high = (finite("--between", float(part)) for part in text.split(":"))
+    except (ValueError, SpecError):
         raise click.UsageError(f"--between {text}: expected LOW:HIGH, for example 100:160") from None
     return low, high

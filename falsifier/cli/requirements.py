@@ -64,6 +64,11 @@ def check(
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
     source = with_template(_source(target, parameterized), template)
+    if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
+        raise SpecError(
+            f"{target}: no requirement to check; add --template 'NAME KEY=VALUE ...', or give a spec "
+            f"(falsifier init {shlex.quote(target)} begins one)"
+        )
     findings = lint(source, simulations=budget)
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0

@@ -212,9 +212,10 @@ def counterexample_file(path: Path) -> Path:
             f"this run has several counterexamples; choose one of these files: {names}", file=str(path)
         )
     if not found:
+        contains = "contains" if holds_run(path) else "not a run directory: it contains"
         raise SpecError(
-            "contains no confirmed counterexample; expected a counterexample file or the directory of a run "
-            "that found one (of a campaign: a directory in its runs/). falsifier explain also "
+            f"{contains} no confirmed counterexample; expected a counterexample file or the directory of a "
+            "run that found one (of a campaign: a directory in its runs/). falsifier explain also "
             "takes a run that found none",
             file=str(path),
         )

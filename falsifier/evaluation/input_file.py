@@ -55,6 +55,10 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     if len(rows) < 2:
         raise SpecError("expected a row of names and one or more rows of numbers", file=str(path))
     header = [cell.strip() for cell in rows[0][1]]
+    if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
+        raise SpecError(
+            f"expected commas between the columns, got {other!r}: export it with commas", file=str(path)
+        )
     columns = [_inputs_of(name, info, path) for name in header[1:]]
     times: list[float] = []
     values: dict[str, list[float]] = {v.name: [] for column in columns for v in column}

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -172,6 +173,8 @@ def _value(option: str) -> tuple[str, dict[str, object]]:
         return name, {"value": named_file(":".join(parts), Path())}
     if len(numbers) > 1:
         raise SpecError(f"--set {option}: expected one value; to search a range: --search {option}")
+    if not isfinite(numbers[0] or 0.0):
+        raise SpecError(f"--set {option}: expected a finite number")
     return name, {"value": numbers[0]}
 
 

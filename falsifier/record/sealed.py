@@ -36,6 +36,8 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
         check_seal(content)
         return kind.model_validate_json(content)
     except (FileNotFoundError, NotADirectoryError):
+        if not path.parent.exists():
+            raise JournalError(f"{path.parent}: no such directory; expected that of a {what}") from None
         raise JournalError(f"{path.parent}: not a {what} directory: it contains no {path.name}") from None
     except ValidationError as error:
         first = error.errors()[0]

@@ -82,10 +82,18 @@ def test_unknown_requirements_are_findings_not_errors(tmp_path: Path) -> None:
 
 
 def test_unreadable_cells_name_their_row(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="row 1: could not convert string to float: 'x'"):
+    with pytest.raises(SpecError, match=r"row 1: column input: expected a matrix .*: 'x'"):
         read_rows(rows(tmp_path, 'S,HARD,1,"[0 x]",[],yes,3,1,1,-0.4,10'))
     with pytest.raises(SpecError, match="row 1: instance '3'"):
         read_rows(rows(tmp_path, 'S,HARD,3,"[0 1]",[],yes,3,1,1,-0.4,10'))
+    with pytest.raises(SpecError, match="row 1: column simulations: expected a number, got 'many'"):
+        read_rows(rows(tmp_path, 'S,HARD,1,"[0 1]",[],yes,many,1,1,-0.4,10'))
+
+
+def test_another_table_is_told_from_a_validation_file(tmp_path: Path) -> None:
+    (tmp_path / "all.csv").write_text("requirement,method,robustness\nHARD,corners,1.0\n")
+    with pytest.raises(SpecError, match=r"all\.csv: expected .* ARCH-COMP .* missing: property, input"):
+        read_rows(tmp_path / "all.csv")
 
 
 def test_names_of_the_competition_are_understood(tmp_path: Path) -> None:

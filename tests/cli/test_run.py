@@ -163,7 +163,8 @@ def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
 def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
     (tmp_path / "bad.fmu").write_bytes(b"this is no archive")
     done = falsifier("run", "bad.fmu", "--stl", "G (x >= 0)", cwd=tmp_path)
-    assert done.code == 3
+    assert "no requirement to check; add --template" in falsifier("check", "bad.fmu", cwd=tmp_path).err
+    assert done.code == 2
     assert "bad.fmu" in done.err
     assert "Traceback" not in done.err
 

@@ -52,6 +52,7 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("time;u\n0;1\n", "expected commas between the columns, got ';'"),
         ("", "a row of names"),
         ("t,throtle\n0,1\n", "column 'throtle'"),
         ("t,speed\n0,1\n", "no column is an input"),

@@ -244,3 +244,15 @@ def test_of_several_requirements_that_simulate_differently_one_has_to_be_named(t
     with pytest.raises(SpecError, match=r"simulate in different ways.*:NAME, with one of R, S"):
         formula_of_template(ProblemSource(target=target), within)
     assert formula_of_template(ProblemSource(target=f"{target}:R"), within) == "G[0,30] (speed <= 120)"
+
+
+def test_what_a_users_function_raises_is_said_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "raises_at_call.py").write_text("def boom():\n    raise KeyError('x')\n")
+    (tmp_path / "raises_at_import.py").write_text("1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(SpecError, match=r"boom\(\) raised KeyError: 'x' \(.*raises_at_call\.py, line 2\)"):
+        load_problem("python:raises_at_call:boom")
+    with pytest.raises(SpecError, match=r"importing raises_at_import raised ZeroDivisionError"):
+        load_problem("python:raises_at_import:boom")

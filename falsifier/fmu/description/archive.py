@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, ModelFileError
 
 try:
     from lzma import LZMAError
@@ -88,7 +88,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an FMU, SSP package or Simulink file after checking its entries.
 
     Raises:
-        ModelError: if it is not a zip archive, or would write outside its folder or fill the disk.
+        ModelFileError: if it is not a zip archive.
+        ModelError: if it cannot be read, or would write outside its folder or fill the disk.
     """
     try:
         archive = zipfile.ZipFile(path)
@@ -96,7 +97,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
     except UNREADABLE as error:
         what = _KINDS.get(path.suffix.lower(), "FMU")
-        raise ModelError(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
+        kind = ModelError if isinstance(error, OSError) else ModelFileError
+        raise kind(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
     with archive:
         for fault in _faults(archive.infolist()):
             raise ModelError(f"{path}: {fault}")
