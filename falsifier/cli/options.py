@@ -353,6 +353,7 @@ def budget_option(
     return click.option(
         "--budget",
         type=click.IntRange(least, _MOST_SIMULATIONS),
+        metavar="INTEGER",
         default=default if shown is None else None,
         show_default=True if shown is None else shown,
         help=f"Maximum number of simulations{note}.",

@@ -131,10 +131,10 @@ def test_suites_and_instances(command: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
     for name, budget, parameterization in (
-        ("run", "[default: 100]", "[default: free]"),
+        ("run", "[default: 100;", "[default: free]"),
         (
             "bench",
-            "[default: (100; with --suite 1500)]",
+            "[default: (100; with --suite 1500);",
             "[default: (free; with --suite fixed)]",
         ),
     ):
