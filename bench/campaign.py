@@ -22,6 +22,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
+from falsifier.record.files import save_trajectory
 from falsifier.record.journal import open_journal, read_journal
 from falsifier.record.manifest import describe, environment, write
 from falsifier.record.records import (
@@ -33,7 +34,6 @@ from falsifier.record.records import (
     line_of,
 )
 from falsifier.record.run import falsify
-from falsifier.record.trajectory_files import save_trajectory
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.loop import search
 from falsifier.search.request import RunRequest

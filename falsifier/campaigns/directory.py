@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError
+from falsifier.record.files import locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
-from falsifier.record.sealed import locked, read_sealed, write_sealed
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"

@@ -12,7 +12,7 @@ from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget
-from falsifier.search.parameterization import engine_parameterization
+from falsifier.search.refine_levels import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10

@@ -184,7 +184,7 @@ def _print_convergence(
     source: "Path | System", found: ModelInfo, allow: tuple[str, ...], deny: tuple[str, ...]
 ) -> None:
     """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
-    from falsifier.evaluation.step_effect import step_convergence
+    from falsifier.evaluation.confirm import step_convergence
     from falsifier.fmu import FmuModel, System
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
@@ -230,7 +230,7 @@ def _print_convergence(
 
 def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Signal]) -> str:
     """Say which step keeps the error of the coupling small."""
-    from falsifier.evaluation.step_effect import sufficient_step
+    from falsifier.evaluation.confirm import sufficient_step
 
     share = f"{100 * _COUPLING_SHARE:g} % of its range"
     step = sufficient_step(system, experiment, signals, share=_COUPLING_SHARE, halvings=_HALVINGS)

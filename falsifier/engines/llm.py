@@ -15,8 +15,7 @@ from falsifier.engines.stand_ins import RANDOM_CHANGE, StandIns
 from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation
-from falsifier.evaluation.initial import start_values
+from falsifier.evaluation.evaluate import Evaluation, start_values
 from falsifier.llm import ReplyKind
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.messages import Chat, ChatRequest, Exchange

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from falsifier.engines.told import doubts_told, reply_form, told_context, told_view
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation
-from falsifier.evaluation.initial import start_values
+from falsifier.evaluation.evaluate import Evaluation, start_values
 from falsifier.llm import ReplyKind
 from falsifier.llm.messages import Message, Tool
 from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, View, variant_named

@@ -28,6 +28,13 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.record.files import (
+    TRAJECTORIES,
+    TRAJECTORY_NAMES,
+    locked,
+    recorded_trajectory,
+    save_trajectory,
+)
 from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
@@ -37,13 +44,6 @@ from falsifier.record.records import (
     Record,
     line_of,
     parse_line,
-)
-from falsifier.record.sealed import locked
-from falsifier.record.trajectory_files import (
-    TRAJECTORIES,
-    TRAJECTORY_NAMES,
-    recorded_trajectory,
-    save_trajectory,
 )
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.request import Keep

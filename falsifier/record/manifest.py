@@ -22,11 +22,10 @@ from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
+from falsifier.record.files import read_sealed, write_sealed
 from falsifier.record.journal import MANIFEST
-from falsifier.record.sealed import read_sealed, write_sealed
 from falsifier.search.budget import Budget
-from falsifier.search.levels import levels_of
-from falsifier.search.parameterization import parameterization_note, parameterization_of
+from falsifier.search.refine_levels import levels_of, parameterization_note, parameterization_of
 from falsifier.search.request import RunRequest
 
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")

@@ -11,8 +11,8 @@ from shutil import copy2
 from falsifier.core.words import counted
 from falsifier.errors import JournalError
 from falsifier.record import manifest
+from falsifier.record.files import TRAJECTORIES, is_intact
 from falsifier.record.journal import JOURNAL, JournalReader, run_lock
-from falsifier.record.trajectory_files import TRAJECTORIES, is_intact
 
 
 def repair(directory: Path) -> list[str]:

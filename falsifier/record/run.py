@@ -31,9 +31,9 @@ from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
-from falsifier.search.levels import level_starts, levels_of
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
+from falsifier.search.refine_levels import level_starts, levels_of
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Steps

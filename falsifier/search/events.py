@@ -10,7 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget, Spent
-from falsifier.search.levels import Level
+from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result, ResultStatus
 
 
@@ -31,7 +31,7 @@ class RunStarted:
     engines: tuple[str, ...]
     budget: Budget
     searched: SearchSpace
-    levels: tuple[Level, ...] = ()
+    levels: tuple[RefineLevel, ...] = ()
     replayed: int = 0
 
 

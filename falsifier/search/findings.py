@@ -11,7 +11,7 @@ from falsifier.engines import DEFAULT_ENGINE
 from falsifier.problem.grid import smallest_window
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import coarse_inputs, limits_of
-from falsifier.search.levels import Level, reached
+from falsifier.search.refine_levels import RefineLevel, reached
 
 # A number that is not part of a name: two errors that differ only in such numbers have the same cause.
 _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)", re.IGNORECASE)
@@ -105,7 +105,7 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
 _REFINE = "falsifier run ... --refine (slow inputs first, then faster ones)"
 
 
-def inexpressible(problem: Problem, levels: Sequence[Level], simulations: int) -> Finding | None:
+def inexpressible(problem: Problem, levels: Sequence[RefineLevel], simulations: int) -> Finding | None:
     """Return what the fixed control points of a search could not express; None if they left nothing out.
 
     Args:

@@ -9,9 +9,10 @@ from time import perf_counter
 from typing import NamedTuple
 
 from falsifier.engines.known_first import KNOWN
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun
+from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.engines.stand_ins import RANDOM_CHANGE
 from falsifier.errors import ChatError, SpecError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
@@ -26,10 +27,11 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
-from falsifier.search.levels import Level, reached
-from falsifier.search.requirement_state import RequirementState
+from falsifier.search.findings import Finding, inexpressible
+from falsifier.search.refine_levels import RefineLevel, reached
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Steps
+from falsifier.search.vacuity import Vacuity
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -43,7 +45,7 @@ def search(
     steps: Steps | None = None,
     jobs: int = 1,
     in_batches: bool = False,
-    levels: Sequence[Level] = (),
+    levels: Sequence[RefineLevel] = (),
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
     prepared: float = 0.0,
@@ -81,7 +83,7 @@ def search(
     for problem in problems[1:]:
         _check_alike(problems[0], problem)
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
-    levels = tuple(levels) or (Level(0, problems[0].space),)
+    levels = tuple(levels) or (RefineLevel(0, problems[0].space),)
     steps = steps or Steps()
     began = perf_counter() - prepared - steps.seconds
     loop = _Loop(states, levels, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
@@ -103,6 +105,62 @@ def search(
     return loop.end(status, reason)
 
 
+@dataclass(slots=True)
+class RequirementState:
+    """One requirement in a running search.
+
+    Attributes:
+        problem: what is to be falsified.
+        engine: searches for a violation.
+        evaluations: all so far, without trajectories.
+        doubtful: violations that were not confirmed.
+        best: evaluation with the smallest robustness, with its trajectory.
+        counterexample: the confirmed violation.
+        spent: what the run had spent by then.
+        untold: evaluations that the engine has not been told.
+    """
+
+    problem: Problem
+    engine: Engine
+    evaluations: list[Evaluation] = field(default_factory=list)
+    doubtful: list[Confirmation] = field(default_factory=list)
+    best: Evaluation | None = None
+    counterexample: Confirmation | None = None
+    spent: Spent | None = None
+    untold: list[Evaluation] = field(default_factory=list)
+    vacuity: Vacuity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vacuity = Vacuity(self.problem)
+
+    def note(self, evaluation: Evaluation) -> bool:
+        """Add an evaluation; return whether it is the best so far."""
+        self.vacuity.see(evaluation, len(self.evaluations))
+        improved = _smaller(evaluation, self.best)
+        if improved:
+            self.best = evaluation
+        self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
+        return improved
+
+    def findings(self, levels: tuple[RefineLevel, ...]) -> tuple[Finding, ...]:
+        """Return what the search could not show about a requirement that it did not falsify."""
+        if self.best is None:
+            return ()
+        limits = inexpressible(self.problem, levels, len(self.evaluations))
+        return (*self.vacuity.findings(), *([limits] if limits else []))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the engine says of how it worked."""
+        return self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else ()
+
+
+def _smaller(evaluation: Evaluation, best: Evaluation | None) -> bool:
+    if evaluation.robustness is None:
+        return False
+    return best is None or best.robustness is None or evaluation.robustness < best.robustness
+
+
 class _Started(NamedTuple):
     """A candidate that is being simulated, or will be when its evaluation is waited for."""
 
@@ -115,7 +173,7 @@ class _Loop:
     """State of a running search: the imperative shell around values and pure functions."""
 
     states: list[RequirementState]
-    levels: tuple[Level, ...]
+    levels: tuple[RefineLevel, ...]
     budget: Budget
     steps: Steps
     directory: Path | None

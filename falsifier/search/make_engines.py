@@ -14,7 +14,7 @@ from falsifier.errors import SpecError
 from falsifier.llm.messages import Chat
 from falsifier.problem.context import with_crossings
 from falsifier.problem.problem import Problem
-from falsifier.search.levels import Level
+from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ _AIM_SEED = 500_009
 
 
 def make_engines(
-    request: RunRequest, problems: Sequence[Problem], chat: Chat | None, levels: Sequence[Level] = ()
+    request: RunRequest, problems: Sequence[Problem], chat: Chat | None, levels: Sequence[RefineLevel] = ()
 ) -> list[Engine]:
     """Make the engines of a request, one per problem.
 

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.analyses.coverage import Coverage, ModeCoverage, PairCoverage, RangeCoverage
+from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverage, PairCoverage, RangeCoverage
 from falsifier.analyses.formalize import Difference, Formalized, Reading
-from falsifier.analyses.range_parts import FAST, PACES, SLOW
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed

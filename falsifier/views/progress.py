@@ -22,8 +22,7 @@ from falsifier.search.events import (
     RunStarted,
 )
 from falsifier.search.findings import cause_of
-from falsifier.search.levels import level_name
-from falsifier.search.parameterization import parameterization_note
+from falsifier.search.refine_levels import level_name, parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken

@@ -16,8 +16,12 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
 from falsifier.search.budget import Spent
-from falsifier.search.levels import LevelResult, level_results
-from falsifier.search.parameterization import parameterization_note, parameterization_of
+from falsifier.search.refine_levels import (
+    LevelResult,
+    level_results,
+    parameterization_note,
+    parameterization_of,
+)
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
 from falsifier.stl.margins import margin_words, signed

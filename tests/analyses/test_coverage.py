@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
-from falsifier.analyses.coverage import Coverage, coverage_of
-from falsifier.analyses.range_parts import (
+from falsifier.analyses.coverage import (
     PARTS,
+    Coverage,
     allowed_labels,
     cells_of,
+    coverage_of,
     edges_of,
     fastest_rate,
     labels_of,

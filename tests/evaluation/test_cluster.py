@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.evaluation.cluster import ClusterExecutor
+from falsifier.evaluation.workers import ClusterExecutor
 
 
 class Client:

@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 from falsifier.core.model import FunctionModel
-from falsifier.evaluation.initial import start_values
+from falsifier.evaluation.evaluate import start_values
 from falsifier.problem.loading import load_problem
 from falsifier.testing import START, Array, lag_problem
 

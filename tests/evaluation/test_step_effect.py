@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.evaluation.step_effect import Movement, step_convergence, sufficient_step
+from falsifier.evaluation.confirm import Movement, step_convergence, sufficient_step
 from falsifier.fmu import Frame
 from tests.fmu.fixtures import isolated, ramp
 from tests.fmu.small_systems import loop

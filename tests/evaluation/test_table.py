@@ -8,7 +8,7 @@ from falsifier import falsify
 from falsifier.campaigns.analysis import load_run
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.table import evaluation_columns
+from falsifier.search.result import evaluation_columns
 from falsifier.testing import BIAS, FREE, lag_problem
 from tests.problems import impossible, mostly_broken
 

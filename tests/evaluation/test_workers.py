@@ -68,7 +68,7 @@ def test_other_executors_are_refused() -> None:
 
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("falsifier.evaluation.cluster._CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("falsifier.evaluation.workers._CONNECT_TIMEOUT", 0.5)
     with (
         pytest.raises(ModelError, match="cannot reach a Dask scheduler"),
         open_workers(1, "dask:tcp://127.0.0.1:9"),

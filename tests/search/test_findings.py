@@ -4,8 +4,8 @@ from falsifier.core.space import InputRange
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, failures, inexpressible
-from falsifier.search.levels import Level
-from falsifier.search.parameterization import (
+from falsifier.search.refine_levels import (
+    RefineLevel,
     searched_space,
 )
 from falsifier.testing import FREE, lag_problem
@@ -40,7 +40,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
 
 
 def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, [Level(0, searched_space(problem.space, engine, None))], 20)
+    finding = inexpressible(problem, [RefineLevel(0, searched_space(problem.space, engine, None))], 20)
     return finding.text if finding else ""
 
 

@@ -5,7 +5,7 @@ from falsifier.engines.box import BoxEngine
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.search.events import Event, RunStarted
-from falsifier.search.parameterization import (
+from falsifier.search.refine_levels import (
     engine_parameterization,
     parameterization_note,
     parameterization_of,

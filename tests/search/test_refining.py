@@ -15,7 +15,7 @@ from falsifier.record import manifest
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
-from falsifier.search.levels import Level, level_results, level_starts, reached
+from falsifier.search.refine_levels import RefineLevel, level_results, level_starts, reached
 from falsifier.search.result import Result
 from falsifier.testing import BIAS, FREE, START, lag_problem
 from tests.problems import fast_only
@@ -165,7 +165,7 @@ STARTS = (0, 4, 8)
 
 
 def test_levels_begin_with_their_first_simulation() -> None:
-    levels = [Level(first, SPACE) for first in STARTS]
+    levels = [RefineLevel(first, SPACE) for first in STARTS]
     assert [len(reached(levels, n)) for n in (0, 1, 4, 5, 8, 9)] == [1, 1, 1, 2, 2, 3]
 
 

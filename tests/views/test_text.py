@@ -12,7 +12,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.findings import Finding
-from falsifier.search.levels import Level
+from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.text import (
@@ -182,7 +182,7 @@ def test_samples_of_a_fallback_are_told_with_the_reason(tmp_path: Path) -> None:
 
 def test_a_level_counts_no_simulation_after_the_counterexample(found: Result) -> None:
     """With several at a time, some end after the counterexample."""
-    levels = (Level(0, found.problem.space),)
+    levels = (RefineLevel(0, found.problem.space),)
     count = found.spent.simulations
     longer = replace(found, evaluations=(*found.evaluations[:count], *found.evaluations[:1]), levels=levels)
     assert result_json(longer)["levels"][0]["simulations"] == count

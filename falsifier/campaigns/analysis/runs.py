@@ -15,8 +15,6 @@ from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.request import Method, method_of_run
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
-from falsifier.evaluation.table import Columns, evaluation_columns
-from falsifier.evaluation.table import frame as as_frame
 from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
@@ -24,6 +22,8 @@ from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunStatus, Summary, read_summary
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding
+from falsifier.search.result import Columns, evaluation_columns
+from falsifier.search.result import frame as as_frame
 from falsifier.stl.monitor import Verdict
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage
-from falsifier.analyses.range_parts import labels_of
+from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage, labels_of
 from falsifier.core.words import counted
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, whole_ticks

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from falsifier.analyses.range_parts import labels_of
+from falsifier.analyses.coverage import labels_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, monitor_for

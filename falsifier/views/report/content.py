@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from falsifier.analyses.range_parts import labels_of
+from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.core.candidate import Candidate
@@ -13,8 +13,8 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
 from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError
+from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
-from falsifier.record.trajectory_files import recorded_trajectory
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.panels import Panel, panels

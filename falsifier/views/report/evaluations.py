@@ -7,7 +7,7 @@ from pathlib import Path
 from falsifier.campaigns.analysis import Run, load
 from falsifier.core.literals import csv_cell
 from falsifier.errors import SpecError
-from falsifier.evaluation.table import Columns, frame
+from falsifier.search.result import Columns, frame
 
 
 def evaluations(runs: Iterable[Run]) -> Columns:

@@ -16,7 +16,7 @@ from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import read_journal, recorded_candidates
-from falsifier.search.levels import level_results
+from falsifier.search.refine_levels import level_results
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict, parse
 from falsifier.stl.margins import is_on_limit, margin_words

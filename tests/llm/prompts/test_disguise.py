@@ -16,8 +16,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.engines.llm import make_llm_engine
 from falsifier.engines.preview import preview
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.evaluation.initial import start_values
+from falsifier.evaluation.evaluate import Evaluation, evaluate, start_values
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.disguise import Disguise

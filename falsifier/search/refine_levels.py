@@ -5,16 +5,50 @@ from dataclasses import dataclass
 from math import isnan
 
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import counted
+from falsifier.core.words import counted, parameterization_text
+from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.problem.refinement import level_spaces
+from falsifier.problem.source import Parameterization
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
-from falsifier.search.parameterization import engine_parameterization, searched_space
 from falsifier.search.request import LLMSettings, RunRequest
 
 
+def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Parameterization:
+    """Return ``fixed`` if what suggests candidates never chooses control points itself.
+
+    Args:
+        engine: name of an engine; an unknown one was made in Python and may choose them.
+        llm: the language model; without an engine it leads the search.
+    """
+    if llm is None or engine == "hybrid":
+        name = engine or DEFAULT_ENGINE
+        return "fixed" if name in ENGINES and not ENGINES[name].is_free else "free"
+    from falsifier.llm.prompts.variants import variant_named
+
+    is_free = variant_named(llm.variant).has("freedom")
+    is_free |= llm.fallback is not None and engine_parameterization(llm.fallback, None) == "free"
+    return "free" if is_free else "fixed"
+
+
+def searched_space(space: SearchSpace, engine: str | None, llm: LLMSettings | None) -> SearchSpace:
+    """Return the space as it is searched: without freedom that is not used."""
+    return space if engine_parameterization(engine, llm) == "free" else space.fixed
+
+
+def parameterization_of(space: SearchSpace) -> Parameterization:
+    """Return ``free`` if the control points of at least one input may be chosen."""
+    return "free" if any(r.free for r in space.inputs) else "fixed"
+
+
+def parameterization_note(space: SearchSpace) -> str:
+    """Return in one line how the inputs are searched; empty without inputs."""
+    told = [f"{r.name} {parameterization_text(r)}" for r in space.inputs]
+    return f"{parameterization_of(space)} parameterization: {'; '.join(told)}" if told else ""
+
+
 @dataclass(frozen=True, slots=True)
-class Level:
+class RefineLevel:
     """One level of a search; a search that does not refine its inputs has one.
 
     Attributes:
@@ -28,7 +62,7 @@ class Level:
     leaves_finer: bool = False
 
 
-def reached(levels: Sequence[Level], simulations: int) -> tuple[Level, ...]:
+def reached(levels: Sequence[RefineLevel], simulations: int) -> tuple[RefineLevel, ...]:
     """Return the levels that a run of so many simulations has begun; at least the first."""
     return tuple(level for level in levels if level.first < max(simulations, 1))
 
@@ -100,13 +134,13 @@ def level_starts(
     return tuple(start for start in dict.fromkeys(starts) if start < total)
 
 
-def levels_of(request: RunRequest, space: SearchSpace) -> tuple[Level, ...]:
+def levels_of(request: RunRequest, space: SearchSpace) -> tuple[RefineLevel, ...]:
     """Return the levels of a run; one with all that its engine can search if it does not refine."""
     if not request.levels:
-        return (Level(0, searched_space(space, request.engine, request.llm)),)
+        return (RefineLevel(0, searched_space(space, request.engine, request.llm)),)
     spaces = level_spaces(space, free=engine_parameterization(request.engine, request.llm) == "free")
     count = len(request.levels)
     return tuple(
-        Level(first, each, leaves_finer=number == count < len(spaces))
+        RefineLevel(first, each, leaves_finer=number == count < len(spaces))
         for number, (first, each) in enumerate(zip(request.levels, spaces, strict=False), start=1)
     )
