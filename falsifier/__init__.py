@@ -36,6 +36,12 @@ from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
+if sys.platform == "win32":
+    raise ImportError(
+        "falsifier does not run on Windows itself; install it in WSL2 (`wsl --install` gives you an Ubuntu), "
+        "where FMUs for Windows run through Wine"
+    )
+
 if TYPE_CHECKING:
     from falsifier.analyses.assess import Assurance, Searched, assess
     from falsifier.analyses.coverage import Coverage, coverage

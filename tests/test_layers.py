@@ -150,15 +150,6 @@ def test_heavy_packages_are_imported_in_one_place_inside_functions() -> None:
     assert found >= HEAVY.keys()
 
 
-def test_what_not_all_systems_have_is_imported_by_the_modules_of_each_system() -> None:
-    """Others take it from core/operating_system; mypy for Windows and macOS finds what they call besides."""
-    of_systems = {PACKAGE / "core" / f"{name}.py" for name in ("posix", "posix_files", "windows")}
-    lacking = {"fcntl", "grp", "msvcrt", "pty", "pwd", "resource", "select", "termios", "winreg"}
-    lacking |= {"multiprocessing.resource_tracker", *map(module_name, of_systems)}
-    for path in {*sources()} - of_systems - {PACKAGE / "core" / "operating_system.py"}:
-        assert not {module for module, _ in imports(path)} & lacking, path
-
-
 def test_importing_the_package_imports_nothing_heavy() -> None:
     code = (
         "import sys, falsifier; from falsifier import load_problem, falsify, FunctionModel; "

@@ -20,7 +20,6 @@ from time import time
 from zipfile import ZipFile
 
 from falsifier.campaigns.directory import campaign_mark, run_directory
-from falsifier.core import operating_system
 from falsifier.fmu import fmu_files, with_local_files
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import STOP
@@ -171,10 +170,10 @@ def _put(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     partial.write_bytes(content)
-    operating_system.replace(partial, path)
+    partial.replace(path)
 
 
 def _store() -> Path:
     """Folder for files sent to this worker: FALSIFIER_STORE, or a temporary folder of this user."""
-    fallback = Path(gettempdir()) / f"falsifier-{operating_system.user()}"
+    fallback = Path(gettempdir()) / f"falsifier-{os.getuid()}"
     return Path(os.environ.get("FALSIFIER_STORE") or fallback)

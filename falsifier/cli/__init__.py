@@ -18,7 +18,7 @@ from falsifier.cli.output import (
     settle_streams,
     stop_at_interrupts,
 )
-from falsifier.core.operating_system import check_memory_limits
+from falsifier.core.posix import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean
 from falsifier.views.terminal import warn
 

@@ -7,8 +7,6 @@ from hashlib import sha256
 from pathlib import Path
 from unicodedata import normalize
 
-from falsifier.core import operating_system
-
 # Maximum length in bytes of what remains of a name; leaves room for the hash, prefixes and endings.
 _LONGEST_NAME = 120
 _HASH_DIGITS = 10
@@ -59,7 +57,7 @@ def write_whole(path: Path, content: str | bytes) -> Path:
             file.write(content.encode() if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())
-        operating_system.replace(partial, path)
+        partial.replace(path)
     except BaseException as error:
         with suppress(OSError):  # the first error says what is wrong
             partial.unlink(missing_ok=True)
@@ -88,8 +86,19 @@ def remove_partial(folder: Path, names: str) -> None:
                 continue
             pid = int(found[1])
             # Numbers are used again, in containers often at once: an own one is of an earlier process.
-            if pid == os.getpid() or not operating_system.is_running(pid):
+            if pid == os.getpid() or not _is_running(pid):
                 path.unlink()
+
+
+def _is_running(pid: int) -> bool:
+    """Whether there is a process with this number, of whichever user."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
 
 
 def cache_directory() -> Path:
@@ -102,9 +111,10 @@ def private_folder(folder: Path) -> Path | None:
     """Make a folder for machine code; None if other users could write to it, or this one cannot."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        is_private = operating_system.is_private(folder)
+        found = folder.stat()
     except OSError:
         return None
+    is_private = found.st_uid == os.getuid() and found.st_mode & 0o022 == 0
     return folder if is_private and os.access(folder, os.W_OK) else None
 
 

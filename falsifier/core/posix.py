@@ -1,7 +1,4 @@
-"""Processes, connections and memory on Linux and macOS; ``windows`` offers the same.
-
-Each function does as much as the system offers.
-"""
+"""Processes, connections and memory on Linux and macOS; each function does as much as the system offers."""
 
 import contextlib
 import ctypes
@@ -14,11 +11,10 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-assert sys.platform != "win32"
-
+from falsifier.errors import MachineError
 
 _SET_DUMPABLE = 4
 # The system call of Landlock and what it is asked (linux/landlock.h), the same on all architectures.
@@ -26,8 +22,9 @@ _CREATE_RULESET, _ASK_VERSION, _VERSION_WITH_MOVES = 444, 1, 2
 # A program's end is waited for at most this long; then the process that watches it is killed.
 _ENDING_SECONDS = 5.0
 _MOST_TOLD = 1 << 16
-# Filter in the format of python -W: warnings whose message starts with this word.
-_TRACKER_FILTER = "ignore:resource_tracker"
+# Below these limits of memory, in bytes, libraries of linear algebra end the process, with exit code 1, or
+# wait for ever; by the option of ``ulimit`` that sets them.
+_LEAST_MEMORY = {"d": (resource.RLIMIT_DATA, 300 << 20), "v": (resource.RLIMIT_AS, 500 << 20)}
 
 
 class Program:
@@ -47,7 +44,6 @@ class Program:
 
     Attributes:
         pid: its process id.
-        replies_place: what the program must be told of where its replies go.
     """
 
     def __init__(
@@ -83,7 +79,6 @@ class Program:
                     os.close(descriptor)
         with contextlib.suppress(OSError):  # it has ended already
             self._line.sendall(policy)
-        self.replies_place = str(replies or "")
         self._life = _open_life(self.pid)
         self._waiting = select.poll()
         for watched in (self._replies, self._life):
@@ -210,26 +205,10 @@ def _spawn(command: Sequence[str], environment: Mapping[str, str], places: Mappi
             os.close(copy)
 
 
-def on_fork(callback: Callable[[], None]) -> None:
-    """Call a function in each forked copy of this process."""
-    os.register_at_fork(after_in_child=callback)
-
-
 def _kill(pid: int) -> None:
     """Kill a process, if it is still there."""
     with contextlib.suppress(ProcessLookupError):
         os.kill(pid, signal.SIGKILL)
-
-
-def is_running(pid: int) -> bool:
-    """Whether there is a process with this number, of whichever user."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
-    return True
 
 
 def hide_memory() -> None:
@@ -268,33 +247,21 @@ def exit_text(code: int) -> str:
         return f"signal {-code}"
 
 
-def yield_processor() -> None:
-    """Let other processes run."""
-    os.sched_yield()
-
-
-def start_silent_tracker() -> None:
-    """Start multiprocessing's resource tracker, which frees a pool's semaphores, without its warnings.
-
-    It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
-    command has ended, and the user could do nothing about it.
-    """
-    from multiprocessing.resource_tracker import ensure_running
-
-    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
-    try:
-        ensure_running()
-    finally:
-        sys.warnoptions.remove(_TRACKER_FILTER)
-
-
 def machine_memory() -> int:
     """Return the memory of this machine in bytes; 0 if it is unknown."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 
-def memory_limits() -> dict[str, int]:
-    """Return the limits of this process's memory in bytes, by the option of ``ulimit`` that sets them."""
-    limits = {"d": resource.RLIMIT_DATA, "v": resource.RLIMIT_AS}
-    allowed = {option: resource.getrlimit(limit)[0] for option, limit in limits.items()}
-    return {option: most for option, most in allowed.items() if most != resource.RLIM_INFINITY}
+def check_memory_limits() -> None:
+    """Check that a process may use as much memory as its libraries need.
+
+    Raises:
+        MachineError: if it may not; names the limit and how to raise it.
+    """
+    for option, (limit, least) in _LEAST_MEMORY.items():
+        allowed = resource.getrlimit(limit)[0]
+        if allowed != resource.RLIM_INFINITY and allowed < least:
+            raise MachineError(
+                f"processes may use {allowed >> 20} MiB of memory (ulimit -{option}); simulations need at "
+                f"least {least >> 20} MiB: raise it with ulimit -{option} {least >> 10}"
+            )

@@ -1,4 +1,4 @@
-"""Files and folders on Linux and macOS; ``windows`` offers the same, ``operating_system`` chooses."""
+"""Files that nobody can shorten, locks, and folders that are removed in any state, on Linux and macOS."""
 
 import contextlib
 import fcntl
@@ -12,8 +12,6 @@ from itertools import count
 from pathlib import Path
 from typing import IO
 from uuid import uuid4
-
-assert sys.platform != "win32"
 
 
 def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
@@ -68,26 +66,6 @@ def can_seal() -> bool:
     return sys.platform == "linux" and hasattr(os, "memfd_create")
 
 
-def write_at(descriptor: int, data: bytes, position: int) -> None:
-    """Write bytes to a position of a file, without moving the file's own."""
-    os.pwrite(descriptor, data, position)
-
-
-def read_at(descriptor: int, most: int, position: int) -> bytes:
-    """Read at most this many bytes of a file from a position, without moving the file's own."""
-    return os.pread(descriptor, most, position)
-
-
-def replace(source: Path, target: Path) -> None:
-    """Put a file in the place of another one, atomically."""
-    source.replace(target)
-
-
-def user() -> str:
-    """Return what tells this user's temporary folders from those of others."""
-    return str(os.getuid())
-
-
 def homes() -> tuple[Path, ...]:
     """Return the user's home folder: what the environment says, and what the system says; none if unknown."""
     found = []
@@ -96,22 +74,6 @@ def homes() -> tuple[Path, ...]:
     with contextlib.suppress(KeyError):
         found.append(Path(pwd.getpwuid(os.getuid()).pw_dir))
     return tuple(dict.fromkeys(found))
-
-
-def is_root() -> bool:
-    """Whether this process may read all files."""
-    return os.geteuid() == 0
-
-
-def is_own(path: Path) -> bool:
-    """Whether a file or folder belongs to this user."""
-    return path.lstat().st_uid == os.getuid()
-
-
-def is_private(folder: Path) -> bool:
-    """Whether a folder belongs to this user and no other user can write to it."""
-    found = folder.stat()
-    return found.st_uid == os.getuid() and found.st_mode & 0o022 == 0
 
 
 def forbids_programs(folder: Path) -> bool:

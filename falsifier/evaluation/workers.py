@@ -1,6 +1,7 @@
 """Executors for evaluations: this process, local processes or a Dask cluster."""
 
 import logging
+import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -9,7 +10,6 @@ from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from falsifier.core import operating_system
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
 from falsifier.core.secrets import holds_credentials
@@ -28,6 +28,8 @@ _End = Any
 _FMU_LOGGER = "falsifier.fmu"
 # Maximum time in s to wait for a cluster's scheduler.
 _CONNECT_TIMEOUT = 20
+# Filter in the format of python -W: warnings whose message starts with this word.
+_TRACKER_FILTER = "ignore:resource_tracker"
 
 
 @contextmanager
@@ -194,11 +196,26 @@ def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
 
-    operating_system.start_silent_tracker()
+    _start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
         jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending)
     )
+
+
+def _start_silent_tracker() -> None:
+    """Start multiprocessing's resource tracker, which frees a pool's semaphores, without its warnings.
+
+    It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
+    command has ended, and the user could do nothing about it.
+    """
+    from multiprocessing.resource_tracker import ensure_running
+
+    sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
+    try:
+        ensure_running()
+    finally:
+        sys.warnoptions.remove(_TRACKER_FILTER)
 
 
 def _prepare_worker(log_level: int, ending: _End) -> None:

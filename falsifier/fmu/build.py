@@ -2,7 +2,6 @@
 
 import importlib.util
 import re
-import sys
 import sysconfig
 import tempfile
 import zipfile
@@ -11,7 +10,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from falsifier.core import operating_system
 from falsifier.core.compiler import compile_c
 from falsifier.errors import ModelError
 from falsifier.fmu.description import extract, library_file, read_description, read_xml
@@ -81,7 +79,7 @@ def _compile(path: Path, folder: Path, sources: Sources, target: Path, major: in
         [
             *("-O2", "-w", "-shared", "-fPIC"), *(f"-I{name}" for name in sources.includes),
             f"-I{_headers()}", *defines, *header, *sources.files,
-            *(() if sys.platform == "win32" else ("-lm",)), "-o", str(target),
+            "-lm", "-o", str(target),
         ],
     )  # fmt: skip
 
@@ -113,7 +111,7 @@ def _write(path: Path, folder: Path, out: Path) -> None:
                 packed.write(file, file.relative_to(folder).as_posix())
         for interface in read_description(partial).info.interfaces:
             FmuModel(partial, interface).load()
-        operating_system.replace(partial, out)
+        partial.replace(out)
     except ModelError as error:
         raise ModelError(f"{path}: the sources compile, but the result cannot be used: {error}") from error
     finally:

@@ -10,7 +10,6 @@ from uuid import uuid4
 
 from pydantic import ValidationError
 
-from falsifier.core import operating_system
 from falsifier.core.files import cache_directory
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 
@@ -52,7 +51,7 @@ class CachedChat:
         # Under a unique name first: several runs may store the same reply at the same time.
         partial = path.with_name(f"{path.name}.{uuid4().hex}")
         partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
-        operating_system.replace(partial, path)
+        partial.replace(path)
         self.inner.accepted(request, reply)
 
     def _path(self, request: ChatRequest) -> Path:

@@ -14,7 +14,7 @@ from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
-from falsifier.core import operating_system
+from falsifier.core import posix
 from falsifier.core.files import cache_directory
 from falsifier.core.literals import printable
 from falsifier.core.secrets import scrubbed
@@ -73,7 +73,7 @@ def check_model_file(llm: str) -> Path:
         raise ChatSetupError(
             f"--llm {llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
         )
-    memory = operating_system.machine_memory()
+    memory = posix.machine_memory()
     if memory and size + _MORE_BYTES > memory:
         raise ChatSetupError(
             f"--llm {llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and this "

@@ -99,7 +99,6 @@ def test_a_run_that_kills_its_worker_has_failed(tmp_path: Path) -> None:
     assert "worker process died" in run.reason
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
 def test_ctrl_c_stops_the_runs_where_they_are(tmp_path: Path) -> None:
     directory = tmp_path / "c"
     campaign = Held(directory, tmp_path / "hold", 5)

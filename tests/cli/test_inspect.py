@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from falsifier.cli import cli
-from falsifier.core import operating_system
+from falsifier.core import posix_files
 from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.description.archive import this_platform
@@ -42,7 +42,7 @@ def test_info_says_what_is_ignored_and_what_cannot_be_simulated(tmp_path: Path) 
 
 def test_info_describes_an_fmu_where_none_can_be_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
     REGISTRY.close()
-    monkeypatch.setattr(operating_system, "forbids_programs", lambda folder: True)
+    monkeypatch.setattr(posix_files, "forbids_programs", lambda folder: True)
     done = CliRunner().invoke(cli, ["info", str(fixture("Lag_2"))])
     assert done.exit_code == 0, done.output
     assert "cannot be simulated now" in done.output and "noexec" in done.output and "outputs" in done.output

@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,12 @@ def test_an_exit_code_or_a_signal_is_named() -> None:
     assert posix.exit_text(3) == "it exited with code 3"
     assert posix.exit_text(-11) == "signal SIGSEGV"
     assert posix.exit_text(-250) == "signal 250"
+
+
+def test_on_windows_the_import_says_where_to_install_it() -> None:
+    code = "import sys; sys.platform = 'win32'; import falsifier"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 1 and "ImportError: " in done.stderr and "WSL2" in done.stderr
 
 
 def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from falsifier.core import operating_system
+from falsifier.core import posix
 from falsifier.core.literals import printable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError
@@ -191,7 +191,7 @@ def test_the_folder_of_a_killed_process_is_swept_at_the_next_start(tmp_path: Pat
 
 
 @pytest.mark.skipif(
-    not operating_system.can_confine() and os.getuid() != 0,
+    not posix.can_confine() and os.getuid() != 0,
     reason="processes of other programs cannot be protected",
 )
 def test_an_fmu_reads_no_secrets_of_other_processes(tmp_path: Path) -> None:
@@ -205,8 +205,8 @@ def test_an_fmu_reads_no_secrets_of_other_processes(tmp_path: Path) -> None:
 
 
 UNCONFINED = """
-from falsifier.core import operating_system
-operating_system.can_confine = lambda: False
+from falsifier.core import posix
+posix.can_confine = lambda: False
 import ctypes
 go()
 print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0))

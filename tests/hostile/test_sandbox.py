@@ -260,7 +260,7 @@ def test_a_file_cannot_outgrow_the_limit(place: Place) -> None:
 
 SMALL = """
 from falsifier.fmu.process import start
-start._MEMORY_SHARE = 1e8 / start.operating_system.machine_memory()
+start._MEMORY_SHARE = 1e8 / start.posix.machine_memory()
 print(tried({}))
 """
 

@@ -197,7 +197,7 @@ class TestModelFile:
         self, model: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         with monkeypatch.context() as patch:
-            patch.setattr("falsifier.core.operating_system.machine_memory", lambda: 1 << 20)
+            patch.setattr("falsifier.core.posix.machine_memory", lambda: 1 << 20)
             with pytest.raises(ChatSetupError, match="of memory"):
                 connect(str(model))
         monkeypatch.setattr(model_file, "find_spec", lambda name: None)

@@ -33,7 +33,6 @@ _MAX_OVERHEAD, _MAX_EXPANSION = 1024, 1.01
 # Limits of usual file systems in bytes; the second one leaves room for the folder that is unpacked to.
 _MAX_NAME_BYTES, _MAX_PATH_BYTES = 255, 2048
 
-_SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows", "cygwin": "windows"}
 _MACHINES = {
     "amd64": "x86_64",
     "x86_64": "x86_64",
@@ -164,8 +163,7 @@ def platforms(names: Iterable[str]) -> tuple[str, ...]:
 def this_platform() -> str:
     """Return the FMI 3 name of the platform that this Python runs on."""
     machine = platform.machine().lower()
-    system = _SYSTEMS.get(sys.platform, sys.platform)
-    return f"{_MACHINES.get(machine, machine)}-{system}"
+    return f"{_MACHINES.get(machine, machine)}-{sys.platform}"
 
 
 def binary_folder(fmi_version: str, platform: str = "") -> str:
@@ -211,8 +209,7 @@ def _faults(entries: list[zipfile.ZipInfo]) -> Iterator[str]:
 
 
 def _faults_of_name(entry: zipfile.ZipInfo) -> Iterator[str]:
-    # zipfile truncates names at NUL and converts backslashes on Windows only: check the name as it was
-    # written.
+    # zipfile truncates names at NUL: check the name as it was written.
     written = entry.orig_filename.replace("\\", "/")
     parts = written.split("/")
     if written.startswith("/") or ":" in parts[0] or ".." in parts or "\0" in written:

@@ -5,12 +5,13 @@ whatever does not look like one ends the connection.
 """
 
 import math
+import os
 import struct
 import time
 from dataclasses import dataclass
 from enum import IntEnum
 
-from falsifier.core import operating_system
+from falsifier.core import posix
 from falsifier.core.literals import printable
 
 # Waking up a process takes about 40 microseconds on either side, which is a lot compared with a simulation
@@ -102,7 +103,7 @@ class Garbled(Closed):
     """What has arrived is not a reply, so the connection cannot be used any more."""
 
 
-def send(program: operating_system.Program, kind: Request, payload: bytes = b"") -> None:
+def send(program: posix.Program, kind: Request, payload: bytes = b"") -> None:
     """Send one request.
 
     Raises:
@@ -114,7 +115,7 @@ def send(program: operating_system.Program, kind: Request, payload: bytes = b"")
         raise Closed from error
 
 
-def receive(program: operating_system.Program, limit: float, *, polling: float = 0.0) -> Reply:
+def receive(program: posix.Program, limit: float, *, polling: float = 0.0) -> Reply:
     """Wait for a reply, at most this many seconds.
 
     Args:
@@ -141,7 +142,7 @@ def receive(program: operating_system.Program, limit: float, *, polling: float =
     return Reply(where, status, printable(text), reached, printed, more, leaving)
 
 
-def _exactly(program: operating_system.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
+def _exactly(program: posix.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
     """Receive this many bytes, at least one; the limit in s is for the first of them."""
     data = _some(program, count, limit, polling)
     until = time.perf_counter() + _REST_SECONDS
@@ -156,14 +157,14 @@ def _exactly(program: operating_system.Program, count: int, limit: float, pollin
     return data
 
 
-def _some(program: operating_system.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
+def _some(program: posix.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
     until = time.perf_counter() + polling
     while True:
         try:
             data = program.receive_now(count)
         except BlockingIOError:
             if time.perf_counter() < until:
-                operating_system.yield_processor()
+                os.sched_yield()
             elif not program.wait(max(0.0, limit)):
                 raise Closed from None
             continue

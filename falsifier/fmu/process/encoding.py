@@ -3,7 +3,6 @@
 ``falsifier/fmu/worker/request.c`` is the other side.
 """
 
-import os
 import struct
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -153,14 +152,14 @@ def fmu(
         library: path of its library.
         interface: interface to simulate with.
         logging: whether to ask it for messages.
-        through_wine: whether the worker is a Windows program on another system.
+        through_wine: whether the worker is the program for Windows.
     """
     resources = folder / "resources"
     if through_wine:
         names = [windows_path(library), windows_path(resources) + "\\"]
         addresses = ["file:///Z:" + quote(str(path)) for path in (folder, resources)]
     else:
-        names, addresses = [str(library), f"{resources}{os.sep}"], [folder.as_uri(), resources.as_uri()]
+        names, addresses = [str(library), f"{resources}/"], [folder.as_uri(), resources.as_uri()]
     events = description.major == 3 and interface == "co-simulation" and description.event_mode
     numbers = integers(
         description.major,

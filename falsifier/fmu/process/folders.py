@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from uuid import uuid4
 
-from falsifier.core import operating_system
+from falsifier.core import posix_files
 
 _PREFIX = "falsifier-fmu-"
 _LOCK_SUFFIX = ".lock"
@@ -24,7 +24,7 @@ class WorkFolder:
     def __init__(self) -> None:
         self.path = Path(tempfile.gettempdir()) / f"{_PREFIX}{uuid4().hex}"
         # Locked before the folder exists: a folder whose lock is free has lost its owner.
-        self._lock = operating_system.lock_file(_lock_of(self.path))
+        self._lock = posix_files.lock_file(_lock_of(self.path))
         self.path.mkdir(mode=0o700)
 
     def remove(self) -> None:
@@ -41,7 +41,7 @@ class WorkFolder:
 
 def remove_work_folder(path: Path) -> None:
     """Remove a folder that a WorkFolder made, perhaps in another process, and its lock."""
-    operating_system.remove_tree(path)
+    posix_files.remove_tree(path)
     with contextlib.suppress(OSError):
         _lock_of(path).unlink()
 
@@ -51,7 +51,7 @@ def sweep() -> None:
     temporary = Path(tempfile.gettempdir())
     for path in temporary.glob(f"{_PREFIX}*"):
         with contextlib.suppress(OSError):
-            if not (_MADE.fullmatch(path.name) and operating_system.is_own(path)):
+            if not (_MADE.fullmatch(path.name) and path.lstat().st_uid == os.getuid()):
                 continue
             if path.name.endswith(_LOCK_SUFFIX):
                 _sweep_lock(path)
@@ -64,7 +64,7 @@ def _lock_of(path: Path) -> Path:
 
 
 def _sweep_folder(path: Path) -> None:
-    lock = operating_system.lock_file(_lock_of(path))
+    lock = posix_files.lock_file(_lock_of(path))
     if lock is not None:
         try:
             remove_work_folder(path)

@@ -1,6 +1,5 @@
 """What a worker is to simulate: one FMU here, or a system of several elsewhere."""
 
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -113,9 +112,8 @@ class FmuOrder(Order):
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
         library = library_of(self.path, self.description, folder, self.interface, windows=self.through_wine)
-        through_wine = self.through_wine and sys.platform != "win32"
         return encoding.fmu(
-            self.description, folder, library, self.interface, logging=logging, through_wine=through_wine
+            self.description, folder, library, self.interface, logging=logging, through_wine=self.through_wine
         )
 
     def prepare(self, plan: Plan) -> bytes:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
-from falsifier.core import operating_system
+from falsifier.core import posix, posix_files
 from falsifier.core.compiler import compile_c
 from falsifier.core.files import cache_directory, checksum, private_folder
 from falsifier.core.secrets import holds_secrets, scrubbed
@@ -24,12 +24,9 @@ _NOT_HERE = ("platform_windows.c", "sandbox_linux.c", "calls_linux.c", "sandbox_
 # Names of further variables to pass on, separated by commas.
 MORE = "FALSIFIER_FMU_VARIABLES"
 
-# Where programs and libraries are, who the user is, language and time zone, what Windows and its C libraries
-# need, and licences.
+# Where programs and libraries are, who the user is, language and time zone, and licences.
 _PASSED = re.compile(
     r"PATH|HOME|USER|LOGNAME|LANG|LANGUAGE|LC_\w+|TZ|LD_LIBRARY_PATH|DYLD_(FALLBACK_)?LIBRARY_PATH"
-    r"|SYSTEMROOT|SYSTEMDRIVE|WINDIR|COMSPEC|PATHEXT|PROGRAMDATA|PROGRAMFILES(\(X86\))?|COMMONPROGRAMFILES"
-    r"|APPDATA|LOCALAPPDATA|USERPROFILE|USERNAME|COMPUTERNAME|NUMBER_OF_PROCESSORS|PROCESSOR_\w+|OS"
     r"|\w*LICEN[SC]E\w*",
     re.IGNORECASE,
 )
@@ -46,10 +43,10 @@ def worker_program(root: Path, *, windows: bool = False) -> Path:
     Raises:
         ModelError: if there is none for this machine, and it cannot be compiled either.
     """
-    found = WINDOWS if windows else this_platform()
-    path = WORKER / "bin" / found / ("worker.exe" if found.endswith("-windows") else "worker")
     if windows:
-        return path
+        return WORKER / "bin" / WINDOWS / "worker.exe"
+    found = this_platform()
+    path = WORKER / "bin" / found / "worker"
     if not path.is_file() or not _has_its_library():
         return _compiled(root, found)
     if os.access(path, os.X_OK):
@@ -69,8 +66,6 @@ def _has_its_library() -> bool:
 
 def _compiled(root: Path, found: str) -> Path:
     """Return the program, compiled by this machine's C compiler, once for all processes of this user."""
-    if found.endswith("-windows"):
-        raise ModelError(f"there is no program to run FMUs on {found}; use a 64-bit Python for x86-64")
     path = (_kept() or root) / f"worker-{found}-{_sum_of_sources()}"
     if path.exists():
         return path
@@ -94,7 +89,7 @@ def _kept() -> Path | None:
         folder = private_folder(cache_directory() / "workers")
     except RuntimeError:  # the user has no home
         return None
-    return None if folder is None or operating_system.forbids_programs(folder) else folder
+    return None if folder is None or posix_files.forbids_programs(folder) else folder
 
 
 @lru_cache(maxsize=1)
@@ -110,8 +105,8 @@ def protect_secrets(environment: Mapping[str, str]) -> None:
     On Linux, any process could otherwise read the environment of another one of the same user. Without
     secrets, or if FMUs can be confined, this process stays open to debuggers.
     """
-    if holds_secrets(environment) and not operating_system.can_confine():
-        operating_system.hide_memory()
+    if holds_secrets(environment) and not posix.can_confine():
+        posix.hide_memory()
 
 
 def worker_environment(environment: Mapping[str, str], scratch: Path) -> dict[str, str]:

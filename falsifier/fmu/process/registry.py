@@ -2,10 +2,10 @@
 
 import atexit
 import contextlib
+import os
 import threading
 from collections.abc import Collection, Hashable, Iterable
 
-from falsifier.core import operating_system
 from falsifier.errors import ModelError
 from falsifier.fmu.process import start
 from falsifier.fmu.process.order import Order
@@ -25,7 +25,7 @@ class Registry:
         self._workplace: Workplace | None = None
         self._runners: dict[tuple[Hashable, int], Runner] = {}
         atexit.register(self.close)
-        operating_system.on_fork(self.forget)
+        os.register_at_fork(after_in_child=self.forget)
 
     def workplace(self) -> Workplace:
         """Return the folder of the workers; make it if necessary."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core import operating_system
+from falsifier.core import posix_files
 from falsifier.core.literals import printable
 from falsifier.fmu.process.plan import Plan
 
@@ -75,10 +75,10 @@ class Memory:
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
         if path is None:
-            self._file = operating_system.sealed_file(0, may_grow=True)
+            self._file = posix_files.sealed_file(0, may_grow=True)
         else:
             self._file = path.open("x+b", buffering=0)
-        self._is_mapped = path is None and operating_system.can_seal()
+        self._is_mapped = path is None and posix_files.can_seal()
         self.values: NDArray[np.float64] = np.zeros(0)
 
     def fileno(self) -> int:
@@ -106,12 +106,12 @@ class Memory:
     def give(self) -> None:
         """Let the worker see the values."""
         if not self._is_mapped:
-            operating_system.write_at(self.fileno(), self.values.tobytes(), 0)
+            os.pwrite(self.fileno(), self.values.tobytes(), 0)
 
     def take(self) -> None:
         """See what the worker has written."""
         if not self._is_mapped:
-            read = operating_system.read_at(self.fileno(), self.values.nbytes, 0)
+            read = os.pread(self.fileno(), self.values.nbytes, 0)
             found = np.frombuffer(read[: len(read) // 8 * 8], dtype=np.float64)
             self.values[: len(found)] = found
             self.values[len(found) :] = np.nan
@@ -133,7 +133,7 @@ class Memory:
     def _header(self) -> NDArray[np.float64]:
         if self._is_mapped or self._file.closed:
             return self.values if len(self.values) >= HEADER else np.zeros(HEADER)
-        read = operating_system.read_at(self.fileno(), 8 * HEADER, 0)
+        read = os.pread(self.fileno(), 8 * HEADER, 0)
         return np.frombuffer(read.ljust(8 * HEADER, b"\0"), dtype=np.float64)
 
 
@@ -141,7 +141,7 @@ class Output:
     """A file for a process's output, with a position that it shares with this process."""
 
     def __init__(self) -> None:
-        self._file = operating_system.sealed_file(_MOST_BYTES)
+        self._file = posix_files.sealed_file(_MOST_BYTES)
 
     def fileno(self) -> int:
         """Descriptor of the file, for the process that prints."""
@@ -158,7 +158,7 @@ class Output:
             return ()
         # The process may have moved the position, which would otherwise be the number of bytes.
         size = min(position, _MOST_BYTES if until is None else until, _MOST_BYTES)
-        text = operating_system.read_at(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        text = os.pread(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
         os.lseek(self.fileno(), 0, os.SEEK_SET)
         lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
         return lines if size < _MOST_BYTES else (*lines, _DROPPED)

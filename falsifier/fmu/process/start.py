@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 import tempfile
 import threading
 import time
@@ -11,8 +10,7 @@ from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
-from falsifier.core import operating_system
-from falsifier.core.operating_system import check_memory_limits
+from falsifier.core import posix, posix_files
 from falsifier.errors import ModelError
 from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
 from falsifier.fmu.process import folders
@@ -45,7 +43,7 @@ class Workplace:
     """
 
     def __init__(self) -> None:
-        check_memory_limits()
+        posix.check_memory_limits()
         protect_secrets(os.environ)
         folders.sweep()
         self._folder = folders.WorkFolder()
@@ -81,7 +79,7 @@ class Workplace:
         Raises:
             ModelError: if there is none for this machine, or no library can be loaded from the folder.
         """
-        if not windows and operating_system.forbids_programs(self.root):
+        if not windows and posix_files.forbids_programs(self.root):
             raise ModelError(
                 f"FMUs are unpacked to {self.root.parent}, from which this system loads no libraries "
                 "(noexec); set TMPDIR to another folder"
@@ -109,7 +107,7 @@ class Started:
         workplace: the folder of all workers.
         folder: where its FMUs are.
         policy: what these may do.
-        through_wine: whether it is the program for Windows, on another system.
+        through_wine: whether it is the program for Windows.
 
     Attributes:
         program: the process.
@@ -122,26 +120,23 @@ class Started:
     """
 
     def __init__(self, workplace: Workplace, folder: Path, policy: Policy, *, through_wine: bool) -> None:
-        self._is_wine = through_wine and sys.platform != "win32"
         path = workplace.program()
         command: tuple[str, ...] = ()
-        if self._is_wine:
+        if through_wine:
             command = (_wine(), windows_path(workplace.program(windows=True)))
         self.scratch = workplace.scratch()
         self.output = Output()
         environment = worker_environment(os.environ, self.scratch)
-        replies = None
-        if self._is_wine:
+        if through_wine:
             _make_prefix(self.scratch / "prefix")
             environment = _wine_environment(environment, self.scratch)
-            replies = self.scratch / "replies"
-        needs_path = self._is_wine or sys.platform == "win32"
-        self.memory = Memory(self.scratch / "memory" if needs_path else None)
+        self._replies = self.scratch / "replies" if through_wine else None
+        self.memory = Memory(self.scratch / "memory" if through_wine else None)
         try:
-            memory = int(operating_system.machine_memory() * _MEMORY_SHARE)
+            memory = int(posix.machine_memory() * _MEMORY_SHARE)
             told = encoded(policy, (self.scratch, folder), _hidden(), memory=memory, command=command)
-            self.program = operating_system.Program(
-                [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), replies
+            self.program = posix.Program(
+                [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), self._replies
             )
         except BaseException as error:
             self._close()
@@ -151,18 +146,13 @@ class Started:
 
     @property
     def connect(self) -> bytes:
-        """What the worker is told first."""
-        place = self.program.replies_place
-        return text(self.known(Path(place)) if place and self._is_wine else place)
+        """What the worker is told first: where its replies go."""
+        return text("" if self._replies is None else windows_path(self._replies))
 
     @property
     def place(self) -> str:
         """What the worker is told of where the memory is."""
-        return "" if self.memory.path is None else self.known(self.memory.path)
-
-    def known(self, path: Path) -> str:
-        """Return the path by which the worker knows a file."""
-        return windows_path(path) if self._is_wine else str(path)
+        return "" if self.memory.path is None else windows_path(self.memory.path)
 
     def end(self) -> int:
         """End the process and remove its folder; return the exit code, negative for a signal."""
@@ -177,7 +167,7 @@ class Started:
     def _close(self) -> None:
         self.output.close()
         self.memory.close()
-        operating_system.remove_tree(self.scratch)
+        posix_files.remove_tree(self.scratch)
 
 
 def rights_text(workplace: Workplace, policy: Policy) -> str:
@@ -187,12 +177,11 @@ def rights_text(workplace: Workplace, policy: Policy) -> str:
         ModelError: if there is no program for this machine.
     """
     told, until = b"", time.monotonic() + _SETUP_SECONDS
-    if sys.platform != "win32":
-        started = Started(workplace, workplace.scratch(), policy, through_wine=False)
-        while not told.endswith(b"\0") and time.monotonic() < until:
-            told += started.program.told()
-            time.sleep(_LOOKING_SECONDS)
-        started.end()
+    started = Started(workplace, workplace.scratch(), policy, through_wine=False)
+    while not told.endswith(b"\0") and time.monotonic() < until:
+        told += started.program.told()
+        time.sleep(_LOOKING_SECONDS)
+    started.end()
     return policy_text(policy, read_told(told).enforced)
 
 
@@ -205,7 +194,7 @@ def crash_code(exception: int) -> int:
 
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
-    return hidden_places(os.environ, operating_system.homes(), is_root=operating_system.is_root())
+    return hidden_places(os.environ, posix_files.homes(), is_root=os.geteuid() == 0)
 
 
 def _extract(path: Path, sha: str, folder: Path) -> None:

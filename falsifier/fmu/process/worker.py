@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, get_args
 
-from falsifier.core.operating_system import exit_text
+from falsifier.core.posix import exit_text
 from falsifier.errors import ModelError
 from falsifier.fmu.description import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import (

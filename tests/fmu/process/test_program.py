@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.core import operating_system
+from falsifier.core import posix_files
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import this_platform
 from falsifier.fmu.process import REGISTRY, program
@@ -102,7 +102,7 @@ class TestElsewhere:
 
 
 def test_a_folder_that_forbids_programs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(operating_system, "forbids_programs", lambda folder: True)
+    monkeypatch.setattr(posix_files, "forbids_programs", lambda folder: True)
     REGISTRY.close()
     with pytest.raises(ModelError, match=rf"{tempfile.gettempdir()}.*noexec.*TMPDIR"):
         fixtures.run(fixtures.isolated("Lag_2"), ("y",))
