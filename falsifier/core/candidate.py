@@ -16,14 +16,12 @@ class Candidate:
         parameters: parameter values by name.
         origin: name of the engine that proposed it.
         rationale: the engine's reason for proposing it.
-        aim: condition of the requirement that it is to make true; empty: it is to violate the requirement.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     origin: str = ""
     rationale: str = ""
-    aim: str = ""
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -48,7 +46,6 @@ class Candidate:
             "parameters": dict(self.parameters),
             "origin": self.origin,
             "rationale": self.rationale,
-            **({"aim": self.aim} if self.aim else {}),
         }
 
     @classmethod
@@ -62,5 +59,4 @@ class Candidate:
             {name: float(v) for name, v in data.get("parameters", {}).items()},
             data.get("origin", ""),
             data.get("rationale", ""),
-            data.get("aim", ""),
         )

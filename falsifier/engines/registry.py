@@ -24,7 +24,6 @@ class Registered:
             name.
         is_free: whether it chooses control points itself if the space allows it; the others search the fixed
             parameterization.
-        uses_robustness: whether what it suggests depends on the robustness that it is told.
         uses_context: whether it tries the levels that context files give.
     """
 
@@ -32,7 +31,6 @@ class Registered:
     summary: str
     extra: str = ""
     is_free: bool = False
-    uses_robustness: bool = True
     uses_context: bool = False
 
     def load(self) -> Any:
@@ -65,17 +63,10 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "falsifier.engines.coverage:Coverage",
             "goes on from inputs that reached something new; does not use robustness",
             is_free=True,
-            uses_robustness=False,
         ),
-        "uniform": Registered(
-            "falsifier.engines.simple:Uniform", "uniform random points", uses_robustness=False
-        ),
-        "sobol": Registered(
-            "falsifier.engines.simple:Sobol", "scrambled Sobol sequence", uses_robustness=False
-        ),
-        "corners": Registered(
-            "falsifier.engines.simple:Corners", "constant extremes first, then random", uses_robustness=False
-        ),
+        "uniform": Registered("falsifier.engines.simple:Uniform", "uniform random points"),
+        "sobol": Registered("falsifier.engines.simple:Sobol", "scrambled Sobol sequence"),
+        "corners": Registered("falsifier.engines.simple:Corners", "constant extremes first, then random"),
         "annealing": Registered("falsifier.engines.optimisers.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(

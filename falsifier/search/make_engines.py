@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from falsifier.context.values import Context
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
-from falsifier.engines.aiming import Aiming, can_aim
 from falsifier.engines.protocol import Engine
 from falsifier.engines.refining import Refining, Stage
 from falsifier.errors import SpecError
@@ -26,8 +25,6 @@ _LLM_ENGINES = ("llm", "hybrid")
 # Distance between the seeds of the engines in one search, so that they do not draw the same points; larger
 # than the consecutive seeds that users choose.
 _SEED_STRIDE = 1_000_003
-# The same for the engine that aims at a condition beside one that searches for a violation.
-_AIM_SEED = 500_009
 
 
 def make_engines(
@@ -62,7 +59,8 @@ def _made(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -
     """Make engines that do not refine, one per problem."""
     seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
     if request.llm is None:
-        return [_numerical(request.engine or DEFAULT_ENGINE, *each) for each in seeded]
+        name = request.engine or DEFAULT_ENGINE
+        return [make_engine(name, problem, seed=seed) for problem, seed in seeded]
     chat = chat or open_chat(request.llm, max_cost=request.budget.cost)
     return [_led_by_llm(request, request.llm, *each, chat) for each in seeded]
 
@@ -88,14 +86,6 @@ def told_problems(
     from falsifier.engines.told import told_context
 
     return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
-
-
-def _numerical(name: str, problem: Problem, seed: int) -> Engine:
-    """Make an engine without a language model; one that uses robustness also aims at unmet conditions."""
-    engine = make_engine(name, problem, seed=seed)
-    if not ENGINES[name].uses_robustness or not can_aim(problem):
-        return engine
-    return Aiming(engine, problem, lambda aim: make_engine(name, aim, seed=seed + _AIM_SEED))
 
 
 def check_names(request: RunRequest) -> None:

@@ -3,7 +3,6 @@
 Parts of the requirement that never had a say, and inputs and parameters without an effect on it.
 """
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -57,7 +56,6 @@ class Vacuity:
         self._highest: list[_Moment | None] = [None] * len(self._parts)
         self._effects = Effects(problem)
         self._count = 0
-        self._aimed: Counter[str] = Counter()
         self._robustness: set[float] = set()
         self._first: dict[str, NDArray[np.float64]] = {}
         self._moved: set[str] = set()
@@ -68,7 +66,6 @@ class Vacuity:
         if verdict is None or trajectory is None:
             return
         self._count += 1
-        self._aimed[evaluation.candidate.aim] += 1
         self._effects.see(evaluation.candidate, trajectory)
         if len(self._robustness) <= 1:
             self._robustness.add(verdict.robustness)
@@ -169,7 +166,6 @@ class Vacuity:
             f"The condition {watched.part.formula} never held {self._in_all()}, so {watched.formula} was not "
             "tested. It must hold at some time",
             "it was false",
-            aim=watched.part.formula,
         )
 
     def _disjunct(self, i: int) -> Finding:
@@ -181,7 +177,6 @@ class Vacuity:
             "was not tested. It must fail at some time",
             "it held",
             held=True,
-            aim=Not(watched.part.formula),
         )
 
     def _far(self, i: int) -> Finding:
@@ -204,7 +199,6 @@ class Vacuity:
         off: str,
         *,
         held: bool = False,
-        aim: Formula | None = None,
     ) -> Finding:
         """Return the finding about a part: what was not tested, and how close the part came to changing.
 
@@ -214,18 +208,15 @@ class Vacuity:
             what: what was not tested, in words.
             off: how its margin is said if its values are not telling.
             held: whether it was always true; otherwise it never was.
-            aim: what a search that aims at the part makes true.
         """
         formula = self._parts[i].part.formula
         moment = (self._lowest if held else self._highest)[i]
         assert moment is not None, "a part is judged after it has been seen"
         margin = float(self._lows[i] if held else -self._highs[i])
         near = _reached(formula, moment.values) or f"{off} by {shown(margin):.6g}"
-        aimed = self._aimed[str(aim)]
         return Finding(
             kind=kind,
-            text=f"{what}; at the closest, {near} {_when(moment)}."
-            + (f" {counted(aimed, 'simulation')} aimed at it." if aimed else ""),
+            text=f"{what}; at the closest, {near} {_when(moment)}.",
             part=str(formula),
             margin=margin,
             time=moment.time,

@@ -144,16 +144,13 @@ class News:
                 yield from self.kept(event)
 
     def kept(self, event: Event) -> Iterator[str]:
-        """Yield what should stay on the screen: choices, levels, aims, warnings and confirmations."""
+        """Yield what should stay on the screen: choices, levels, warnings and confirmations."""
         match event:
             case RunStarted():
                 self._started, self._since = event, Spent()
                 yield from _choices(event)
             case Asked():
                 yield from self._levels(event)
-                new = {c.aim: c for c in event.candidates if c.aim and c.aim not in self._told}
-                self._told |= new.keys()
-                yield from (f"{event.problem.name}: {c.rationale.partition(': ')[0]}" for c in new.values())
             case Evaluated(spent=spent) if spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed:
                 yield from self._once(
                     "mostly failed",
