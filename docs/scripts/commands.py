@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from falsifier.cli import cli
-from falsifier.cli.options import OPTION_GROUPS, option_groups
+from falsifier.cli.command import OPTION_GROUPS, option_groups
 
 _LIST, _MARK = "<!-- command list -->", "<!-- commands -->"
 _UNWRAPPED = "\b\n"

@@ -7,11 +7,11 @@ from typing import Any
 
 import click
 
+from falsifier.cli.command import command
 from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
-    command,
     json_option,
     out_option,
     problem_options,
@@ -27,12 +27,12 @@ from falsifier.core.arguments import finite
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.errors import SpecError
+from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
-from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.journal import MANIFEST, holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
@@ -157,13 +157,22 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     Raises:
         click.UsageError: if options change the problem of a run, a requirement is chosen from no run, or none
             of a run that searched several.
+        JournalError: if the target is a folder without a run.
         SpecError: if the run's problem was made in Python.
     """
     place = Path(options["target"])
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
             raise click.UsageError("--requirement applies to run directories only; TARGET is not one")
-        return load_source(problem_source(options)), []
+        try:
+            return load_source(problem_source(options)), []
+        except SpecError:
+            if not place.is_dir():
+                raise
+            raise JournalError(
+                f"{place}: not a run directory: it contains no {MANIFEST}; expected a run, a spec, an "
+                "FMU or a bundled name"
+            ) from None
     unset = {"target": None, "parameterized": Parameterized(kind=DEFAULT_PARAMETERIZATION)}
     changed = [
         name for name, value in options.items() if name != "target" and value and value != unset.get(name)

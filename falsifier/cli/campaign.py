@@ -30,6 +30,7 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.request import as_searched
 from falsifier.campaigns.runner import check_request
+from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     asking,
     asking_options,
@@ -44,7 +45,6 @@ from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
-    command,
     directory_argument,
     engine_option,
     executor_option,

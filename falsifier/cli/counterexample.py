@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.cli.command import command
 from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
 from falsifier.cli.llm_options import api_base_option, llm_option, name_and_effort
 from falsifier.cli.options import (
     budget_option,
-    command,
     interface_option,
     json_option,
     out_option,

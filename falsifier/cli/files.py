@@ -61,11 +61,22 @@ def checked_picture(path: Path) -> Path:
     """Return the path of a picture to write.
 
     Raises:
-        SpecError: if its ending states no format that can be drawn.
+        SpecError: if its ending states no format that can be drawn, or its folder does not exist.
     """
-    if path.suffix.lower() in PICTURES:
-        return path
-    raise SpecError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    if path.suffix.lower() not in PICTURES:
+        raise SpecError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    return in_existing_folder(path)
+
+
+def in_existing_folder(path: Path) -> Path:
+    """Return the path of a file to write.
+
+    Raises:
+        SpecError: if its folder does not exist.
+    """
+    if not path.parent.is_dir():
+        raise SpecError(f"{path}: no such folder {path.parent}: choose another --out, or make it first")
+    return path
 
 
 def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:

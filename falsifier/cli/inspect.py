@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.files import checked_picture
+from falsifier.cli.command import command
+from falsifier.cli.files import checked_picture, in_existing_folder
 from falsifier.cli.options import (
-    command,
     json_option,
     out_option,
     policy_changes,
@@ -119,10 +119,7 @@ def _draw_diagram(system: "System", out: Path | None) -> None:
         return
     from falsifier.views.plotting import plot_diagram, save_figure
 
-    try:
-        save_figure(plot_diagram(found), out)
-    except OSError as error:
-        raise SpecError(f"{out} cannot be written: {error.strerror}") from None
+    save_figure(plot_diagram(found), out)
     say(f"picture: {out}")
 
 
@@ -148,8 +145,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     from falsifier.problem.writing import problem_of_starter
 
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
-    if not path.parent.is_dir():
-        raise SpecError(f"{path}: no such folder {path.parent}: choose another --out, or make it first")
+    in_existing_folder(path)
     if path.exists():
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)

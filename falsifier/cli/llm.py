@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     anonymous_option,
     connection_options,
@@ -17,7 +18,6 @@ from falsifier.cli.llm_options import (
     variant_option,
 )
 from falsifier.cli.options import (
-    command,
     json_option,
     problem_source,
     requirement_options,

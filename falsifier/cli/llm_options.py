@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from falsifier.cli.options import Decorator, Function, add, repeatable
+from falsifier.cli.command import Decorator, Function, add
+from falsifier.cli.options import (
+    repeatable,
+)
 from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
@@ -18,6 +21,9 @@ if TYPE_CHECKING:
 
 # What a price is, in errors; as providers state prices.
 _PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and received, for example 0.25:2"
+
+# Words after an @ that are versions of a model, as Vertex AI has them.
+_VERSIONS = ("default", "latest")
 
 
 def llm_option(*, multiple: bool = False) -> Decorator:
@@ -96,13 +102,20 @@ def llm_options(command: Function) -> Function:
 
 
 def name_and_effort(text: str) -> tuple[str, str | None]:
-    """Split ``NAME[@EFFORT]``; any other text after an @ belongs to the name.
+    """Split ``NAME[@EFFORT]``; a version or a path after an @ belongs to the name.
+
+    Raises:
+        click.UsageError: if a word after an @ is neither an effort nor a version.
 
     >>> name_and_effort("openai/gpt-5-mini@low"), name_and_effort("vertex_ai/model@001")
     (('openai/gpt-5-mini', 'low'), ('vertex_ai/model@001', None))
     """
     name, _, level = text.rpartition("@")
-    return (name, level) if name and level in get_args(Effort) else (text, None)
+    if name and level in get_args(Effort):
+        return name, level
+    if name and level.isalpha() and level not in _VERSIONS:
+        raise click.UsageError(f"{text}: unknown effort {level!r}; {did_you_mean(level, get_args(Effort))}")
+    return text, None
 
 
 def connection_settings(options: dict[str, Any]) -> "LLMSettings | None":

@@ -7,8 +7,13 @@ import click
 
 from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.archcomp import export
+from falsifier.cli.command import command
 from falsifier.cli.files import check_out, checked_picture, draw
-from falsifier.cli.options import command, directory_argument, json_option, out_option
+from falsifier.cli.options import (
+    directory_argument,
+    json_option,
+    out_option,
+)
 from falsifier.cli.output import say
 from falsifier.record import manifest
 from falsifier.views.analyses_text import coverage_json, coverage_text

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.analyses.lint import LintFinding, lint
+from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     connection_options,
     connection_settings,
@@ -18,7 +19,6 @@ from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
-    command,
     json_option,
     out_option,
     parameterization_option,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from falsifier.cli.command import Command, command
 from falsifier.cli.llm_options import (
     check_context,
     context_option,
@@ -16,9 +17,7 @@ from falsifier.cli.llm_options import (
     refuse_limits_without_llm,
 )
 from falsifier.cli.options import (
-    Command,
     budget_option,
-    command,
     directory_argument,
     engine_option,
     executor_option,

@@ -8,9 +8,9 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
+from falsifier.cli.command import command
 from falsifier.cli.files import draw_evaluation
 from falsifier.cli.options import (
-    command,
     inputs_option,
     json_option,
     out_option,

@@ -11,8 +11,14 @@ from falsifier.campaigns.archcomp import Revalidated, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
 from falsifier.campaigns.published import PROTOCOL_SIMULATIONS
+from falsifier.cli.command import command
 from falsifier.cli.inspect import one_fmu
-from falsifier.cli.options import budget_option, command, directory_argument, json_option, out_option
+from falsifier.cli.options import (
+    budget_option,
+    directory_argument,
+    json_option,
+    out_option,
+)
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted

@@ -32,6 +32,12 @@ from tests.command import ROOT, falsifier
         (["init", "AT.fmu", "--out", "gone/x.toml"], "no such folder gone"),
         (["explain", "."], "not a run directory: it contains no confirmed counterexample"),
         (["coverage", "gone"], "gone: no such directory; expected that of a run"),
+        (["assess", "."], ".: not a run directory: it contains no manifest.json; expected"),
+        (
+            ["run", "AT1", "--llm", "openai/x@hgih"],
+            "unknown effort 'hgih'; did you mean 'high'?",
+        ),
+        (["bench", "AT1", "--llm", "openai/x@deep"], "unknown effort 'deep'; known: none, minimal, low"),
         (["margin", "AT1", "--stl", "G (speed <= {limit})", "--between", "nan:1"], "expected LOW:HIGH"),
         (["run", "AT1", "--set", "throttle=nan"], "--set throttle=nan: expected a finite number"),
         (["lint", "AT1"], "use falsifier check"),

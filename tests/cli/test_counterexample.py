@@ -149,6 +149,8 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["explain", "run", "--map", "--budget", "99999999999"], "is not in the range 1<="),
         (["explain", "run", "--map", "--budget", "6"], "a map needs at least 7 simulations"),
         (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
+        (["explain", "run", "--map", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
+        (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["coverage", "run", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["coverage", "run", "--out", "x"], "x: expected a file name that ends in .svg"),
     ],

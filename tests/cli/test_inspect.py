@@ -147,7 +147,7 @@ def test_info_draws_a_system_as_text_and_as_a_picture(tmp_path: Path) -> None:
             "s.txt: expected a file name that ends in .svg, .png",
         ),
         (("SharedFeeder", "--diagram", "--json"), "leave out --json, --check and --all"),
-        (("SharedFeeder", "--diagram", "--out", "no/s.svg"), "no/s.svg cannot be written: No such file"),
+        (("SharedFeeder", "--diagram", "--out", "no/s.svg"), "no/s.svg: no such folder no"),
     ],
 )
 def test_info_says_why_it_does_not_draw(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
 """What all figures share: colours, new axes, text, files; without pyplot, which keeps global state."""
 
 import textwrap
+import warnings
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 
@@ -67,13 +68,13 @@ def figure_of(ax: "Axes") -> "Figure":
 
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write a figure; the file extension determines the format."""
-    figure.savefig(path, dpi=130)
+    _save(figure, path, dpi=130)
 
 
 def png(figure: "Figure", *, dpi: int) -> bytes:
     """Return a figure as the content of a PNG file."""
     buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi)
+    _save(figure, buffer, format="png", dpi=dpi)
     return buffer.getvalue()
 
 
@@ -83,5 +84,12 @@ def svg(figure: "Figure") -> bytes:
 
     buffer = BytesIO()
     with rc_context({"svg.hashsalt": "falsifier"}):
-        figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
+        _save(figure, buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
+
+
+def _save(figure: "Figure", place: Path | BytesIO, **options: Any) -> None:
+    """Draw a figure; characters that the font lacks, as in names of signals, become boxes without a word."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        figure.savefig(place, **options)

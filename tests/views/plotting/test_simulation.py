@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
@@ -213,6 +214,12 @@ def test_the_panels_of_a_system_are_headed_by_their_components() -> None:
     named = [head for head in heads if head[1]]
     assert [name for name, _ in named] == ["plant", "pi", ""]
     assert named[0][1].startswith("plant.y") and named[2][1].startswith("pi.r")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_name_in_characters_that_the_font_lacks_is_no_warning() -> None:
+    times = np.linspace(0.0, 1.0, 3)
+    assert png(plot_trajectory(Trajectory(times, {"\N{CJK UNIFIED IDEOGRAPH-6E29}": times})), dpi=50)
 
 
 def test_a_trajectory_has_a_panel_for_each_signal_with_its_unit() -> None:

@@ -1,0 +1,79 @@
+"""Commands: their help in groups, the check of their arguments, and how options are added to them."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import click
+
+Function = Callable[..., Any]
+Decorator = Callable[[Function], Function]
+
+# Headings of --help, for commands with many options; what is in none of them belongs to the command itself.
+OPTION_GROUPS = {
+    "What is searched": (
+        *("--stl", "--template", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
+        *("--output-interval", "--time-limit", "--allow", "--deny"),
+    ),
+    "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs", "--executor"),
+    "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),
+    "Language model": (
+        *("--llm", "--variant", "--context", "--anonymous", "--fallback", "--api-base", "--llm-option"),
+        "--yes",
+    ),
+    "Output": ("--out", "--table", "--fmu-log", "--quiet", "--json", "--help"),
+}
+# From this number of options on, --help has headings.
+_MANY = 12
+
+
+class Command(click.Command):
+    """A command whose help lists many options in groups, and that refuses empty arguments."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse the arguments.
+
+        Raises:
+            click.UsageError: if one is empty: as a path it would mean the current folder.
+        """
+        for before, given in zip(["", *args], args, strict=False):
+            if not given or (given.startswith("--") and given.find("=") == len(given) - 1):
+                option = given.removesuffix("=") or (before if before.startswith("-") else "")
+                empty = f"{option}: the value is empty" if option else "an argument is empty"
+                raise click.UsageError(
+                    f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)",
+                    ctx,
+                )
+        return super().parse_args(ctx, args)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options below their headings."""
+        for heading, rows in option_groups(self, ctx):
+            with formatter.section(heading):
+                formatter.write_dl(rows)
+
+
+def option_groups(command: click.Command, ctx: click.Context) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Return the headings of a command's options, each with the names and meanings below it."""
+    options = [p for p in command.get_params(ctx) if isinstance(p, click.Option)]
+    rows = {p.opts[-1]: record for p in options if (record := p.get_help_record(ctx))}
+    if len(rows) < _MANY:
+        return [("Options", list(rows.values()))]
+    grouped = {name for names in OPTION_GROUPS.values() for name in names}
+    own = [row for name, row in rows.items() if name not in grouped]
+    groups = {"Options": own} | {
+        heading: [row for name, row in rows.items() if name in names]
+        for heading, names in OPTION_GROUPS.items()
+    }
+    return [(heading, group) for heading, group in groups.items() if group]
+
+
+# Makes a command of a function.
+command = partial(click.command, cls=Command)
+
+
+def add(command: Function, *decorators: Decorator) -> Function:
+    """Add options to a command; --help lists them in this order."""
+    for decorate in reversed(decorators):
+        command = decorate(command)
+    return command
