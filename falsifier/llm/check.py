@@ -7,7 +7,7 @@ from typing import Any
 
 from falsifier.errors import ChatError
 from falsifier.llm.connect import connect
-from falsifier.llm.lenient import json_objects, without_thoughts
+from falsifier.llm.json_text import json_objects, without_thoughts
 from falsifier.llm.litellm_adapter import listed_price
 from falsifier.llm.messages import MODES, UNREADABLE, Chat, ChatReply, ChatRequest, Message, Tool, Usage
 from falsifier.llm.model_file import is_model_file

@@ -15,7 +15,7 @@ from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.lenient import json_objects, repaired, without_thoughts
+from falsifier.llm.json_text import json_objects, repaired, without_thoughts
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.numbers import number
 from falsifier.problem.template_advice import WHAT_CANNOT_BE_SAID

@@ -28,7 +28,7 @@ from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSp
 from falsifier.core.words import counted
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.lenient import json_objects, repaired, without_thoughts
+from falsifier.llm.json_text import json_objects, repaired, without_thoughts
 
 _POINT_TAG = re.compile(r"<(/?)point>", re.IGNORECASE)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
