@@ -116,8 +116,8 @@ def prompt(
 
 def _lessons(records: Sequence["Record"]) -> str:
     """What the language model wrote down last in a run."""
+    from falsifier.llm.candidate_text import lessons_in
     from falsifier.llm.messages import Exchange
-    from falsifier.llm.replies import lessons_in
     from falsifier.record.records import ExchangeRecord
 
     exchanges = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]

@@ -7,7 +7,7 @@ from typing import Any
 
 from falsifier.errors import ChatError
 from falsifier.llm.connect import connect
-from falsifier.llm.json_text import json_objects, without_thoughts
+from falsifier.llm.json_text import objects_in, schema_of_list, schema_of_object, without_thoughts
 from falsifier.llm.litellm_adapter import listed_price
 from falsifier.llm.messages import MODES, UNREADABLE, Chat, ChatReply, ChatRequest, Message, Tool, Usage
 from falsifier.llm.model_file import is_model_file
@@ -19,24 +19,11 @@ _SHORT, _CUT = 4000, 8
 _LONGEST_SHOWN = 60
 # In s; a run waits longer.
 _TIMEOUT = 60.0
-_SCHEMA = {
-    "type": "object",
-    "properties": {
-        "values": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
-        "rationale": {"type": "string"},
-    },
-    "required": ["values", "rationale"],
-    "additionalProperties": False,
-}
+_SCHEMA = schema_of_object(values=schema_of_list({"type": "number"}, 3, 3), rationale={"type": "string"})
 _TOOL = Tool(
     name="measure",
     description="Measures the temperature.",
-    parameters={
-        "type": "object",
-        "properties": {"place": {"type": "string"}},
-        "required": ["place"],
-        "additionalProperties": False,
-    },
+    parameters=schema_of_object(place={"type": "string"}),
 )
 _ASKED = (
     'Reply with one JSON object in this form, with three numbers that sum to 6: {"values": [3 numbers], '
@@ -155,11 +142,11 @@ def _on_answer(reply: ChatReply) -> Feature:
             else "null"
         )
         return _fails("answer", f"empty ({why})")
-    found = [one for one in json_objects(text) if isinstance(one.get("values"), list)]
-    if not found:
+    found = (one.get("values") for one in objects_in(text) if isinstance(one, dict))
+    values = next((one for one in found if isinstance(one, list)), None)
+    if values is None:
         return _fails("answer", f"not the JSON that was asked for {how}: {_shown(text)}")
     place = "" if reply.text.strip() else ", in the reasoning instead of the content"
-    values = found[-1]["values"]
     if len(values) != 3:
         return _works("answer", f"JSON asked for {how}{place}, but {len(values)} values instead of 3")
     return _works("answer", f"JSON asked for {how}{place}")

@@ -14,6 +14,7 @@ from falsifier.llm.failures import (
     UnreadableReplyError,
     classify,
 )
+from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
     calls_in,
     dropped_parameters,
@@ -34,7 +35,6 @@ from falsifier.llm.messages import (
     Usage,
     below,
     cleaned,
-    without_limits,
 )
 from falsifier.llm.providers import find_key, known, provider_of
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, Gate, retried

@@ -15,7 +15,7 @@ from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.json_text import json_objects, repaired, without_thoughts
+from falsifier.llm.json_text import objects_in, schema_of_list, schema_of_object
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.numbers import number
 from falsifier.problem.template_advice import WHAT_CANNOT_BE_SAID
@@ -160,16 +160,17 @@ class ReadingsReply(_Reply):
 
 def readings_schema() -> dict[str, Any]:
     """Return the JSON Schema of a reply, within the subset of strict servers."""
-    text, numbers = {"type": "string"}, {"type": "array", "items": {"type": "number"}}
-    signals = _list(_object(name=text, times=numbers, values=numbers))
-    reading = _object(
+    text = {"type": "string"}
+    numbers = schema_of_list({"type": "number"})
+    signals = schema_of_list(schema_of_object(name=text, times=numbers, values=numbers))
+    reading = schema_of_object(
         formula=text,
         meaning=text,
-        units=_list(_object(signal=text, unit=text)),
+        units=schema_of_list(schema_of_object(signal=text, unit=text)),
         satisfied=signals,
         violated=signals,
     )
-    return _object(readings=_list(reading), cannot=text)
+    return schema_of_object(readings=schema_of_list(reading), cannot=text)
 
 
 def read_readings(text: str) -> list[ReadingReply]:
@@ -179,12 +180,11 @@ def read_readings(text: str) -> list[ReadingReply]:
         RejectedReplyError: if it contains none, or they are not of the required form.
         SpecError: if it says that no formula can say it.
     """
-    text = without_thoughts(text)
-    found = [o for o in (*json_objects(text), repaired(text)) if isinstance(o, dict) and "readings" in o]
-    if not found:
+    found = next((o for o in objects_in(text) if isinstance(o, dict) and "readings" in o), None)
+    if found is None:
         raise RejectedReplyError('it contains no JSON object with "readings"')
     try:
-        reply = ReadingsReply.model_validate(found[-1])
+        reply = ReadingsReply.model_validate(found)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
@@ -216,16 +216,3 @@ def example_trajectory(
             raise RejectedReplyError(f"the example's signal {name!r} needs as many times as values, in order")
         columns[name] = np.interp(times, found.times, found.values)
     return Trajectory(times, columns)
-
-
-def _object(**properties: Any) -> dict[str, Any]:
-    return {
-        "type": "object",
-        "properties": properties,
-        "required": list(properties),
-        "additionalProperties": False,
-    }
-
-
-def _list(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items}

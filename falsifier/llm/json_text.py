@@ -1,8 +1,8 @@
-"""JSON objects in what a language model wrote: as they stand, else with mistakes that are unambiguous.
+"""JSON that a language model is asked for, as schemas, and JSON in what it wrote.
 
-A reply has been paid for, so a trailing comma, a comment, quotes of another kind or YAML do not cost another
-one. What could mean several things is left to be rejected: objects that are cut off, omissions such as
-``...``, and arithmetic.
+Objects are read as they stand, else with mistakes that are unambiguous. A reply has been paid for, so a
+trailing comma, a comment, quotes of another kind or YAML do not cost another one. What could mean several
+things is left to be rejected: objects that are cut off, omissions such as ``...``, and arithmetic.
 """
 
 import json
@@ -18,10 +18,49 @@ _INNER_LIST = re.compile(r"\[([^\[\]{}\"']*)\]")
 _LIST_WORD = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?|null|None|true|false", re.ASCII)
 # Punctuation of East Asian typing and of word processors.
 _PLAIN = str.maketrans("｛｝［］：，＂“”„‘’（）", '{}[]:,""""\'\'()')
+# Keywords of a schema that not every server takes.
+_LIMITS = frozenset({"minItems", "maxItems", "minimum", "maximum"})
 # How often the text of a reply may be read again in search of JSON, counted in its length.
 _READINGS = 20
 # The repair of a hostile text takes a time that grows with the square of its length.
 _LONGEST_REPAIRED = 10_000
+
+
+def schema_of_object(**properties: Any) -> dict[str, Any]:
+    """Return a schema that strict servers take: all keys are required, and no others allowed."""
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+        "additionalProperties": False,
+    }
+
+
+def schema_of_list(
+    items: dict[str, Any], least: int | None = None, most: int | None = None
+) -> dict[str, Any]:
+    """Return the schema of a list, with the number of its items as far as it is limited."""
+    limits = {"minItems": least, "maxItems": most}
+    return {"type": "array", "items": items, **{k: n for k, n in limits.items() if n is not None}}
+
+
+def without_limits(schema: Any) -> Any:
+    """Return a schema without numbers of items and ranges of numbers, which not every server takes."""
+    if isinstance(schema, list):
+        return [without_limits(part) for part in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {key: without_limits(part) for key, part in schema.items() if key not in _LIMITS}
+
+
+def objects_in(text: str) -> Iterator[Any]:
+    """What a reply may mean outside of its thoughts, the best guess first.
+
+    The last object counts, as reasoning may show drafts before it; then what can be read in one way only.
+    """
+    text = without_thoughts(text)
+    yield from reversed(list(json_objects(text)))
+    yield repaired(text)
 
 
 def without_thoughts(text: str) -> str:

@@ -15,8 +15,6 @@ Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["bounded_schema", "json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
-# Keywords of a schema that not every server takes; ``bounded_schema`` asks with them.
-_LIMITS = frozenset({"minItems", "maxItems", "minimum", "maximum"})
 # Finish reason of a reply that the server could not parse in the form that was asked for.
 UNREADABLE = "unreadable"
 # Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
@@ -239,15 +237,6 @@ def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
             "echo": echo(reply.echo),
         }
     )
-
-
-def without_limits(schema: Any) -> Any:
-    """A schema without numbers of items and ranges of numbers, which not every server takes."""
-    if isinstance(schema, list):
-        return [without_limits(part) for part in schema]
-    if not isinstance(schema, dict):
-        return schema
-    return {key: without_limits(part) for key, part in schema.items() if key not in _LIMITS}
 
 
 class Chat(Protocol):

@@ -349,7 +349,7 @@ ROWS = re.findall(
 
 
 @pytest.mark.parametrize(
-    ("name", "reply"), odd_replies(), ids=lambda value: value if isinstance(value, str) else ""
+    ("name", "reply"), list(odd_replies()), ids=lambda value: value if isinstance(value, str) else ""
 )
 def test_odd_replies_are_read_or_told_as_the_table_says(name: str, reply: ChatReply) -> None:
     assert outcome(reply).replace("|", "/") == dict(ROWS)[name]

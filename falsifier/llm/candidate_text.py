@@ -1,0 +1,272 @@
+"""Candidates as a language model writes them: JSON of several forms, or numbers between ``<point>`` tags.
+
+What is read here is not compared with a search space yet; ``replies`` does that.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from math import isfinite
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationError
+
+from falsifier.core.literals import printable
+from falsifier.core.signals import Interpolation
+from falsifier.llm.conversation import RejectedReplyError
+from falsifier.llm.json_text import objects_in, without_thoughts
+
+_POINT_TAG = re.compile(r"<(/?)point>", re.IGNORECASE)
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
+_RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*", re.ASCII)
+# Numbers and runs are written with fewer characters; for longer texts the expressions above would take a time
+# that grows with the square of the length.
+LONGEST_NUMBER = 64
+_LONGEST_RUN = 100_000
+_LONGEST_RATIONALE = 2000
+# More candidates than any question asks for; those beyond are not read.
+_MOST_CANDIDATES = 1000
+# Characters before the place where JSON breaks off that are told, and keys.
+_SHOWN_BEFORE, _SHOWN_KEYS = 24, 10
+# Keys of a candidate, of what stands beside candidates, and of the parts of a candidate.
+_PARTS = frozenset({"signals", "parameters", "point"})
+_BESIDE = frozenset({"lessons", "keep"})
+_KEYS = _PARTS | _BESIDE | {"candidates", "rationale"}
+_KEYS |= {"name", "values", "value", "times", "points", "interpolation"}
+
+
+def _unrolled(found: Any) -> Any:
+    """Numbers, with runs such as ``"0 x 187"`` expanded; what is no list is left to be rejected."""
+    if not isinstance(found, list):
+        return found
+    numbers: list[Any] = []
+    for value in found:
+        if not isinstance(value, str):
+            numbers.append(value)
+        elif len(value) <= LONGEST_NUMBER and (run := _RUN.fullmatch(value)):
+            count = float(run[2])
+            if len(numbers) + count > _LONGEST_RUN:
+                raise RejectedReplyError(f"{value!r} makes the signal longer than {_LONGEST_RUN} values")
+            numbers += [float(run[1])] * int(count)
+        elif len(value) <= LONGEST_NUMBER and _NUMBER.fullmatch(number := value.strip()):
+            numbers.append(float(number))
+        else:
+            raise RejectedReplyError(f"{quoted(value)} is neither a number nor a run such as '0 x 187'")
+    return numbers
+
+
+def _signals_by_name(found: Any) -> Any:
+    """Convert ``{name: values}`` and [time, value] pairs, which LLMs also write, to the listed form."""
+    if isinstance(found, dict):
+        found = [{"name": k, **(v if isinstance(v, dict) else {"values": v})} for k, v in found.items()]
+    return [_pairs_apart(s) for s in found] if isinstance(found, list) else found
+
+
+def _pairs_apart(signal: Any) -> Any:
+    if not isinstance(signal, dict):
+        return signal
+    signal = _plain_keys(signal)
+    values = signal.get("values", signal.get("points"))
+    if isinstance(values, int | float):
+        return {**signal, "values": [values]}
+    if isinstance(values, list) and values and all(isinstance(v, list) and len(v) == 2 for v in values):
+        rest = {k: v for k, v in signal.items() if k != "points"}
+        return {**rest, "times": [t for t, _ in values], "values": [v for _, v in values]}
+    return signal
+
+
+def _parameters_by_name(found: Any) -> Any:
+    if isinstance(found, dict):
+        return [{"name": k, "value": v} for k, v in found.items()]
+    return [_plain_keys(p) if isinstance(p, dict) else p for p in found] if isinstance(found, list) else found
+
+
+def _storable(text: str) -> str:
+    """The text up to a maximum length, as files can hold and terminals can show it."""
+    return printable(text[: 2 * _LONGEST_RATIONALE])[:_LONGEST_RATIONALE]
+
+
+class _Part(BaseModel):
+    # A misspelt key within a part would change what is simulated.
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+
+
+class WrittenSignal(_Part):
+    """One signal."""
+
+    name: str
+    values: Annotated[list[float], FailFast(), BeforeValidator(_unrolled)]
+    times: Annotated[list[float] | None, FailFast()] = None
+    interpolation: Interpolation | None = None
+
+
+class WrittenParameter(_Part):
+    """One parameter."""
+
+    name: str
+    value: float
+
+
+class WrittenCandidate(BaseModel):
+    """One candidate; unknown keys are ignored, not worth paying for another reply."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
+
+    rationale: Annotated[str, BeforeValidator(lambda found: found or ""), AfterValidator(_storable)] = ""
+    signals: Annotated[list[WrittenSignal], FailFast(), BeforeValidator(_signals_by_name)] = Field(
+        default_factory=list
+    )
+    parameters: Annotated[list[WrittenParameter], FailFast(), BeforeValidator(_parameters_by_name)] = Field(
+        default_factory=list
+    )
+    point: Annotated[list[float] | None, FailFast(), BeforeValidator(_unrolled)] = None
+
+
+def candidates_in(text: str, *, points: bool, count: int) -> list[WrittenCandidate | RejectedReplyError]:
+    """Read the candidates of a reply in order; one that cannot be read is replaced by what is wrong with it.
+
+    Args:
+        text: the reply.
+        points: whether numbers between tags were asked for, not JSON; the other form is read too.
+        count: number of points that were asked for.
+
+    Raises:
+        RejectedReplyError: if the reply contains no candidate, valid or not.
+    """
+    text = without_thoughts(text)
+    found: Sequence[str | dict[str, Any]]
+    if points:
+        # Reasoning may contain drafts before what is meant, and speak of the tags.
+        found = _points(text)[-count:] or _objects(text)
+        missing, where = "numbers between <point> and </point>", " between <point> and </point>"
+    else:
+        found = _objects(text) or _points(text)
+        missing, where = "JSON object with a candidate", ""
+    if not found:
+        raise RejectedReplyError(f"it contains no {missing}{'' if points else _other_keys(text)}")
+    each: list[WrittenCandidate | RejectedReplyError] = []
+    for one in found:
+        try:
+            each.append(
+                WrittenCandidate(point=_numbers(one, where)) if isinstance(one, str) else _validated(one)
+            )
+        except RejectedReplyError as rejection:
+            each.append(rejection)
+    return each
+
+
+def lessons_in(text: str) -> str:
+    """What an LLM wrote down for its next question; empty if it did not."""
+    return printable(str(_beside(text).get("lessons") or "")[:_LONGEST_RATIONALE])
+
+
+def kept_in(text: str) -> list[int]:
+    """Numbers of the earlier candidates on which an LLM insists."""
+    found = _beside(text).get("keep")
+    numbers = found if isinstance(found, list) else []
+    return [int(n) for n in numbers if isinstance(n, int | float) and isfinite(n) and n == int(n)]
+
+
+def _beside(text: str) -> dict[str, Any]:
+    """What a reply says beside its candidates."""
+    objects = (_plain_keys(one) for one in objects_in(text) if isinstance(one, dict))
+    return next((one for one in objects if _BESIDE & one.keys()), {})
+
+
+def _objects(text: str) -> list[dict[str, Any]]:
+    return next((found for one in objects_in(text) if (found := _candidates_of(one))), [])
+
+
+def _candidates_of(found: Any) -> list[dict[str, Any]]:
+    """Candidates that an object is or contains, or that a list without a key consists of."""
+    if isinstance(found, dict):
+        found = _plain_keys(found)
+        several = found.get("candidates")
+        if isinstance(several, list) and several and all(isinstance(c, dict) for c in several):
+            return [_plain_keys(one) for one in several[:_MOST_CANDIDATES]]
+        return [found] if _PARTS & found.keys() else []
+    if not isinstance(found, list) or not found:
+        return []
+    if all(isinstance(one, int | float) for one in found):
+        return [{"point": found}]
+    objects = [_plain_keys(one) for one in found if isinstance(one, dict)]
+    if len(objects) < len(found):
+        return []
+    if all(_PARTS & one.keys() for one in objects):
+        return objects[:_MOST_CANDIDATES]
+    return [{"signals": objects}] if all({"name", "values"} <= one.keys() for one in objects) else []
+
+
+def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
+    """An object with known keys in the case in which they were asked for."""
+    names = {key: low for key in found if (low := str(key).lower()) in _KEYS and low not in found}
+    return {names.get(key, str(key)): value for key, value in found.items()}
+
+
+def _points(text: str) -> list[str]:
+    """What stands between the tags, or after the only one."""
+    found: list[str]
+    found, begun = [], -1
+    for tag in _POINT_TAG.finditer(text):
+        if not tag[1]:
+            begun = tag.end()
+        elif begun >= 0:
+            found.append(text[begun : tag.start()])
+            begun = -1
+    if begun >= 0 and not found:  # a model that stops at the end of the numbers
+        found.append(text[begun:])
+    return found[-_MOST_CANDIDATES:]
+
+
+def _numbers(text: str, where: str) -> list[float]:
+    """Numbers of a point; the tags are spoken of only if they were asked for."""
+    words = [w for w in re.split(r"[\s,;()\[\]]+", text) if w]
+    for word in words:
+        if len(word) > LONGEST_NUMBER or not _NUMBER.fullmatch(word):
+            raise RejectedReplyError(f"expected only numbers{where}, got {quoted(word)}")
+    numbers = [float(word) for word in words]
+    if not all(map(isfinite, numbers)):
+        raise RejectedReplyError(f"expected only finite numbers{where}")
+    return numbers
+
+
+def _validated(found: dict[str, Any]) -> WrittenCandidate:
+    try:
+        return WrittenCandidate.model_validate(found)
+    except ValidationError as error:
+        raise RejectedReplyError(_defect(error)) from None
+
+
+def _defect(error: ValidationError) -> str:
+    """What is wrong first, with the keys that are not known there: one of them may be what is missing."""
+    errors = error.errors(include_url=False, include_context=False, include_input=False)
+    first, place = errors[0], errors[0]["loc"][:-1]
+    text = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
+    unknown = [
+        quoted(str(e["loc"][-1])) for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == place
+    ]
+    if unknown and first["type"] == "missing":
+        text += f"; unknown there: {', '.join(unknown[:_SHOWN_KEYS])}"
+    return text
+
+
+def _other_keys(text: str) -> str:
+    """Why a reply without candidates has none: where its JSON breaks off, or which keys it has."""
+    start = text.find("{")
+    if start < 0:
+        return ""
+    try:
+        found, _ = json.JSONDecoder(parse_int=float).raw_decode(text, start)
+    except json.JSONDecodeError as error:
+        before = quoted(text[max(start, error.pos - _SHOWN_BEFORE) : error.pos + 1])
+        return f" that can be read: {error.msg} after {before}"
+    except RecursionError:
+        return ": it is nested too deeply"
+    keys = ", ".join(quoted(key) for key in list(found)[:_SHOWN_KEYS])
+    expected = ", ".join(repr(key) for key in sorted(_PARTS))
+    return f": its keys are {keys}; expected {expected} or 'candidates'" if found else ""
+
+
+def quoted(value: str) -> str:
+    """A rejected value as a message quotes it."""
+    return repr(value) if len(value) <= LONGEST_NUMBER else f"{value[:LONGEST_NUMBER]!r} ..."
