@@ -13,7 +13,7 @@ from mkdocs.exceptions import PluginError
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS
-from falsifier.llm.prompts.variants import Part
+from falsifier.llm.prompts.view import Part
 from falsifier.problem.sections import ModelChanges, ModelSection
 from falsifier.problem.spec import Spec
 

@@ -9,7 +9,7 @@ from falsifier.core.words import counted
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import Tool, ToolCall
 from falsifier.llm.prompts.numbers import number
-from falsifier.llm.prompts.variants import Variant
+from falsifier.llm.prompts.view import Variant
 from falsifier.llm.replies import ReplyForm
 from falsifier.stl import Verdict
 from falsifier.stl.margins import signed

@@ -103,7 +103,7 @@ def check_names(request: RunRequest) -> None:
         return
     if (engine or "llm") not in _LLM_ENGINES:
         raise SpecError(f"the engine {engine!r} does not use a language model: drop --llm or --engine")
-    from falsifier.llm.prompts.variants import variant_named
+    from falsifier.llm.prompts.view import variant_named
 
     variant_named(llm.variant)
     if llm.fallback in _LLM_ENGINES:
@@ -118,9 +118,8 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
         SpecError: if the cost is limited although the price is unknown.
         ChatError: for an unknown provider or a missing key.
     """
-    from falsifier.llm.cache import default_cache_directory
     from falsifier.llm.client import DEFAULT_TIMEOUT
-    from falsifier.llm.connect import connect, preflight
+    from falsifier.llm.connect import connect, default_cache_directory, preflight
     from falsifier.llm.usage import Price
 
     preflight(llm.name, api_base=llm.api_base)

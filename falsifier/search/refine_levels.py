@@ -24,7 +24,7 @@ def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Para
     if llm is None or engine == "hybrid":
         name = engine or DEFAULT_ENGINE
         return "fixed" if name in ENGINES and not ENGINES[name].is_free else "free"
-    from falsifier.llm.prompts.variants import variant_named
+    from falsifier.llm.prompts.view import variant_named
 
     is_free = variant_named(llm.variant).has("freedom")
     is_free |= llm.fallback is not None and engine_parameterization(llm.fallback, None) == "free"

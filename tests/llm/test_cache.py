@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError
-from falsifier.llm.cache import CachedChat
+from falsifier.llm.connect import CachedChat
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
 from falsifier.llm.replay import ScriptedChat

@@ -5,9 +5,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
-from falsifier.llm.cache import CachedChat
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.connect import connect, preflight
+from falsifier.llm.connect import CachedChat, connect, preflight
 
 
 @pytest.mark.parametrize(

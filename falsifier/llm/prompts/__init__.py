@@ -1,7 +1,6 @@
 """Prompts: what an LLM is sent; a constant part, the samples so far, and what is new."""
 
 from falsifier.llm.prompts.question import DEFAULT_PROMPT_TOKENS, Questions
-from falsifier.llm.prompts.variants import VARIANTS, Variant, variant_named
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import VARIANTS, Variant, View, variant_named
 
 __all__ = ["DEFAULT_PROMPT_TOKENS", "VARIANTS", "Questions", "Variant", "View", "variant_named"]

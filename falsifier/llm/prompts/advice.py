@@ -2,8 +2,7 @@
 
 from falsifier.core.space import InputRange
 from falsifier.core.words import listed
-from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.formula import Always, And, Formula, Implies
 
 

@@ -10,8 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import decimals_for
 from falsifier.llm.prompts.observations import compared_columns
-from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Always, Eventually, Formula, Until
 

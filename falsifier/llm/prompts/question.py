@@ -22,8 +22,7 @@ from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Observed, obse
 from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, published_facts
 from falsifier.llm.prompts.reached import Progress, Reached
 from falsifier.llm.prompts.standing import standing
-from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
 from falsifier.stl.margins import is_on_limit, margin_words, signed
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import counted
 from falsifier.llm import ReplyKind
-from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import Variant, View
 
 _RATIONALE = "why these values"
 _ALL_NOTE = "Every {} must be given in every reply, also those that stay as they were."

@@ -9,8 +9,7 @@ from falsifier.llm.prompts.advice import advice
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.published import clock
 from falsifier.llm.prompts.required_reply import reply_text
-from falsifier.llm.prompts.variants import Variant
-from falsifier.llm.prompts.view import View
+from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Next, Not, Or, Predicate, Until
 
