@@ -92,7 +92,7 @@ def info(
         return
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
-    found = replace(found, notes=(*found.notes, *_binary_notes(source), _rights_note(*rights)))
+    found = replace(found, notes=(*found.notes, _rights_note(*rights)))
     if as_json:
         say(info_json(found))
         return
@@ -248,17 +248,6 @@ def _rights_note(allow: Sequence[str], deny: Sequence[str]) -> str:
         return rights_text(allow, deny)
     except (MachineError, ModelError) as error:
         return f"FMUs cannot be simulated now: {error}"
-
-
-def _binary_notes(source: "Path | System") -> tuple[str, ...]:
-    """Return why binaries cannot be loaded on this machine; of a system, those of each component."""
-    from falsifier.fmu.description import binary_remarks
-
-    if isinstance(source, Path):
-        return binary_remarks(source)
-    return tuple(
-        f"{name}: {said}" for name, part in source.parts.items() for said in binary_remarks(part.fmu)
-    )
 
 
 def _named(given: Path) -> "Path | System":

@@ -202,7 +202,7 @@ def _check_interface(model: FmuModel) -> None:
 
 
 def _check_windows(model: FmuModel, description: Description) -> None:
-    if model.interface not in description.windows_libraries:
+    if model.interface not in description.libraries.windows:
         raise ModelError(
             f"{model.path}: the FMU has no library for {WINDOWS}, only "
             f"{', '.join(description.info.platforms) or 'no binaries at all'}"

@@ -165,8 +165,18 @@ def test_of_several_libraries_none_is_guessed(tmp_path: Path) -> None:
     shutil.copy(fixtures.path("OtherLibrary_2"), path)
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("binaries/linux64/helper.so", b"not a library")
-    assert read_info(path).notes == ()
+    (note,) = read_info(path).notes
+    assert note.startswith("binaries/linux64 contains helper.so, plant_win_and_linux.so")
     with pytest.raises(ModelError, match=r"contains helper\.so, plant_win_and_linux\.so, but not Other"):
+        run(FmuModel(path), ("y",))
+
+
+def test_a_library_that_is_not_installed_is_named_when_it_is_needed(tmp_path: Path) -> None:
+    path = tmp_path / "needy.fmu"
+    with zipfile.ZipFile(fixtures.path("Lag_2")) as good, zipfile.ZipFile(path, "w") as archive:
+        for name in good.namelist():
+            archive.writestr(name, good.read(name).replace(b"libc.so.6", b"libq.so.6"))
+    with pytest.raises(ModelError, match=r"the library cannot be loaded: libq\.so\.6: cannot open"):
         run(FmuModel(path), ("y",))
 
 

@@ -14,8 +14,6 @@ from falsifier.fmu.description.archive import (
 from falsifier.fmu.description.libraries import (
     HOW_TO_INSTALL,
     find_wine,
-    misnamed_text,
-    missing_binary_text,
     windows_path,
 )
 from falsifier.fmu.description.model_description import (
@@ -25,7 +23,6 @@ from falsifier.fmu.description.model_description import (
     read_description,
     read_info,
 )
-from falsifier.fmu.description.needed_libraries import binary_remarks
 from falsifier.fmu.description.structure import (
     Structure,
     Unit,
@@ -47,7 +44,6 @@ __all__ = [
     "Structure",
     "Unit",
     "Units",
-    "binary_remarks",
     "conversion",
     "describe",
     "entry_names",
@@ -56,8 +52,6 @@ __all__ = [
     "find_wine",
     "is_known",
     "library_file",
-    "misnamed_text",
-    "missing_binary_text",
     "needed_tool_text",
     "open_archive",
     "read_description",

@@ -8,7 +8,7 @@ import sys
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
@@ -59,6 +59,8 @@ _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
 # What is the machine's fault and not the archive's.
 _EXHAUSTED = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+# Enough for the header of a Windows library, which comes after a program for DOS.
+_FIRST_BYTES = 4096
 _FORBIDDEN_KINDS = {
     stat.S_IFLNK: "symbolic link",
     stat.S_IFIFO: "named pipe",
@@ -150,14 +152,23 @@ def entry_names(path: Path) -> tuple[str, ...]:
         return tuple(archive.namelist())
 
 
-def platforms(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the FMI 3 names (``x86_64-linux``) of the platforms for which the entries contain binaries."""
-    found = set()
-    for name in names:
-        parts = PurePosixPath(name).parts
-        if len(parts) == 3 and parts[0] == "binaries":
-            found.add(_OLD_PLATFORMS.get(parts[1], parts[1]))
-    return tuple(sorted(found))
+def first_bytes(path: Path, name: str) -> bytes:
+    """Return the first bytes of a file in an FMU, in which libraries say what they are for.
+
+    Raises:
+        ModelError: if the file is damaged.
+    """
+    with open_archive(path) as archive:
+        try:
+            with archive.open(name) as file:
+                return file.read(_FIRST_BYTES)
+        except UNREADABLE as error:
+            raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
+
+
+def platform_of(folder: str) -> str:
+    """Return the FMI 3 name (``x86_64-linux``) of the platform of a folder below ``binaries``."""
+    return _OLD_PLATFORMS.get(folder, folder)
 
 
 def this_platform() -> str:

@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from falsifier.core.model import Interface
@@ -16,90 +16,137 @@ HOW_TO_INSTALL = (
 
 # Debian's wine64 is in no folder of the search path.
 _DEBIAN = Path("/usr/lib/wine/wine64")
-# Where Wine's own libraries are, below a folder above its program.
-_OWN_LIBRARIES = ("lib*/wine/x86_64-windows", "lib*/*/wine/x86_64-windows")
+# Class with byte order, and machine, of ELF files (System V ABI); machine of PE files ("PE Format").
+_ELF = {
+    "x86_64-linux": (b"\2\1", b"\x3e\0"),
+    "aarch64-linux": (b"\2\1", b"\xb7\0"),
+    "x86-linux": (b"\1\1", b"\3\0"),
+}
+_PE_X86_64 = b"\x64\x86"
 # These are not part of a name, or of no name that Wine finds.
 _UNKNOWN = frozenset('\\"')
 
 
-def find_libraries(
-    names: Sequence[str], fmi_version: str, identifiers: Mapping[Interface, str], platform: str = ""
-) -> tuple[dict[Interface, PurePosixPath], tuple[str, ...]]:
-    """Look up the libraries among an FMU's entries; the only one for a platform may have any name.
+@dataclass(frozen=True, slots=True)
+class Libraries:
+    """Which files of an FMU are its libraries.
 
-    Args:
-        names: names of the entries.
-        fmi_version: FMI version of the FMU.
-        identifiers: model identifier by interface.
-        platform: FMI 3 name of the platform; empty for this one.
-
-    Returns:
-        The path of the library by interface, missing if there is none, and what the user should know.
+    Attributes:
+        here: path inside the archive of this platform's library, by interface; missing if there is none.
+        windows: the same for 64-bit Windows.
+        lacking: why there is none for this platform and what to do, by interface.
+        notes: what the user should know, one sentence each.
     """
-    libraries: dict[Interface, PurePosixPath] = {}
-    said: list[str] = []
-    for interface, identifier in identifiers.items():
-        expected = archive.library_file(fmi_version, identifier, platform)
-        found = _find(names, expected)
-        if found is None:
-            continue
-        libraries[interface] = found
-        if found != expected:
-            said.append(
-                f"its library is called {found.name}, not {expected.name}; it is the only one, so it is used"
-            )
-    return libraries, tuple(dict.fromkeys(said))
+
+    here: Mapping[Interface, PurePosixPath]
+    windows: Mapping[Interface, PurePosixPath]
+    lacking: Mapping[Interface, str]
+    notes: tuple[str, ...]
 
 
-def misnamed_text(names: Sequence[str], fmi_version: str, identifiers: Iterable[str]) -> str:
-    """Say that there are libraries that could run on this machine, but none with the right name.
+def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface, str]) -> Libraries:
+    """Look up the libraries in an FMU; the only one for a platform may have any name.
 
     Args:
-        names: names of the FMU's entries.
+        path: path of the FMU.
         fmi_version: its FMI version.
-        identifiers: model identifiers whose libraries are missing.
-
-    Returns:
-        The text; empty if there are no such libraries.
+        identifiers: model identifier by interface.
     """
-    for platform in (archive.this_platform(), *([archive.WINDOWS] if can_run_windows() else [])):
-        expected = [archive.library_file(fmi_version, i, platform) for i in dict.fromkeys(identifiers)]
-        found = sorted({path.name for place in expected for path in _beside(names, place)})
-        if found and not any(_find(names, place) for place in expected):
-            wanted = " or ".join(place.name for place in expected)
-            return (
-                f"{expected[0].parent} contains {', '.join(found)}, but not {wanted}, and the model "
-                "identifier tells which one to load: export the FMU again"
-            )
-    return ""
+    names = archive.entry_names(path)
+    places = {i: archive.library_file(fmi_version, name) for i, name in identifiers.items()}
+    windows_places = {
+        i: archive.library_file(fmi_version, name, archive.WINDOWS) for i, name in identifiers.items()
+    }
+    here, windows = _found(names, places), _found(names, windows_places)
+    through_wine = [i for i in windows if i not in here and can_run_windows()]
+    lacking = {
+        interface: _missing_text(
+            path.name,
+            names,
+            [place, *([windows_places[interface]] if can_run_windows() else [])],
+            needs_wine=interface in through_wine,
+        )
+        for interface, place in places.items()
+        if interface not in here
+    }
+    notes = [*_name_notes(here, places)]
+    if through_wine:
+        notes += [*_name_notes(windows, windows_places), windows_text()]
+    has_sources = any(map(_is_source, names))
+    # Wine makes up for a missing library; sources make Wine superfluous.
+    if len(lacking) == len(identifiers) and (has_sources or not through_wine):
+        notes += lacking.values()
+    loaded = [(library, archive.this_platform()) for library in here.values()]
+    loaded += [(windows[i], archive.WINDOWS) for i in through_wine]
+    for library, platform in loaded:
+        if not _is_for(archive.first_bytes(path, str(library)), platform):
+            notes.append(f"{library.name} is not a library for {platform}; export the FMU again for it")
+    return Libraries(here, windows, lacking, tuple(dict.fromkeys(notes)))
 
 
-def missing_binary_text(
-    name: str, platforms: Sequence[str], *, has_sources: bool, needs_wine: bool = False
+def platforms(names: Iterable[str]) -> tuple[str, ...]:
+    """Return the FMI 3 names (``x86_64-linux``) of the platforms for which the entries contain binaries."""
+    paths = [PurePosixPath(name).parts for name in names]
+    return tuple(sorted({archive.platform_of(p[1]) for p in paths if len(p) == 3 and p[0] == "binaries"}))
+
+
+def _found(names: Sequence[str], places: Mapping[Interface, PurePosixPath]) -> dict[Interface, PurePosixPath]:
+    found = {interface: _find(names, place) for interface, place in places.items()}
+    return {interface: place for interface, place in found.items() if place is not None}
+
+
+def _name_notes(
+    found: Mapping[Interface, PurePosixPath], expected: Mapping[Interface, PurePosixPath]
+) -> Iterator[str]:
+    for interface, path in found.items():
+        if path != expected[interface]:
+            name = expected[interface].name
+            yield f"its library is called {path.name}, not {name}; it is the only one, so it is used"
+
+
+def _missing_text(
+    fmu: str, names: Sequence[str], expected: Sequence[PurePosixPath], *, needs_wine: bool
 ) -> str:
-    """Say that an FMU has no binary for this platform, why those that it has do not help, and what does.
+    """Say that an FMU has no library for this platform, why those that it has do not help, and what does.
 
     Args:
-        name: file name of the FMU.
-        platforms: platforms for which it contains binaries.
-        has_sources: whether it contains C sources.
-        needs_wine: whether its binary for Windows can be simulated here.
+        fmu: file name of the FMU.
+        names: names of its entries.
+        expected: libraries that could run here, this platform's first.
+        needs_wine: whether that for Windows can be simulated here.
     """
-    here = archive.this_platform()
-    text = f"no binary for {here}, " + (
-        f"only for {', '.join(platforms)}" if platforms else "nor for any other"
-    )
+    for place in expected[:1] if needs_wine else expected:
+        if found := sorted(path.name for path in _beside(names, place)):
+            return (
+                f"{place.parent} contains {', '.join(found)}, but not {place.name}, and the model identifier "
+                "tells which one to load: export the FMU again"
+            )
+    here, others = archive.this_platform(), platforms(names)
+    text = f"no binary for {here}, " + (f"only for {', '.join(others)}" if others else "nor for any other")
     if needs_wine:
         text += "; that for Windows runs through Wine"
-        build = (
-            f"; it contains C sources: compile them with `falsifier tools build {name}` to run without Wine"
-        )
-        return text + (build if has_sources else "")
-    text += "".join(f"; {reason}" for reason in _reasons(here, platforms))
-    if has_sources:
-        return f"{text}; it contains C sources: compile them with `falsifier tools build {name}`"
-    wine = " or for 64-bit Windows" if "x86-windows" in platforms and can_run_windows() else ""
-    return f"{text}; export it again for this platform{wine}"
+    else:
+        text += "".join(f"; {reason}" for reason in _reasons(here, others))
+    if any(map(_is_source, names)):
+        wine = " to run without Wine" if needs_wine else ""
+        text += f"; it contains C sources: compile them with `falsifier tools build {fmu}`{wine}"
+    elif not needs_wine:
+        wine = " or for 64-bit Windows" if "x86-windows" in others and can_run_windows() else ""
+        text += f"; export it again for this platform{wine}"
+    return f"{text} ({expected[0]} is missing)"
+
+
+def _is_source(name: str) -> bool:
+    return name.startswith("sources/") and name.endswith(".c")
+
+
+def _is_for(start: bytes, platform: str) -> bool:
+    """Whether a file that starts with these bytes can be a library for a platform; True if it is unknown."""
+    if platform == archive.WINDOWS:
+        at = int.from_bytes(start[0x3C:0x40], "little")
+        return start[:2] == b"MZ" and start[at : at + 6] == b"PE\0\0" + _PE_X86_64
+    expected = _ELF.get(platform)
+    return expected is None or (start[:4], start[4:6], start[18:20]) == (b"\x7fELF", *expected)
 
 
 def _reasons(here: str, platforms: Sequence[str]) -> Iterator[str]:
@@ -132,17 +179,6 @@ def find_wine() -> Path | None:
         if found := shutil.which(name):
             return Path(found)
     return None
-
-
-@lru_cache(maxsize=1)
-def wine_libraries() -> frozenset[str]:
-    """Return the names of Wine's own libraries for 64-bit programs, in lower case; none if unknown."""
-    found = find_wine()
-    for folder in found.resolve().parents if found is not None else ():
-        for pattern in _OWN_LIBRARIES:
-            for place in folder.glob(pattern):
-                return frozenset(path.name.lower() for path in place.iterdir())
-    return frozenset()
 
 
 def can_run_windows() -> bool:

@@ -6,14 +6,14 @@ Element and attribute names are those of the FMI standards 1.0.1, 2.0.5 and 3.0.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import cast
 from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu.description import archive
-from falsifier.fmu.description.libraries import can_run_windows, find_libraries, windows_text
+from falsifier.fmu.description.libraries import Libraries, can_run_windows, find_libraries, platforms
 from falsifier.fmu.description.variables import (
     LONGEST_NAME,
     Slot,
@@ -30,6 +30,7 @@ _INTERFACE_TAGS: Mapping[str, Interface] = {
     "ModelExchange": "model-exchange",
 }
 
+_NO_LIBRARIES = Libraries({}, {}, {}, ())
 # Maximum number of names in one note.
 _SHOWN_NAMES = 10
 
@@ -42,8 +43,7 @@ class Description:
         info: what other packages need.
         token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
         identifiers: model identifier by interface.
-        libraries: path of this platform's library inside the archive, by interface; missing if there is none.
-        windows_libraries: the same for 64-bit Windows.
+        libraries: its libraries for this platform and for Windows.
         slots: how to access each scalar variable, by name.
         arrays: start values of all elements by value reference, for arrays only.
         states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
@@ -57,8 +57,7 @@ class Description:
     token: str
     identifiers: Mapping[Interface, str]
     slots: Mapping[str, Slot]
-    libraries: Mapping[Interface, PurePosixPath] = field(default_factory=dict)
-    windows_libraries: Mapping[Interface, PurePosixPath] = field(default_factory=dict)
+    libraries: Libraries = _NO_LIBRARIES
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
     states: int = 0
     indicators: int = 0
@@ -73,7 +72,8 @@ class Description:
 
     def needs_wine(self, interface: Interface) -> bool:
         """Whether the only library that this machine can run is the one for Windows."""
-        return can_run_windows() and interface not in self.libraries and interface in self.windows_libraries
+        libraries = self.libraries
+        return can_run_windows() and interface not in libraries.here and interface in libraries.windows
 
     def slot(self, name: str) -> Slot:
         """Return how to access a numeric variable.
@@ -116,15 +116,10 @@ def describe(path: Path, sha256: str) -> Description:
     """
     text = archive.read_entry(path, "modelDescription.xml")
     root = read_xml(text, f"{path}: modelDescription.xml", ModelError)
-    names = archive.entry_names(path)
-    described = parse(root, name=str(path), platforms=archive.platforms(names))
-    info = described.info
-    libraries, said = find_libraries(names, info.fmi_version, described.identifiers)
-    windows, windows_said = find_libraries(names, info.fmi_version, described.identifiers, archive.WINDOWS)
-    described = replace(described, libraries=libraries, windows_libraries=windows)
-    if any(described.needs_wine(interface) for interface in info.interfaces):
-        said = (*said, *windows_said, windows_text())
-    return replace(described, info=replace(info, notes=(*info.notes, *said)))
+    described = parse(root, name=str(path), platforms=platforms(archive.entry_names(path)))
+    libraries = find_libraries(path, described.info.fmi_version, described.identifiers)
+    info = replace(described.info, notes=(*described.info.notes, *libraries.notes))
+    return replace(described, info=info, libraries=libraries)
 
 
 def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:

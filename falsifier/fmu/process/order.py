@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import FalsifierError, ModelError
-from falsifier.fmu.description import Description, library_file, misnamed_text, missing_binary_text
+from falsifier.fmu.description import Description
 from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Request
 from falsifier.fmu.process.encoding import integers, reals, text
@@ -203,15 +203,8 @@ def library_of(
     Raises:
         ModelError: if there is none for this platform, or several with other names than expected.
     """
-    libraries = description.windows_libraries if windows else description.libraries
-    info, identifier = description.info, description.identifiers[interface]
-    if interface in libraries:
-        return folder / libraries[interface]
-    names = [p.relative_to(folder).as_posix() for p in folder.glob("binaries/*/*")]
-    said = misnamed_text(names, info.fmi_version, [identifier])
-    if not said:
-        has_sources = any((folder / "sources").rglob("*.c"))
-        wine = description.needs_wine(interface)
-        said = missing_binary_text("FMU", info.platforms, has_sources=has_sources, needs_wine=wine)
-        said += f" ({library_file(info.fmi_version, identifier)} is missing)"
-    raise ModelError(f"{path}: {said}")
+    libraries = description.libraries
+    found = libraries.windows if windows else libraries.here
+    if interface not in found:
+        raise ModelError(f"{path}: {libraries.lacking[interface]}")
+    return folder / found[interface]
