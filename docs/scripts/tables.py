@@ -65,6 +65,7 @@ def _keys(section: str) -> str:
         properties = {k: v for k, v in properties.items() if k not in ModelChanges.model_fields}
     if is_template:  # these are the same for all
         properties = {k: v for k, v in properties.items() if k not in ("template", "description")}
+        properties["during"] = properties.pop("during")  # after its own arguments
     required = sections[section].get("required", ())
     rows = [
         (f"`{key}`", _type(said), "yes" if key in required else "", _meaning(key, said))

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, lcm
 
-from falsifier.core.model import Experiment
-from falsifier.core.space import SearchSpace
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
@@ -180,17 +178,6 @@ def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
             f"the smallest value is {stop_time / MAX_STEPS:g}",
             key=key,
         )
-
-
-def check_sizes(experiment: Experiment, space: SearchSpace) -> None:
-    """Check the steps of the solver and of inputs that are sampled and held.
-
-    Raises:
-        SpecError: naming the key and the smallest period.
-    """
-    check_steps(experiment.stop_time, experiment.step_size, key="model.step_size")
-    for r in space.inputs:
-        check_steps(experiment.stop_time, r.hold, key=f"inputs.{r.name}.hold")
 
 
 def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:

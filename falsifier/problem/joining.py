@@ -1,32 +1,28 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
 from falsifier.core.space import SearchSpace
+from falsifier.core.words import listed
 from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.fmu import System, is_package, read_info, read_package
-from falsifier.problem.grid import Grid, check_sizes, check_steps, choose_grid, default_freedom, formula_times
+from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
-from falsifier.problem.ranges import (
-    DEFAULT_POINTS,
-    search_space,
-    string_values,
-)
-from falsifier.problem.requirement import Requirement, expanded, parse_requirement, spec_formulas
-from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
-from falsifier.problem.source import MODEL_FILES, STL_NAME
-from falsifier.problem.spec import Spec, overlay, parse_spec
+from falsifier.problem.ranges import DEFAULT_POINTS, search_space, string_values
+from falsifier.problem.requirement import Requirement, formula_of, section_formulas
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.source import STL_NAME
+from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
 
 
-@dataclass(frozen=True, slots=True)
-class Joined:
+class Joined(NamedTuple):
     """Parts of a problem; the attributes are those of Problem."""
 
     model: Model
@@ -43,8 +39,8 @@ def join(
     *,
     path: Path,
     profile: str | None = None,
-    stl: str | None = None,
-    stl_name: str = STL_NAME,
+    stated: AnyRequirement | None = None,
+    stated_name: str = STL_NAME,
     changes: ModelChanges | None = None,
     model: Model | None = None,
     searches: bool = True,
@@ -56,8 +52,8 @@ def join(
         requirement: name of the requirement.
         path: path of the spec file, for relative paths and error messages.
         profile: name of a profile of the spec.
-        stl: a formula to use instead of the spec's.
-        stl_name: name of the requirement that this formula makes.
+        stated: requirement of an option, to use instead of the spec's with what that one overrides.
+        stated_name: its name.
         changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
         model: the model; None: the one that the spec names.
         searches: whether to refuse a spec in which everything is fixed.
@@ -71,39 +67,39 @@ def join(
             raise SpecError(f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}")
         if profile is not None and profile not in spec.profiles:
             raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}")
-        layers = [*spec.changes(requirement, profile), *([changes] if changes else [])]
-        model = model or make_model(spec, layers, path)
+        layers = spec.changes(requirement, profile)
+        model = model or make_model(spec, [*layers, changes] if changes else layers, path)
         info = model.info
         if changes is not None:
             changes = placed(changes, info)
-            layers[-1] = changes
-        experiment, grid = _experiment(
-            spec, layers, info, lambda stop: spec_formulas(spec, stop) if stl is None else [stl]
-        )
+            layers = [*layers, changes]
+        # All formulas of a spec, so that its requirements can share a search.
+        sections = spec.requirements.values() if stated is None else [stated]
+        experiment, grid = _experiment(spec, layers, info, lambda stop: section_formulas(sections, stop))
         if isinstance(model, System):
             model.check_steps(experiment)
-        inputs, parameters = _merged(spec, layers)
-        formulas = spec_formulas(spec, experiment.stop_time) if stl is None else [stl]
-        inputs |= _with_points(inputs, changes, formulas, experiment)
+        inputs, parameters = dict(spec.inputs), dict(spec.parameters)
+        for layer in layers:
+            inputs |= {name: overlay(inputs.get(name), s) for name, s in layer.inputs.items()}
+            parameters |= {name: overlay(parameters.get(name), s) for name, s in layer.parameters.items()}
+        if changes is not None:
+            formulas = section_formulas(sections, experiment.stop_time)
+            inputs |= _with_points({name: inputs[name] for name in changes.inputs}, formulas, experiment)
         space, fixed = search_space(inputs, parameters, info, experiment.stop_time)
-        if searches:
-            _check_searched(space, inputs, info, is_spec=path.suffix not in MODEL_FILES)
-        check_sizes(experiment, space)
-        section, key = spec.requirements[requirement], f"requirements.{requirement}"
-        if stl is None:
-            with in_section(key=key):
-                text = expanded(section, info, experiment)
-        is_option = stl is not None or path.suffix in MODEL_FILES
-        stated_by = "formula" if isinstance(section, RequirementSection) else "template"
-        with in_section(key="--stl" if is_option else f"{key}.{stated_by}"):
-            formula = parse_requirement(text if stl is None else stl, info, experiment)
+        if searches and not space.names:
+            raise _nothing_to_search(info, changes)
+        check_steps(experiment.stop_time, experiment.step_size, key="model.step_size")
+        for r in space.inputs:
+            check_steps(experiment.stop_time, r.hold, key=f"inputs.{r.name}.hold")
+        section, name, key = spec.requirements[requirement], requirement, f"requirements.{requirement}"
+        if stated is not None:
+            section, name, key = stated, stated_name, ""
+        formula = formula_of(section, info, experiment, key=key)
         known = {*space.names, *fixed, *(v.name for v in info.inputs if isinstance(v.start, int | float))}
         experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
         return Joined(
             model,
-            Requirement(
-                requirement if stl is None else stl_name, formula, "" if stl else section.description
-            ),
+            Requirement(name, formula, section.description),
             space,
             _recording(experiment, info, [*spec.model.record, *formula.signals], known),
             fixed,
@@ -113,13 +109,13 @@ def join(
 
 def join_formula(
     model: Path | System,
-    formula: str | Mapping[str, object],
+    stated: AnyRequirement,
     *,
     changes: ModelChanges,
     name: str = STL_NAME,
     searches: bool = True,
 ) -> Joined:
-    """Join an FMU, SSP package or system with a formula, without a spec.
+    """Join an FMU, SSP package or system with a requirement, without a spec.
 
     If no input or parameter is to be searched, all inputs with a min and a max are searched, and those whose
     type states them (Booleans, enumerations). There must be one, unless the problem is made for other things
@@ -127,7 +123,7 @@ def join_formula(
 
     Args:
         model: path of the FMU or package, or the system.
-        formula: the requirement, a formula or the section of a template.
+        stated: the requirement.
         changes: overrides for experiment, inputs and parameters.
         name: name of the requirement.
         searches: whether to refuse a model in which there is nothing to search.
@@ -159,20 +155,30 @@ def join_formula(
     data["model"]["stop_time"] = changes.stop_time or info.stop_time
     if data["model"]["stop_time"] is None:
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
-    data["requirements"] = {name: {"formula": formula} if isinstance(formula, str) else formula}
-    spec = parse_spec(data, file=str(path))
+    spec = parse_spec(data | {"requirements": {name: stated}}, file=str(path))
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
-    bounded = {} if searched else _bounded_inputs(info)
-    if searches and not searched and not bounded:
-        inputs = [v.name for v in info.inputs]
-        why = "its inputs are unbounded" if inputs else "it has no inputs"
-        raise SpecError(
-            f"{path}: nothing to search: {why}; add --search NAME=LOW:HIGH; {did_you_mean('', inputs)}"
-        )
-    every = changes.model_copy(update={"inputs": bounded | changes.inputs})
-    return join(spec, name, path=path, changes=every, model=system, searches=searches)
+    if not searched:
+        connected = {target for _, target in info.connections}
+        bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}
+        if searches and not bounded:
+            inputs = [v.name for v in info.inputs]
+            why = "its inputs are unbounded" if inputs else "it has no inputs"
+            raise SpecError(
+                f"{path}: nothing to search: {why}; add --search NAME=LOW:HIGH; {did_you_mean('', inputs)}"
+            )
+        changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
+    return join(
+        spec,
+        name,
+        path=path,
+        stated=stated,
+        stated_name=name,
+        changes=changes,
+        model=system,
+        searches=searches,
+    )
 
 
 def _experiment(
@@ -193,23 +199,23 @@ def _experiment(
                 value = getattr(layer, key)
         return value
 
-    stop_time = stated("stop_time") or info.stop_time
-    if stop_time is None:
+    def fitting(fmu_step: float | None, step_size: float | None = None) -> Grid:
+        times = formula_times(formulas_of(stop_time))
+        return choose_grid(stop_time, times=times, fmu_step=fmu_step, step_size=step_size)
+
+    stop_time = stated("stop_time") or info.stop_time or 0.0
+    if not stop_time:
         raise SpecError(f"the {info.noun} has no default stop time; add this key", key="model.stop_time")
-    output_interval, step_size = stated("output_interval"), stated("step_size")
-    formulas = formulas_of(stop_time)
-    grid = None
+    output_interval, step_size, grid = stated("output_interval"), stated("step_size"), None
     if output_interval is None:
-        # All formulas of a spec, so that its requirements can share a search.
-        grid = _grid(stop_time, formula_times(formulas), info, step_size)
+        grid = fitting(info.step_size, step_size)
         output_interval = grid.interval
     check_steps(stop_time, output_interval, key="model.output_interval")
     intervals = stop_time / output_interval
     if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
-        fits = _grid(stop_time, formula_times(formulas), replace(info, step_size=output_interval), None)
         raise SpecError(
             f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
-            f"try {fits.interval:.12g}",
+            f"try {fitting(output_interval).interval:.12g}",
             key="model.output_interval",
         )
     experiment = Experiment(
@@ -221,10 +227,6 @@ def _experiment(
         time_limit=stated("time_limit"),
     )
     return experiment, grid
-
-
-def _grid(stop_time: float, times: Iterable[float], info: ModelInfo, step_size: float | None) -> Grid:
-    return choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
 
 
 def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
@@ -256,49 +258,37 @@ def _recording(
     return replace(experiment, outputs=tuple(outputs))
 
 
-def _merged(
-    spec: Spec, layers: Iterable[ModelChanges]
-) -> tuple[dict[str, InputSection], dict[str, ParameterSection]]:
-    inputs, parameters = dict(spec.inputs), dict(spec.parameters)
-    for layer in layers:
-        for name, changed in layer.inputs.items():
-            inputs[name] = overlay(inputs.get(name), changed)
-        for name, change in layer.parameters.items():
-            parameters[name] = overlay(parameters.get(name), change)
-    return inputs, parameters
-
-
 def _with_points(
-    inputs: Mapping[str, InputSection],
-    changes: ModelChanges | None,
-    formulas: Iterable[str],
-    experiment: Experiment,
+    changed: Mapping[str, InputSection], formulas: Iterable[str], experiment: Experiment
 ) -> dict[str, InputSection]:
-    """Return the inputs whose ranges were changed and whose control points nobody stated, free by default."""
+    """Return those of the changed inputs whose control points nobody stated, free by default."""
     free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
-
-    def completed(section: InputSection) -> InputSection:
-        chosen = section.free or (None if section.interpolation else free)
-        return section.model_copy(update={"control_points": DEFAULT_POINTS, "free": chosen})
-
-    changed = {name: inputs[name] for name in (changes.inputs if changes else ())}
     return {
-        name: completed(section)
+        name: section.model_copy(
+            update={
+                "control_points": DEFAULT_POINTS,
+                "free": section.free or (None if section.interpolation else free),
+            }
+        )
         for name, section in changed.items()
         if section.value is None and section.control_points is None
     }
 
 
-def _check_searched(
-    space: SearchSpace, inputs: Mapping[str, InputSection], info: ModelInfo, *, is_spec: bool
-) -> None:
-    if space.names:
-        return
-    if not is_spec:
-        raise SpecError(f"nothing to search; {_range_to_add(inputs, info)}")
-    raise SpecError(
-        "nothing to search; add [inputs.NAME] with range and control_points, or [parameters.NAME] with range",
-        key="inputs",
+def _nothing_to_search(info: ModelInfo, changes: ModelChanges | None) -> SpecError:
+    """Return the error that says which key of the spec, or which option, lets something vary."""
+    kept = [*changes.inputs, *changes.parameters] if changes else []
+    if not kept:
+        return SpecError(
+            "nothing to search; add [inputs.NAME] with range and control_points, or [parameters.NAME] with "
+            "range",
+            key="inputs",
+        )
+    low, high = info[kept[0]].limits
+    limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
+    return SpecError(
+        f"nothing is left to search: --set keeps {listed(kept)} constant, and nothing else varies; leave one "
+        f"of them out, or search it: --search {kept[0]}={limits}"
     )
 
 
@@ -332,19 +322,3 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
         else:
             parameters[name] = ParameterSection.model_validate(stated)
     return changes.model_copy(update={"inputs": inputs, "parameters": parameters})
-
-
-def _range_to_add(inputs: Mapping[str, InputSection], info: ModelInfo) -> str:
-    """Say which option makes one of the inputs, which all have fixed values, a searched one."""
-    if not inputs:
-        return "add --search NAME=LOW:HIGH"
-    name = next(iter(inputs))
-    low, high = info[name].low, info[name].high
-    limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
-    return f"all inputs have fixed values; search one of them, for example --search {name}={limits}"
-
-
-def _bounded_inputs(info: ModelInfo) -> dict[str, InputSection]:
-    """Return the inputs whose range the FMU or their type states."""
-    connected = {target for _, target in info.connections}
-    return {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}

@@ -12,6 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from traceback import extract_tb
 
+from falsifier.context.values import Named
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
@@ -19,20 +20,19 @@ from falsifier.core.space import Freedom
 from falsifier.errors import FalsifierError, SpecError, did_you_mean
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
-from falsifier.problem.joining import join, join_formula
+from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.sections import InputSection, ModelChanges
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
+from falsifier.problem.requirement import TEMPLATE_OPTION
+from falsifier.problem.sections import InputSection, ModelChanges, RequirementSection
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, template_arguments
 from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import AnyRequirement, Spec, parse_spec, read_spec
-from falsifier.problem.template_arguments import template_arguments
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
 # loading it once more.
 _LOADED: dict[ProblemSource, str] = {}
-_OPTION = "--template"
-# Keys of a requirement in a spec that are no arguments of its template.
-_BESIDE = {*ModelChanges.model_fields, "description"}
+# Keys with which a requirement changes the simulation.
+_OVERRIDES = set(ModelChanges.model_fields)
 
 
 def find_spec(target: str) -> tuple[Path, str | None]:
@@ -121,8 +121,8 @@ def load_problem(
         ModelError: if the FMU cannot be read.
     """
     changes = changes_from(
-        inputs=inputs or {},
-        parameters=parameters or {},
+        inputs=inputs,
+        parameters=parameters,
         stop_time=stop_time,
         output_interval=output_interval,
         time_limit=time_limit,
@@ -183,31 +183,15 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         SpecError: naming what is wrong and the remedy.
         ModelError: if the FMU cannot be used.
     """
-    kind = source.parts.kind
-    if kind == "python":
-        freed = {name: InputSection(free=s.free) for name, s in source.changes.inputs.items() if s.free}
-        allowed = ProblemSource(target=source.target, changes=ModelChanges(inputs=freed))
-        stated = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
-        if stated != allowed:
-            raise SpecError(
-                f"{source.target}: options cannot change a problem made in Python; change it in its module"
-            )
-        problem = replace(_with_limits(_python_problem(source.target), freed), source=source)
-    elif kind == "fmu":
-        if source.stl is None and Path(source.target).is_file():
-            raise SpecError(f"{source.target}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
-        joined = join_formula(
-            Path(source.target),
-            source.stl or "",
-            changes=source.changes,
-            name=source.stl_name,
-            searches=searches,
-        )
-        problem = replace(Problem.of(joined), source=source)
+    if source.parts.kind == "python":
+        problem = _python_problem(source)
+        if source.context:  # else it may name its own
+            problem = replace(problem, named_context=named_context(source))
     else:
-        problem = _of_spec(source, searches=searches)
-    if kind in ("python", "fmu") and source.context:  # a problem made in Python may name its own
-        problem = replace(problem, named_context=named_context(source))
+        stated = None if source.stl is None else RequirementSection(formula=source.stl)
+        joined, context = _joined(source, stated, searches=searches)
+        problem = replace(Problem.of(joined), named_context=context)
+    problem = replace(problem, source=source)
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
             raise SpecError("shortest_piece makes inputs free: parameterization must be free, not fixed")
@@ -238,47 +222,67 @@ def reloadable(problem: Problem) -> ProblemSource | None:
     return source if known == problem.fingerprint else None
 
 
-def _of_spec(source: ProblemSource, *, searches: bool) -> Problem:
+def _joined(
+    source: ProblemSource, stated: AnyRequirement | None, *, searches: bool = True
+) -> tuple[Joined, Named]:
+    """Join what a source names; ``stated`` takes the place of the spec's requirement."""
+    if source.parts.kind == "fmu":
+        fmu = Path(source.target)
+        if stated is None and fmu.is_file():
+            raise SpecError(f"{fmu}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
+        joined = join_formula(
+            fmu,
+            stated or RequirementSection(formula=""),
+            changes=source.changes,
+            name=source.stl_name,
+            searches=searches,
+        )
+        return joined, named_context(source)
     path, requirement = find_spec(source.target)
     spec = read_spec(path)
     if requirement is None and path.stem in spec.requirements:
         requirement = path.stem  # such as NN, which is the name of a spec and of one of its requirements
     if requirement is None:
-        if len(spec.requirements) > 1:
+        requirement, *others = spec.requirements
+        target, names = source.target.rstrip(":"), ", ".join(spec.requirements)
+        if others and stated is None:
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{source.target.rstrip(':')}:{next(iter(spec.requirements))}; falsifier run "
-                f"{source.target.rstrip(':')} falsifies all of them. "
-                f"Known: {', '.join(spec.requirements)}",
+                f"{target}:{requirement}; falsifier run {target} falsifies all of them. Known: {names}",
                 file=str(path),
             )
-        requirement = next(iter(spec.requirements))
+        if others and not _simulate_alike(spec):
+            raise SpecError(
+                f"the requirements of {target} simulate in different ways; say whose inputs and times hold: "
+                f"{target}:NAME, with one of {names}"
+            )
     joined = join(
         spec,
         requirement,
         path=path,
         profile=source.profile,
-        stl=source.stl,
-        stl_name=source.stl_name,
+        stated=stated,
+        stated_name=source.stl_name,
         changes=source.changes,
         searches=searches,
     )
-    return replace(Problem.of(joined), source=source, named_context=named_context(source, spec, path))
+    return joined, named_context(source, spec, path)
 
 
-def _with_limits(problem: Problem, freed: Mapping[str, InputSection]) -> Problem:
-    """Return the problem with the limits of free control points that a search with refined inputs has."""
-    limits = {name: s.free for name, s in freed.items() if s.free is not None}
-    inputs = tuple(
-        replace(r, free=Freedom(limits[r.name].max_control_points, limits[r.name].min_interval))
-        if r.name in limits
-        else r
-        for r in problem.space.inputs
-    )
-    return replace(problem, space=replace(problem.space, inputs=inputs))
+def _simulate_alike(spec: Spec) -> bool:
+    """Whether no requirement of a spec overrides something else than the others."""
+    first, *others = (section.model_dump(include=_OVERRIDES) for section in spec.requirements.values())
+    return all(other == first for other in others)
 
 
-def _python_problem(target: str) -> Problem:
+def _python_problem(source: ProblemSource) -> Problem:
+    """Return a problem made in Python, with the limits of free control points of a search that refines."""
+    target, stated = source.target, source.changes.inputs
+    freed = {name: section.free for name, section in stated.items() if section.free}
+    allowed = ModelChanges(inputs={name: InputSection(free=free) for name, free in freed.items()})
+    plain = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
+    if plain != ProblemSource(target=target, changes=allowed):
+        raise SpecError(f"{target}: options cannot change a problem made in Python; change it in its module")
     _, module, name = [*target.split(":"), "", ""][:3]
     try:
         found = getattr(import_module(module), name)
@@ -294,7 +298,11 @@ def _python_problem(target: str) -> Problem:
         raise SpecError(_raised(f"{target}: {name}()", error)) from error
     if not isinstance(problem, Problem):
         raise SpecError(f"{target}: expected a Problem or a function that returns one")
-    return problem
+    inputs = (
+        replace(r, free=Freedom(**freed[r.name].model_dump())) if r.name in freed else r
+        for r in problem.space.inputs
+    )
+    return replace(problem, space=replace(problem.space, inputs=tuple(inputs)))
 
 
 def _raised(what: str, error: Exception) -> str:
@@ -317,65 +325,21 @@ def formula_of_template(source: ProblemSource, text: str) -> str:
         FormulaError: if the text is not of this form.
     """
     arguments = template_arguments(text)
-    _check_keys(arguments)
-    kind, name = source.parts.kind, _OPTION
-    if kind == "python":
-        raise SpecError(f"{source.target}: a problem made in Python has its own requirement; drop {_OPTION}")
-    try:
-        if kind == "fmu":
-            joined = join_formula(Path(source.target), arguments, changes=source.changes, name=name)
-        else:
-            path, requirement = find_spec(source.target)
-            spec = read_spec(path)
-            _check_single(spec, requirement, source.target)
-            name = requirement or next(iter(spec.requirements))
-            spec = _with(spec, name, arguments)
-            joined = join(spec, name, path=path, profile=source.profile, changes=source.changes)
-    except SpecError as error:
-        if error.key is None or not error.key.startswith("requirements."):
-            raise
-        argument = error.key.removeprefix(f"requirements.{name}").removeprefix(".")
-        raise SpecError(error.message, file=_OPTION, key=argument or None) from None
-    return str(joined.requirement.formula)
-
-
-def _check_single(spec: Spec, requirement: str | None, target: str) -> None:
-    """Refuse a spec whose requirements change the simulation differently: whose changes hold is not clear."""
-    first, *others = (_kept(section) for section in spec.requirements.values())
-    if requirement is None and any(changes != first for changes in others):
-        names = ", ".join(spec.requirements)
+    if source.parts.kind == "python":
         raise SpecError(
-            f"the requirements of {target} simulate in different ways; say whose inputs and times hold: "
-            f"{target}:NAME, with one of {names}",
-            file=_OPTION,
+            f"{source.target}: a problem made in Python has its own requirement; drop {TEMPLATE_OPTION}"
         )
-
-
-def _kept(section: AnyRequirement) -> dict[str, object]:
-    """Return what a requirement changes of the simulation."""
-    return {
-        key: getattr(section, key) for key in ModelChanges.model_fields if key in section.model_fields_set
-    }
-
-
-def _check_keys(arguments: Mapping[str, object]) -> None:
-    """Refuse what only a section of a spec may have: it would shape the formula and not the simulation."""
-    beside = next((key for key in arguments if key in _BESIDE), None)
-    if beside is not None:
+    if beside := sorted(arguments.keys() & {*_OVERRIDES, "description"}):
+        # It would shape the formula and not the simulation.
         raise SpecError(
             "no argument of a template on the command line; simulations are changed by the other options "
             "(--stop-time, --set, --search, ...), or write a spec with [requirements.NAME]",
-            file=_OPTION,
-            key=beside,
+            file=TEMPLATE_OPTION,
+            key=beside[0],
         )
-
-
-def _with(spec: Spec, name: str, arguments: dict[str, object]) -> Spec:
-    """Return the spec with the template in place of a requirement, which keeps what it overrides."""
-    section = parse_spec(
-        {"model": {"fmu": "-"}, "requirements": {name: arguments}}, file=_OPTION
-    ).requirements[name]
-    kept = _kept(spec.requirements[name])
-    return spec.model_copy(
-        update={"requirements": {**spec.requirements, name: section.model_copy(update=kept)}}
-    )
+    try:
+        spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=TEMPLATE_OPTION)
+    except SpecError as error:
+        key = (error.key or "").removeprefix("requirements.R").lstrip(".")
+        raise SpecError(error.message, file=TEMPLATE_OPTION, key=key or None) from None
+    return str(_joined(source, spec.requirements["R"])[0].requirement.formula)

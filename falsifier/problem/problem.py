@@ -1,7 +1,7 @@
 """Problems: a model, a requirement, and what may be varied."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from math import inf
 from pathlib import Path
@@ -14,6 +14,7 @@ from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
+from falsifier.problem.sections import RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
 from falsifier.problem.source import STL_NAME, ProblemSource
 
@@ -129,8 +130,8 @@ class Problem:
         from falsifier.problem.joining import join_formula
 
         changes = changes_from(
-            inputs=inputs or {},
-            parameters=parameters or {},
+            inputs=inputs,
+            parameters=parameters,
             stop_time=stop_time,
             output_interval=output_interval,
             step_size=step_size,
@@ -140,7 +141,8 @@ class Problem:
             allow=allow,
             deny=deny,
         )
-        joined = join_formula(Path(fmu), formula, changes=changes, name=name)
+        stated = RequirementSection(formula=formula)
+        joined = join_formula(Path(fmu), stated, changes=changes, name=name)
         source = ProblemSource(
             target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
         )
@@ -186,21 +188,21 @@ class Problem:
         from falsifier.problem.joining import join_formula
 
         changes = changes_from(
-            inputs=inputs or {},
-            parameters=parameters or {},
+            inputs=inputs,
+            parameters=parameters,
             stop_time=stop_time,
             output_interval=output_interval,
             step_size=step_size,
             tolerance=tolerance,
             time_limit=time_limit,
         )
-        return Problem.of(join_formula(system, formula, changes=changes, name=name))
+        stated = RequirementSection(formula=formula)
+        return Problem.of(join_formula(system, stated, changes=changes, name=name))
 
     @staticmethod
     def of(joined: "Joined") -> "Problem":
         """Return the problem that a spec, or a model and a formula, was joined to."""
-        parts = {each.name: getattr(joined, each.name) for each in fields(joined)}
-        return Problem(**parts)
+        return Problem(**joined._asdict())
 
     @property
     def info(self) -> ModelInfo:

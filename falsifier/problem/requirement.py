@@ -1,19 +1,21 @@
 """Requirements: named formulas, checked against a model and an experiment."""
 
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 
 from falsifier.core.arguments import instance
 from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
-from falsifier.errors import FormulaError, SpecError, did_you_mean
+from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement, Spec
-from falsifier.problem.template_arguments import TemplateError
+from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
+from falsifier.problem.template_arguments import Template, TemplateError
 from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.formula import renamed
 
+STL_OPTION, TEMPLATE_OPTION = "--stl", "--template"
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
 PLACEHOLDER = "LIMIT"
 
@@ -65,17 +67,20 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
     """
     try:
         formula = parse(text)
-        for name in formula.signals:
-            if name == PLACEHOLDER and name not in info:
-                raise FormulaError(
-                    f"{name} is a placeholder: write the number, or your requirement in place of this one"
-                )
-            if name not in info:
-                raise FormulaError(f"unknown signal {name!r}; {similar(name, info)}")
-        # One input has one name, whose values are known at every sample without asking the model.
-        formula = renamed(formula, _input_names(info, formula))
     except FormulaError as error:
         raise SpecError(str(error)) from None
+    for name in formula.signals:
+        if name == PLACEHOLDER and name not in info:
+            raise SpecError(
+                f"{name} is a placeholder: write the number, or your requirement in place of this one"
+            )
+        if name not in info:
+            raise SpecError(_unknown(name, info))
+    # One input has one name, whose values are known at every sample without asking the model.
+    variables = [info[name] for name in formula.signals]
+    formula = renamed(
+        formula, {v.name: v.alias_of for v in variables if v.alias_of and v.causality == "input"}
+    )
     try:
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
@@ -85,46 +90,54 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
     return formula
 
 
-def spec_formulas(spec: Spec, stop_time: float) -> list[str]:
-    """Return the formulas of all requirements, for the times in them; templates that do not fit have none."""
+def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> list[str]:
+    """Return the formulas of requirements, for the times in them; templates that do not fit have none."""
     found = []
-    for section in spec.requirements.values():
+    for section in sections:
         with suppress(TemplateError):
             found.append(section.expanded(section.stop_time or stop_time))
     return found
 
 
-def expanded(section: AnyRequirement, info: ModelInfo, experiment: Experiment) -> str:
-    """Return the text of a requirement's formula.
+def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment, *, key: str) -> Formula:
+    """Return the formula of a requirement, checked against a model and an experiment.
+
+    Args:
+        section: the requirement.
+        info: the model.
+        experiment: stop time and time grid.
+        key: the section's key in its spec; empty if it was given by an option.
 
     Raises:
-        SpecError: naming the argument of a template that names an unknown signal or does not fit.
+        SpecError: naming the argument of a template that names an unknown signal or does not fit, or what is
+            wrong with the formula.
     """
-    for argument, name in section.signals():
-        if name not in info:
-            message = f"unknown signal {name!r}; {similar(name, info)}"
+    is_template = isinstance(section, Template)
+    option = None if key else TEMPLATE_OPTION if is_template else STL_OPTION
+    with in_section(option, key):
+        for argument, name in section.signals():
+            if name in info:
+                continue
+            message = _unknown(name, info)
             if isinstance(section, RampLimit) and argument == "rate" and section.rate is None:
                 message = (
                     f"the model has no {name}: state rate, the signal that is this rate of change; or over, "
                     "a time in s, and range, [low, high]"
                 )
             raise SpecError(message, key=argument)
-    try:
-        return section.expanded(experiment.stop_time, experiment.output_interval)
-    except TemplateError as error:
-        raise SpecError(str(error), key=error.key) from None
+        try:
+            text = section.expanded(experiment.stop_time, experiment.output_interval)
+        except TemplateError as error:
+            raise SpecError(str(error), key=error.key) from None
+    with in_section(option, key and f"{key}.{'template' if is_template else 'formula'}"):
+        return parse_requirement(text, info, experiment)
 
 
-def similar(name: str, info: ModelInfo) -> str:
-    """Return the end of a message on an unknown signal: the most similar one, and what is usually named."""
+def _unknown(name: str, info: ModelInfo) -> str:
+    """Say that a signal is unknown: the most similar one, and what is usually named."""
     usual = [v.name for v in (*info.observables, *info.inputs)]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))
     if listing.startswith("known") and not near.startswith("known"):
-        return f"{near.split('?')[0]}? K{listing[1:]}"
-    return listing
-
-
-def _input_names(info: ModelInfo, formula: Formula) -> dict[str, str]:
-    variables = [info[name] for name in formula.signals]
-    return {v.name: v.alias_of for v in variables if v.alias_of and v.causality == "input"}
+        listing = f"{near.split('?')[0]}? K{listing[1:]}"
+    return f"unknown signal {name!r}; {listing}"

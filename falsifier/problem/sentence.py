@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import Literal
 
 from falsifier.core.model import ModelInfo
 from falsifier.fmu.description import Units, is_known
@@ -29,10 +30,12 @@ _LOWER = (
     r"|(?:more|higher|greater|larger|faster) than|exceed\w*|min(?:imum|imal)?"
 )
 _COMPARED = re.compile(rf"\b(?:({UPPER})|({_LOWER}))(?:\s+(?:of|is|the|a|value|limit|by))*\s*$", re.I)
+_BETWEEN = re.compile(r"\b(?:between|from)\s*$", re.I)
 _NEGATED = re.compile(r"\b(?:not|never|cannot|without|nor|neither)\b|n't\b", re.I)
 _EVENT = re.compile(r"\b(?:exceed\w*|ris\w+|f[ae]lls?|drops?|goes|climbs?|reach\w*)\b", re.I)
 
-
+# A signal's name, also with dots.
+_WORD = r"[\w.]*\w"
 # Words that say nothing of a signal, although its description may contain them.
 _EMPTY = frozenset(
     ("and", "are", "for", "from", "has", "not", "off", "per", "than", "that", "the", "this", "with")
@@ -57,6 +60,11 @@ class Quantity:
     before: str
     end: int
 
+    @property
+    def is_time(self) -> bool:
+        """Whether it is a time."""
+        return self.unit in SECONDS and not self.per
+
 
 class UnplacedError(Exception):
     """A number of the sentence has no place in a template."""
@@ -64,9 +72,19 @@ class UnplacedError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Sentence:
-    """A sentence, its numbers, and the model that it is about."""
+    """A sentence, its numbers, and the model that it is about.
+
+    Attributes:
+        text: the sentence.
+        marked: the sentence with its numbers replaced: times by ``@``, others by ``#``, those per second or
+            minute by ``# ~``.
+        quantities: its numbers.
+        info: the model's signals.
+        units: what the model says of its units.
+    """
 
     text: str
+    marked: str
     quantities: tuple[Quantity, ...]
     info: ModelInfo
     units: Units
@@ -74,9 +92,9 @@ class Sentence:
     @property
     def signal(self) -> str:
         """The signal, or expression of signals, that it is about; empty if it names none."""
-        names, word = {v.name for v in (*self.info.outputs, *self.info.inputs)}, r"[\w.]*\w"
-        for match in re.finditer(rf"{word}(?:\s*[-+*/]\s*{word})+", self.text):
-            if {*re.findall(word, match[0])} <= names:
+        names = {v.name for v in (*self.info.outputs, *self.info.inputs)}
+        for match in re.finditer(rf"{_WORD}(?:\s*[-+*/]\s*{_WORD})+", self.text):
+            if {*re.findall(_WORD, match[0])} <= names:
                 return match[0]
         return next(iter(mentioned_signals(self.text, self.info)), "")
 
@@ -86,7 +104,7 @@ class Sentence:
         Raises:
             UnplacedError: if it is of another kind.
         """
-        first = next(iter(re.findall(r"[\w.]*\w", self.signal)), "")
+        first = next(iter(re.findall(_WORD, self.signal)), "")
         unit = self.info[first].unit if first in self.info else ""
         # Of a signal without a unit 5 % may be 5 or 0.05.
         if not q.unit or not self.signal or (not unit and q.unit != "%"):
@@ -96,17 +114,36 @@ class Sentence:
             raise UnplacedError
         return f"{tidy((q.value or 0.0) * found[0] + (0.0 if is_difference else found[1])):.12g}"
 
+    def limit(self, q: Quantity) -> Literal["low", "high", ""]:
+        """Return which limit a number is; an empty text if the words do not say."""
+        previous = next((other for other in self.quantities[::-1] if other.end < q.end), None)
+        if _BETWEEN.search(q.before):
+            return "low"
+        if (
+            previous
+            and re.fullmatch(r"\s*(?:and|to)\s*", q.before, re.I)
+            and _BETWEEN.search(previous.before)
+        ):
+            return "high"
+        found = _COMPARED.search(q.before)
+        if found is None:
+            return ""
+        before = q.before[: found.start()]
+        is_negated = bool(_NEGATED.search(before))
+        if previous and re.match(r"\s*(?:or|nor)\b", before):  # "must not exceed 3 or fall below 1"
+            is_negated = is_negated or bool(_NEGATED.search(previous.before))
+        if _EVENT.search(q.before) and not is_negated:
+            return ""
+        return "high" if (found[1] is not None) != is_negated else "low"
+
 
 def mentioned_signals(sentence: str, info: ModelInfo) -> list[str]:
     """Return the signals whose names, or words of whose descriptions, occur in a sentence; best first."""
-    words, whole = (
-        set(re.findall(r"[a-z]{3,}", sentence.lower())) - _EMPTY,
-        set(re.findall(r"[\w.]*\w", sentence)),
-    )
-    variables = [v for v in (*info.outputs, *info.inputs) if v.kind != "string"]
+    words, whole = _parts(sentence.lower()) - _EMPTY, set(re.findall(_WORD, sentence))
     named = {
         v.name: (v.name in whole) + 2 * len(words & _parts(v.name)) + len(words & _parts(v.description))
-        for v in variables
+        for v in (*info.outputs, *info.inputs)
+        if v.kind != "string"
     }
     return sorted((name for name in named if named[name]), key=lambda name: -named[name])
 
@@ -122,11 +159,8 @@ def position_of(text: str, name: str) -> int:
     return min((place.start() for place in places if place), default=len(text))
 
 
-def read_sentence(text: str, info: ModelInfo, units: Units) -> tuple[Sentence, str]:
-    """Return a sentence with its numbers, and its text with marks in their places.
-
-    A time is marked ``@``, any other number ``#``, one per second or minute ``# ~``.
-    """
+def read_sentence(text: str, info: ModelInfo, units: Units) -> Sentence:
+    """Return a sentence with its numbers."""
     own = {v.unit for v in info.variables if v.unit}
     found: list[Quantity] = []
     marked, position = "", 0
@@ -144,12 +178,12 @@ def read_sentence(text: str, info: ModelInfo, units: Units) -> tuple[Sentence, s
         is_part = not known and re.match(r"\w", text[end:])  # an ordinal, say
         value = float(digits.replace(",", "")) if is_number and not is_part else None
         found.append(Quantity(value, unit, per, text[position : match.start()], end))
-        marked += text[position : match.start()] + ("@" if is_time(found[-1]) else "# ~" if per else "#")
+        marked += found[-1].before + ("@" if found[-1].is_time else "# ~" if per else "#")
         position = end
     for k in range(len(found) - 1, 0, -1):  # the unit of "from 5 to 10 s" belongs to both
         if not found[k - 1].unit and _JOIN.fullmatch(found[k].before):
             found[k - 1] = replace(found[k - 1], unit=found[k].unit, per=found[k].per)
-    return Sentence(text, tuple(found), info, units), marked + text[position:]
+    return Sentence(text, marked + text[position:], tuple(found), info, units)
 
 
 def _unit_at(text: str, start: int, own: set[str], units: Units) -> tuple[str, int] | None:
@@ -159,23 +193,3 @@ def _unit_at(text: str, start: int, own: set[str], units: Units) -> tuple[str, i
         return None
     unit = match[1] if match[1] in own or is_known(match[1], units) else spelled(match[1])
     return (unit, match.end()) if unit in own or is_known(unit, units) else None
-
-
-def comparison(said: Sentence, q: Quantity) -> str:
-    """Return the limit that a number is: ``low``, ``high``, or an empty text if the words do not say."""
-    found = _COMPARED.search(q.before)
-    if found is None:
-        return ""
-    before = q.before[: found.start()]
-    earlier = [other for other in said.quantities if other.end < q.end]
-    is_negated = bool(_NEGATED.search(before))
-    if earlier and re.match(r"\s*(?:or|nor)\b", before):  # "must not exceed 3 or fall below 1"
-        is_negated = is_negated or bool(_NEGATED.search(earlier[-1].before))
-    if _EVENT.search(q.before) and not is_negated:
-        return ""
-    return "high" if (found[1] is not None) != is_negated else "low"
-
-
-def is_time(q: Quantity) -> bool:
-    """Return whether a number is a time."""
-    return q.unit in SECONDS and not q.per

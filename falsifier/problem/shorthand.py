@@ -1,6 +1,7 @@
 """Conversion of Python values and command-line options to the sections of a spec."""
 
 import re
+import tomllib
 from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
@@ -11,11 +12,14 @@ from pydantic import ValidationError
 from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
 from falsifier.core.signals import INTERPOLATIONS
-from falsifier.errors import SpecError, did_you_mean, rejected
+from falsifier.errors import FormulaError, SpecError, did_you_mean, rejected
 from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 
 _DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+_QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
+# One argument of a template: spaces only in quotes and in lists.
+_ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
 # A constant value; (low, high) to search, with the spec's control points or else a free parameterization;
 # (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
@@ -34,8 +38,8 @@ ParameterChoice = float | str | tuple[float, float] | ParameterSection
 
 def changes_from(
     *,
-    inputs: Mapping[str, InputChoice],
-    parameters: Mapping[str, ParameterChoice],
+    inputs: Mapping[str, InputChoice] | None = None,
+    parameters: Mapping[str, ParameterChoice] | None = None,
     allow: Iterable[str] = (),
     deny: Iterable[str] = (),
     **experiment: float | Interface | None,
@@ -52,6 +56,7 @@ def changes_from(
     Raises:
         SpecError: naming the input, parameter or field that is invalid.
     """
+    inputs, parameters = inputs or {}, parameters or {}
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
@@ -260,3 +265,36 @@ def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, s
         if section.interpolation is not None:
             said.append(section.interpolation)
     return "--search", f"{name}={':'.join(said)}"
+
+
+def template_arguments(text: str) -> dict[str, Any]:
+    """Return the section for a template on the command line: its name, then ``key=value`` in any order.
+
+    Values are written as in TOML; text needs no quotes of its own unless it contains spaces.
+
+    >>> template_arguments("settles signal=speed reference=80 within=2% time=3")["reference"]
+    80
+
+    Raises:
+        FormulaError: naming what is not ``key=value``.
+    """
+    rest = _ARGUMENT.sub("", text).strip()
+    if rest or not text.strip():
+        problem = f"{rest}: a quote has no end" if rest else "empty"
+        raise FormulaError(
+            f"--template: {problem}; write a template and its arguments: 'settles signal=speed ...'"
+        )
+    name, *pairs = _ARGUMENT.findall(text)
+    found: dict[str, Any] = {"template": name}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not equals or key in found:
+            raise FormulaError(
+                f"--template: {pair}: expected each argument once, as key=value; spaces need quotes: "
+                "when='speed > 5'"
+            )
+        try:
+            found[key] = tomllib.loads(f"v = {value}")["v"]
+        except (ValueError, RecursionError):  # also integers of too many digits, and deep nesting
+            found[key] = value
+    return found

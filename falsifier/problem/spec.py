@@ -8,9 +8,9 @@ these sections that sets a key wins::
 """
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -20,12 +20,9 @@ from falsifier.errors import SpecError, did_you_mean, in_section, rejected
 from falsifier.fmu.ssp import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
     Components,
-    ComponentSection,
     Connections,
-    ConnectionSection,
     ContextSection,
     CouplingSection,
-    FreeSection,
     Inputs,
     InputSection,
     ModelChanges,
@@ -50,30 +47,15 @@ from falsifier.problem.templates import (
 )
 
 Section = TypeVar("Section", bound=BaseModel)
-# Limits of a spec file: the time to read nested keys grows with the square of their depth.
 # Names that we choose stand in messages, tables and titles.
 NAME_IN_LINES = "expected a name of one line without control characters"
+# Limits of a spec file: the time to read nested keys grows with the square of their depth.
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
-# Sections by the key that holds them, or by the tag of a kind of requirement; for hints in error messages.
-_SECTIONS: Mapping[str, type[BaseModel]] = {
-    "model": ModelSection,
-    "components": ComponentSection,
-    "connections": ConnectionSection,
-    "coupling": CouplingSection,
-    "context": ContextSection,
-    "inputs": InputSection,
-    "parameters": ParameterSection,
-    "requirements": ModelChanges,
-    "profiles": ProfileSection,
-    "free": FreeSection,
-    "<formula>": RequirementSection,
-    **{f"<{name}>": template for name, template in TEMPLATES.items()},
-}
+# How files begin that Windows programs, such as PowerShell's >, write in UTF-16.
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # Parts of pydantic's locations that are no keys.
 _STEPS = ("tuple", "function-before")
-# Sections of which there is one, without a name of its own.
-_SINGLE = ("model", "free", "coupling", "context")
 
 
 def _kind_of_requirement(section: object) -> str | None:
@@ -129,12 +111,7 @@ def read_spec(path: Path) -> Spec:
         SpecError: naming the file, the key and what was expected.
     """
     with in_section(str(path)):
-        try:
-            text = path.read_text(encoding="utf-8-sig")  # some editors begin files with a byte order mark
-        except FileNotFoundError:
-            raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one") from None
-        except (OSError, UnicodeDecodeError) as error:
-            raise SpecError(f"cannot be read: {error}") from None
+        text = _text_of(path)
         if len(text) > _MAX_LENGTH:
             raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}")
         if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
@@ -149,6 +126,20 @@ def read_spec(path: Path) -> Spec:
                 "`falsifier init MODEL.fmu` write a spec to begin with"
             )
     return parse_spec(data, file=str(path))
+
+
+def _text_of(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one") from None
+    except OSError as error:
+        raise SpecError(f"cannot be read: {error}") from None
+    try:
+        return content.decode("utf-8-sig")  # some editors begin files with a byte order mark
+    except UnicodeDecodeError as error:
+        found = "is written in UTF-16" if content.startswith(_UTF_16) else f"cannot be read: {error}"
+        raise SpecError(f"{found}; specs are UTF-8: save the file with this encoding") from None
 
 
 def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
@@ -210,28 +201,22 @@ def _error_of(error: ValidationError) -> SpecError:
     """Return the error to raise for the first thing that is wrong."""
     first = error.errors()[0]
     where = [str(part) for part in first["loc"] if part not in _STEPS]
-    location = _keys_of(where)
-    key = ".".join(location)
-    kind = first["type"]
-    if kind == "union_tag_not_found":
+    # Below the name of a requirement comes the tag of its kind, which is no key.
+    kind = where.pop(2) if where[0] == "requirements" and len(where) > 2 else ""
+    key, wrong = ".".join(where), first["type"]
+    if wrong == "union_tag_not_found":
         known = did_you_mean(str(first["input"].get("template")), TEMPLATES)
         return SpecError(f"no such template; {known}", key=f"{key}.template")
-    if kind in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
-        return SpecError(f"names with dots are written in quotes: {quoted}", key=".".join(location[:2]))
-    if kind == "extra_forbidden":
-        known = did_you_mean(location[-1], sorted(_fields(where[:-1])))
+    if wrong in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
+        return SpecError(f"names with dots are written in quotes: {quoted}", key=".".join(where[:2]))
+    if wrong == "extra_forbidden":
+        known = did_you_mean(where[-1], sorted(_fields(where[:-1], kind)))
         return SpecError(f"unknown key; {known}", key=key)
-    if kind == "missing":
-        field = _fields(where[:-1]).get(location[-1])
+    if wrong == "missing":
+        field = _fields(where[:-1], kind).get(where[-1])
         meaning = f" ({field.description})" if field is not None and field.description else ""
         return SpecError(f"this key is missing{meaning}", key=key)
     return SpecError(rejected(first["msg"], first["input"]), key=key)
-
-
-def _keys_of(where: list[str]) -> list[str]:
-    return [
-        part for part in where if not (part.startswith("<") and part.strip("<>") in (*TEMPLATES, "formula"))
-    ]
 
 
 def _unquoted(error: ValidationError) -> str:
@@ -250,16 +235,23 @@ def _unquoted(error: ValidationError) -> str:
     return ""
 
 
-def _fields(where: list[str]) -> Mapping[str, FieldInfo]:
-    """Return the fields of the section at this location in a spec."""
-    if where and where[-1] not in _keys_of(where[-1:]):
-        return _SECTIONS[where[-1]].model_fields
+def _fields(keys: Iterable[str], kind: str) -> Mapping[str, FieldInfo]:
+    """Return the fields of the section with these keys; a requirement's are those of its kind."""
     fields: Mapping[str, FieldInfo] = Spec.model_fields
-    location = _keys_of(where)
-    for i, part in enumerate(location):
-        before = location[i - 1] if i else ""
-        if part in _SINGLE:
-            fields = _SECTIONS[part].model_fields
-        elif before in _SECTIONS and before not in _SINGLE:
-            fields = _SECTIONS[before].model_fields
+    remaining = iter(keys)
+    for key in remaining:
+        annotation = fields[key].annotation if key in fields else None
+        if get_origin(annotation) is dict:  # the next key is a name that the user chose
+            next(remaining, None)
+        section = _section_in(annotation)
+        if section is RequirementSection:
+            section = TEMPLATES.get(kind.strip("<>"), RequirementSection)
+        fields = section.model_fields if section else fields
     return fields
+
+
+def _section_in(annotation: object) -> type[BaseModel] | None:
+    """Return the first section that a type contains."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_section_in, get_args(annotation))), None)

@@ -1,24 +1,19 @@
 """What templates of requirements have in common: their arguments, and the windows in which they apply."""
 
-import re
-import tomllib
 from collections.abc import Callable, Iterator
-from math import floor, isfinite
-from typing import Annotated, Any, ClassVar, NamedTuple
+from math import floor, inf, isfinite
+from typing import Annotated, ClassVar, NamedTuple, get_args, get_type_hints
 
 from pydantic import AfterValidator, Field
 
 from falsifier.errors import FalsifierError, FormulaError
-from falsifier.problem.sections import ModelChanges
+from falsifier.problem.sections import ModelChanges, Seconds
 from falsifier.stl import Formula, parse
 from falsifier.stl.expression import Arithmetic, Call, Expression, Number
 from falsifier.stl.formula import Always, And, Implies, Next, Not, Predicate, Window
 
 # Decimals of times in s; finer than any grid.
 _DECIMALS = 9
-_QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
-# One argument on the command line: spaces only in quotes and in lists.
-_ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
 
 class TemplateError(FalsifierError):
@@ -38,6 +33,9 @@ class Clock(NamedTuple):
 
     stop_time: float
     step: float
+
+
+# -- kinds of arguments --------------------------------------------------------------------------------------
 
 
 def term(text: str | float) -> Expression:
@@ -73,12 +71,12 @@ def _checked_condition(text: str) -> str:
 
 
 def _checked_margin(margin: float | str) -> float | str:
-    if share_of(margin) is None and not isinstance(margin, int | float):
+    size = share_of(margin) if isinstance(margin, str) else margin
+    if size is None:
         raise ValueError(
             f"expected a number in the signal's unit, or a percentage such as '2%', got {margin!r}"
         )
-    size = share_of(margin) if isinstance(margin, str) else margin
-    if size is None or not 0 <= size < float("inf"):
+    if not 0 <= size < inf:
         raise ValueError(f"expected a finite number of at least 0, got {margin}")
     return margin
 
@@ -86,7 +84,7 @@ def _checked_margin(margin: float | str) -> float | str:
 def _checked_moment(after: float | str) -> float | str:
     if isinstance(after, str):
         return _checked_condition(after)
-    if not 0 <= after < float("inf"):
+    if not 0 <= after < inf:
         raise ValueError(f"expected a time of at least 0 s, or a condition, got {after:g}")
     return after
 
@@ -109,18 +107,25 @@ Duration = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
+# -- what all templates do -----------------------------------------------------------------------------------
+
+
 class Template(ModelChanges):
     """A requirement by template: its arguments, and what it overrides."""
 
-    # One line on what it requires, for lists.
+    # One line on what it requires, for lists: that of its docstring.
     summary: ClassVar[str] = ""
-    # Arguments that name signals.
-    terms: ClassVar[tuple[str, ...]] = ()
-    conditions_in: ClassVar[tuple[str, ...]] = ()
-    # Arguments that are times in s.
-    times: ClassVar[tuple[str, ...]] = ()
 
     description: str = Field("", description="Its meaning in words.")
+    during: tuple[Finite, Finite] | None = Field(
+        None, description="[start, end] in s; default: as long as the simulation allows."
+    )
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: object) -> None:
+        """Take the summary from the docstring."""
+        line = (cls.__doc__ or "").partition("\n")[0].rstrip(".")
+        cls.summary = f"{line[:1].lower()}{line[1:]}"
 
     def expanded(self, stop_time: float, step: float = 0.0) -> str:
         """Return the text of the formula.
@@ -136,17 +141,101 @@ class Template(ModelChanges):
 
     def signals(self) -> Iterator[tuple[str, str]]:
         """Yield the argument and the name of each signal in it."""
-        for key in self.terms:
-            if (value := getattr(self, key)) is not None:
-                yield from ((key, name) for name in term(value).signals)
-        for key in self.conditions_in:
-            value = getattr(self, key)
-            for text in value if isinstance(value, tuple) else (value,):
-                if isinstance(text, str):
-                    yield from ((key, name) for name in parse(text).signals)
+        for key, value in self._stated(Term):
+            yield from ((key, name) for name in term(value).signals)
+        for key, condition in self._conditions():
+            yield from ((key, name) for name in condition.signals)
 
     def _formula(self, clock: Clock) -> Formula:
         raise NotImplementedError
+
+    def _stated(self, *kinds: object) -> Iterator[tuple[str, str | float]]:
+        """Yield the arguments of some kinds that are given; of a list each item."""
+        for key, hint in get_type_hints(type(self), include_extras=True).items():
+            is_argument = key not in ModelChanges.model_fields
+            if is_argument and any(kind in (hint, *get_args(hint)) for kind in kinds):
+                value = getattr(self, key)
+                values = value if isinstance(value, tuple) else (value,)
+                yield from ((key, each) for each in values if each is not None)
+
+    def _conditions(self) -> Iterator[tuple[str, Formula]]:
+        for key, value in self._stated(Condition, Moment):
+            if isinstance(value, str):
+                yield key, parse(value)
+
+    def _longest(self) -> str:
+        """Return the argument to name if a requirement needs more time than there is."""
+        times = {key: t for key, t in self._stated(Duration, Seconds, Moment) if not isinstance(t, str)}
+        conditions = [key for key, _ in self._conditions()]
+        return max(times, key=times.__getitem__) if times else (*conditions, "during")[0]
+
+    def _after(
+        self,
+        after: float | str,
+        clock: Clock,
+        body: Callable[[float, float], Formula],
+        *,
+        lasts: float | None,
+        begins: float = 0.0,
+    ) -> Formula:
+        """Return what must hold after a time, or each time when a condition becomes true.
+
+        Args:
+            after: time in s, or the condition.
+            clock: end of the simulation, and step.
+            body: what must hold, given the moment and the end relative to the time of evaluation, in s.
+            lasts: time in s for which it must hold; None: to the end of the simulation.
+            begins: time in s after the moment at which that begins.
+        """
+        if isinstance(after, str):
+            assert lasts is not None
+            return self._each_time(clock, parse(after), body(0.0, lasts), lasts)
+        if self.during is not None:
+            raise TemplateError("during", "applies only if after is a condition; state the time in after")
+        end = clock.stop_time if lasts is None else after + lasts
+        needed = max(after + begins, end)
+        if needed > clock.stop_time:
+            raise TemplateError(
+                self._longest(),
+                f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: shorten "
+                "the times or simulate longer",
+            )
+        return body(after, end)
+
+    def _each_time(self, clock: Clock, condition: Formula, body: Formula, reach: float) -> Formula:
+        """Return that something holds each time when a condition becomes true."""
+        becomes = And(Not(condition), Next(condition))
+        return Always(Implies(becomes, Next(body)), self._span(clock, reach + clock.step))
+
+    def _span(self, clock: Clock, reach: float = 0.0) -> Window:
+        """Return the window in which it applies: the given one, or as long as the simulation allows.
+
+        Args:
+            clock: end of the simulation, and step.
+            reach: time in s that it looks ahead, besides what its conditions do.
+        """
+        inner = max((condition.horizon(clock.step) for _, condition in self._conditions()), default=0.0)
+        latest = clock.stop_time - reach - inner
+        if clock.step:
+            latest = floor(latest / clock.step + 1e-6) * clock.step
+        start, end = self.during or (0.0, latest)
+        if self.during is not None and not 0 <= start <= end:
+            raise TemplateError(
+                "during", f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]"
+            )
+        if end > latest + 1e-9 * clock.stop_time or latest < 0:
+            needed = clock.stop_time - latest + (0.0 if self.during is None else end)
+            cure = "shorten the times or simulate longer"
+            if self.during is not None and latest >= start:
+                cure = f"end the window at {latest:g} s, {cure}"
+            raise TemplateError(
+                self._longest() if self.during is None else "during",
+                f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: {cure}",
+            )
+        return window_of(start, end)
+
+
+# -- parts of formulas ---------------------------------------------------------------------------------------
 
 
 def near(signal: str | float, reference: str | float, within: float | str) -> Formula:
@@ -174,91 +263,6 @@ def scaled(share: float, reference: Expression) -> Expression:
     return reference if share == 1 else Arithmetic("*", Number(share), reference)
 
 
-def after_moment(
-    template: Template,
-    clock: Clock,
-    after: float | str,
-    body: Callable[[float, float], Formula],
-    *,
-    lasts: float | None,
-    during: tuple[float, float] | None,
-) -> Formula:
-    """Return what must hold after a time, or each time when a condition becomes true.
-
-    Args:
-        template: the template, for errors.
-        clock: end of the simulation, and step.
-        after: time in s, or the condition.
-        body: what must hold, given the moment and the end relative to the time of evaluation, in s.
-        lasts: time in s for which it must hold; None: to the end of the simulation.
-        during: when a condition may become true.
-    """
-    if isinstance(after, str):
-        assert lasts is not None
-        return each_time(template, clock, parse(after), body(0.0, lasts), lasts, during)
-    if during is not None:
-        raise TemplateError("during", "applies only if after is a condition; state the time in after")
-    end = clock.stop_time if lasts is None else after + lasts
-    start = after + (getattr(template, "time", 0.0) if lasts is None else 0.0)
-    needed = max(start, end)
-    if needed > clock.stop_time:
-        raise TemplateError(
-            _longest(template),
-            f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: shorten the "
-            "times or simulate longer",
-        )
-    return body(after, end)
-
-
-def _longest(template: Template) -> str:
-    """Return the argument to name if a requirement needs more time than there is."""
-    times = {key: t for key in template.times if isinstance(t := getattr(template, key), int | float)}
-    return max(times, key=times.__getitem__) if times else (*template.conditions_in, "during")[0]
-
-
-def each_time(
-    template: Template,
-    clock: Clock,
-    condition: Formula,
-    body: Formula,
-    reach: float,
-    during: tuple[float, float] | None,
-) -> Formula:
-    """Return that something holds each time when a condition becomes true."""
-    becomes = And(Not(condition), Next(condition))
-    window = span(template, clock, reach + clock.step, during)
-    return Always(Implies(becomes, Next(body)), window)
-
-
-def span(template: Template, clock: Clock, reach: float, during: tuple[float, float] | None) -> Window:
-    """Return the window in which it applies: the given one, or as long as the simulation allows."""
-    inner = [parse(t).horizon(clock.step) for t in _conditions(template)]
-    latest = clock.stop_time - reach - max(inner, default=0.0)
-    if clock.step:
-        latest = floor(latest / clock.step + 1e-6) * clock.step
-    start, end = during or (0.0, latest)
-    if during is not None and not 0 <= start <= end:
-        raise TemplateError(
-            "during", f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]"
-        )
-    if end > latest + 1e-9 * clock.stop_time or latest < 0:
-        needed = clock.stop_time - latest + (0.0 if during is None else end)
-        cure = "shorten the times or simulate longer"
-        if during is not None and latest >= start:
-            cure = f"end the window at {latest:g} s, {cure}"
-        raise TemplateError(
-            _longest(template) if during is None else "during",
-            f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: {cure}",
-        )
-    return window_of(start, end)
-
-
-def _conditions(template: Template) -> Iterator[str]:
-    for key in template.conditions_in:
-        value = getattr(template, key)
-        yield from (t for t in (value if isinstance(value, tuple) else (value,)) if isinstance(t, str))
-
-
 def window_of(start: float, end: float) -> Window:
     """Return a window without the digits of rounding."""
     return Window(round(start, _DECIMALS), round(end, _DECIMALS))
@@ -267,36 +271,3 @@ def window_of(start: float, end: float) -> Window:
 def tidy(value: float) -> float:
     """Return a computed number without the digits of rounding, 1.6 for 0.02 * 80."""
     return float(f"{value:.12g}")
-
-
-def template_arguments(text: str) -> dict[str, Any]:
-    """Return the section for a template on the command line: its name, then ``key=value`` in any order.
-
-    Values are written as in TOML; text needs no quotes of its own unless it contains spaces.
-
-    >>> template_arguments("settles signal=speed reference=80 within=2% time=3")["reference"]
-    80
-
-    Raises:
-        FormulaError: naming what is not ``key=value``.
-    """
-    rest = _ARGUMENT.sub("", text).strip()
-    if rest or not text.strip():
-        problem = f"{rest}: a quote has no end" if rest else "empty"
-        raise FormulaError(
-            f"--template: {problem}; write a template and its arguments: 'settles signal=speed ...'"
-        )
-    name, *pairs = _ARGUMENT.findall(text)
-    found: dict[str, Any] = {"template": name}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not equals or key in found:
-            raise FormulaError(
-                f"--template: {pair}: expected each argument once, as key=value; spaces need quotes: "
-                "when='speed > 5'"
-            )
-        try:
-            found[key] = tomllib.loads(f"v = {value}")["v"]
-        except (ValueError, RecursionError):  # also integers of too many digits, and deep nesting
-            found[key] = value
-    return found

@@ -12,15 +12,18 @@
 Terms are written as in formulas, so that ``y5 - y4`` is a signal, too; conditions are formulas. Formulas look
 forward only and know no value of another sample. So a condition *becomes* true between two samples: false at
 one, true at the next; a condition that is true at time 0 does not become true there.
+
+The first line of a template's docstring is what lists and prompts say of it.
 """
 
 from collections.abc import Iterator, Mapping
 from functools import reduce
 from itertools import combinations, pairwise
-from typing import Annotated, ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field, model_validator
 
+from falsifier.problem.sections import Seconds
 from falsifier.problem.template_arguments import (
     Clock,
     Condition,
@@ -31,13 +34,10 @@ from falsifier.problem.template_arguments import (
     Template,
     TemplateError,
     Term,
-    after_moment,
-    each_time,
     near,
     scaled,
     share_of,
     size_of,
-    span,
     term,
     tidy,
     window_of,
@@ -54,16 +54,10 @@ _REFERENCE = Field(description="What it is compared with: a number, a signal or 
 _AFTER = Field(
     0.0, description="Time in s, or a condition: then it applies each time when the condition becomes true."
 )
-_DURING = Field(None, description="[start, end] in s; default: as long as the simulation allows.")
 
 
 class Settles(Template):
-    """Stays within a margin of the reference, at the latest some time after a moment."""
-
-    summary: ClassVar[str] = "it is near a reference at the latest some time after a moment, and stays there"
-    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
-    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
-    times: ClassVar[tuple[str, ...]] = ("time", "stays", "after")
+    """It is near a reference at the latest some time after a moment, and stays there."""
 
     template: Literal["settles"]
     signal: Term = _SIGNAL
@@ -74,7 +68,6 @@ class Settles(Template):
     stays: Duration | None = Field(
         None, description="How long it stays there in s; default after a time: to the end of the simulation."
     )
-    during: tuple[Finite, Finite] | None = _DURING
 
     def _formula(self, clock: Clock) -> Formula:
         inside = near(self.signal, self.reference, self.within)
@@ -82,21 +75,16 @@ class Settles(Template):
             raise TemplateError(
                 "stays", "this key is missing: after a condition, say how long it stays there"
             )
-        stays = None if self.stays is None else self.time + self.stays
 
         def settled(start: float, end: float) -> Formula:
             return Always(inside, window_of(start + self.time, end))
 
-        return after_moment(self, clock, self.after, settled, lasts=stays, during=self.during)
+        lasts = None if self.stays is None else self.time + self.stays
+        return self._after(self.after, clock, settled, lasts=lasts, begins=self.time)
 
 
 class Overshoot(Template):
-    """Never exceeds the reference by more than a margin after a moment."""
-
-    summary: ClassVar[str] = "it exceeds a reference by at most a margin after a moment"
-    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
-    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
-    times: ClassVar[tuple[str, ...]] = ("after", "duration")
+    """It exceeds a reference by at most a margin after a moment."""
 
     template: Literal["overshoot"]
     signal: Term = _SIGNAL
@@ -107,7 +95,6 @@ class Overshoot(Template):
     duration: Duration | None = Field(
         None, description="How long it applies in s; default after a time: to the end of the simulation."
     )
-    during: tuple[Finite, Finite] | None = _DURING
 
     def _formula(self, clock: Clock) -> Formula:
         if isinstance(self.after, str) and self.duration is None:
@@ -117,25 +104,15 @@ class Overshoot(Template):
         signal, reference = term(self.signal), term(self.reference)
         sides = (signal, reference) if self.direction == "up" else (reference, signal)
         bounded = Predicate("<=", Arithmetic("-", *sides), size_of(self.at_most, reference, "at_most"))
-        return after_moment(
-            self,
-            clock,
-            self.after,
-            lambda start, end: Always(bounded, window_of(start, end)),
-            lasts=self.duration,
-            during=self.during,
-        )
+
+        def kept(start: float, end: float) -> Formula:
+            return Always(bounded, window_of(start, end))
+
+        return self._after(self.after, clock, kept, lasts=self.duration)
 
 
 class Rise(Template):
-    """Reaches a share of the reference some time after a moment at the latest."""
-
-    summary: ClassVar[str] = (
-        "it reaches a reference, or a share of it, at the latest some time after a moment"
-    )
-    terms: ClassVar[tuple[str, ...]] = ("signal", "reference")
-    conditions_in: ClassVar[tuple[str, ...]] = ("after",)
-    times: ClassVar[tuple[str, ...]] = ("time", "after")
+    """It reaches a reference, or a share of it, at the latest some time after a moment."""
 
     template: Literal["rise"]
     signal: Term = _SIGNAL
@@ -146,7 +123,6 @@ class Rise(Template):
     time: Duration = Field(description="Time in s until then, at most.")
     direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
     after: Moment = _AFTER
-    during: tuple[Finite, Finite] | None = _DURING
 
     @model_validator(mode="after")
     def _is_percentage(self) -> "Rise":
@@ -163,22 +139,15 @@ class Rise(Template):
         operator: Comparison = ">=" if self.direction == "up" else "<="
         level = scaled(share_of(self.reaches) or 0.0, term(self.reference))
         reached = Predicate(operator, term(self.signal), level)
-        return after_moment(
-            self,
-            clock,
-            self.after,
-            lambda start, _end: Eventually(reached, window_of(start, start + self.time)),
-            lasts=self.time,
-            during=self.during,
-        )
+
+        def risen(start: float, end: float) -> Formula:
+            return Eventually(reached, window_of(start, end))
+
+        return self._after(self.after, clock, risen, lasts=self.time)
 
 
 class Response(Template):
     """Whenever one condition holds, another one follows within some time."""
-
-    summary: ClassVar[str] = "whenever one condition holds, another one follows within some time"
-    conditions_in: ClassVar[tuple[str, ...]] = ("when", "then")
-    times: ClassVar[tuple[str, ...]] = ("time", "stays")
 
     template: Literal["response"]
     when: Condition = Field(description="Condition.")
@@ -188,25 +157,20 @@ class Response(Template):
     on: Literal["true", "rising"] = Field(
         "true", description="true: at each time when the condition holds; rising: only when it becomes true."
     )
-    during: tuple[Finite, Finite] | None = _DURING
 
     def _formula(self, clock: Clock) -> Formula:
-        then: Formula = parse(self.then)
+        when, then = parse(self.when), parse(self.then)
         if self.stays:
             then = Always(then, window_of(0.0, self.stays))
         answer = Eventually(then, window_of(0.0, self.time))
         reach = self.time + self.stays
-        when = parse(self.when)
         if self.on == "true":
-            return Always(Implies(when, answer), span(self, clock, reach, self.during))
-        return each_time(self, clock, when, answer, reach, self.during)
+            return Always(Implies(when, answer), self._span(clock, reach))
+        return self._each_time(clock, when, answer, reach)
 
 
 class StaysWithin(Template):
-    """Stays between two limits, or near a reference."""
-
-    summary: ClassVar[str] = "it stays between limits, or near a reference"
-    terms: ClassVar[tuple[str, ...]] = ("signal", "low", "high", "reference")
+    """It stays between limits, or near a reference."""
 
     template: Literal["stays_within"]
     signal: Term = _SIGNAL
@@ -214,7 +178,6 @@ class StaysWithin(Template):
     high: Term | None = Field(None, description="Upper limit.")
     reference: Term | None = Field(None, description="In place of limits: what it stays near.")
     within: Margin | None = Field(None, description="With reference: a number, or a percentage of it.")
-    during: tuple[Finite, Finite] | None = _DURING
 
     @model_validator(mode="after")
     def _limits_or_reference(self) -> "StaysWithin":
@@ -227,7 +190,7 @@ class StaysWithin(Template):
         return self
 
     def _formula(self, clock: Clock) -> Formula:
-        window = span(self, clock, 0.0, self.during)
+        window = self._span(clock)
         if self.reference is not None and self.within is not None:
             return Always(near(self.signal, self.reference, self.within), window)
         signal = term(self.signal)
@@ -240,32 +203,23 @@ class StaysWithin(Template):
 
 
 class NeverTogether(Template):
-    """No two of the conditions hold at the same time."""
-
-    summary: ClassVar[str] = "no two conditions hold at the same time"
-    conditions_in: ClassVar[tuple[str, ...]] = ("conditions",)
+    """No two conditions hold at the same time."""
 
     template: Literal["never_together"]
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions.")
-    during: tuple[Finite, Finite] | None = _DURING
 
     def _formula(self, clock: Clock) -> Formula:
         pairs: list[Formula] = [Not(And(a, b)) for a, b in combinations(map(parse, self.conditions), 2)]
-        return Always(reduce(And, pairs), span(self, clock, 0.0, self.during))
+        return Always(reduce(And, pairs), self._span(clock))
 
 
 class Dwell(Template):
-    """A condition that becomes true stays true for a time between two limits."""
-
-    summary: ClassVar[str] = "a condition that becomes true holds for at least or at most some time"
-    conditions_in: ClassVar[tuple[str, ...]] = ("condition",)
-    times: ClassVar[tuple[str, ...]] = ("at_least", "at_most")
+    """A condition that becomes true holds for at least or at most some time."""
 
     template: Literal["dwell"]
     condition: Condition = Field(description="Condition.")
     at_least: Duration | None = Field(None, description="How long it holds in s, at least.")
     at_most: Duration | None = Field(None, description="How long it holds in s, at most.")
-    during: tuple[Finite, Finite] | None = _DURING
 
     @model_validator(mode="after")
     def _limited(self) -> "Dwell":
@@ -283,11 +237,11 @@ class Dwell(Template):
         if self.at_most is not None:
             parts.append(Eventually(Not(condition), window_of(0.0, self.at_most)))
         reach = max(self.at_least or 0.0, self.at_most or 0.0)
-        return each_time(self, clock, condition, reduce(And, parts), reach, self.during)
+        return self._each_time(clock, condition, reduce(And, parts), reach)
 
 
 class RampLimit(Template):
-    """Changes by at most so much per second.
+    """It changes by at most so much per second.
 
     Formulas cannot compare values of two samples. Either the model has the rate as a signal, or the signal is
     compared at levels: if it is below a level, it is at most ``limit * over`` above that level for the next
@@ -295,24 +249,17 @@ class RampLimit(Template):
     of two levels, and no change that is slow enough is ever called too fast.
     """
 
-    summary: ClassVar[str] = "it changes by at most so much per second"
-    terms: ClassVar[tuple[str, ...]] = ("signal", "rate")
-    times: ClassVar[tuple[str, ...]] = ("over",)
-
     template: Literal["ramp_limit"]
     signal: Term = _SIGNAL
-    limit: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(
-        description="Largest change per second, in the signal's unit."
-    )
+    limit: Finite = Field(gt=0, description="Largest change per second, in the signal's unit.")
     rate: Term | None = Field(
         None, description="Signal that is its rate of change; default: der(signal), unless over is given."
     )
-    over: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = Field(
+    over: Seconds | None = Field(
         None, description="Without a rate: time in s over which changes are judged, with range and levels."
     )
     range: tuple[Finite, Finite] | None = Field(None, description="With over: [low, high] of the signal.")
     levels: int = Field(20, ge=1, le=_MOST_LEVELS, description="With over: number of levels in the range.")
-    during: tuple[Finite, Finite] | None = _DURING
 
     @model_validator(mode="after")
     def _one_way(self) -> "RampLimit":
@@ -338,31 +285,28 @@ class RampLimit(Template):
     def _formula(self, clock: Clock) -> Formula:
         if self.over is None or self.range is None:
             slow = Predicate("<=", Call("abs", (self._rate(),)), Number(self.limit))
-            return Always(slow, span(self, clock, 0.0, self.during))
+            return Always(slow, self._span(clock))
         change, signal = self.limit * self.over, term(self.signal)
         low, high = self.range
+        sides: tuple[tuple[Comparison, float], ...] = (("<=", change), (">=", -change))
         parts: list[Formula] = []
         for k in range(self.levels):
             level = low + (high - low) * (k + 0.5) / self.levels
-            for operator, bound in (("<=", level + change), (">=", level - change)):
-                here = Predicate(operator, signal, Number(tidy(level)))  # type: ignore[arg-type]
-                later = Predicate(operator, signal, Number(tidy(bound)))  # type: ignore[arg-type]
+            for operator, shift in sides:
+                here = Predicate(operator, signal, Number(tidy(level)))
+                later = Predicate(operator, signal, Number(tidy(level + shift)))
                 parts.append(Implies(here, Always(later, window_of(0.0, self.over))))
-        return Always(_balanced(parts), span(self, clock, self.over, self.during))
+        return Always(_balanced(parts), self._span(clock, self.over))
 
 
 class Order(Template):
     """Each condition holds only once the one before it has held."""
 
-    summary: ClassVar[str] = "each condition holds only once the one before it has held"
-    conditions_in: ClassVar[tuple[str, ...]] = ("conditions",)
-
     template: Literal["order"]
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions, in order.")
-    during: tuple[Finite, Finite] | None = _DURING
 
     def _formula(self, clock: Clock) -> Formula:
-        window = span(self, clock, 0.0, self.during)
+        window = self._span(clock)
         rest = window_of(0.0, window.end - window.start)
         parts: list[Formula] = []
         for first, later in pairwise(map(parse, self.conditions)):

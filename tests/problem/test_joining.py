@@ -10,6 +10,7 @@ from falsifier.core.files import bundled
 from falsifier.errors import ModelError, SpecError
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem
+from falsifier.problem.sections import RequirementSection
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import path as fixture
@@ -60,7 +61,7 @@ def test_requirement_then_profile_then_option_override_the_spec() -> None:
 
 
 def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
-    found = joined(stl="F[0,20] (rpm > 3000)")
+    found = joined(stated=RequirementSection(formula="F[0,20] (rpm > 3000)"))
     assert (found.requirement.name, found.requirement.description) == ("stl", "")
     assert found.requirement.formula.signals == ("rpm",)
 
@@ -70,12 +71,12 @@ def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
     [
         ({"requirement": "T"}, "'T'"),
         ({"profile": "fine"}, "'fine'"),
-        ({"stl": "G[0,50] (speed <= 1)"}, "--stl"),
+        ({"stated": RequirementSection(formula="G[0,50] (speed <= 1)")}, "--stl: "),
         ({"options": {"values": ["speed=3"]}}, "parameters.speed"),
         (
             {"options": {"values": ["throttle=3", "finalDrive=3"]}},
-            "inputs",
-        ),  # nothing is left
+            "nothing is left to search: --set keeps throttle and finalDrive constant",
+        ),
         ({"options": {"output_interval": 0.03}}, "model.output_interval"),
     ],
 )
@@ -83,7 +84,7 @@ def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -
     with pytest.raises(SpecError) as caught:
         joined(**more)
     assert named in str(caught.value)
-    assert str(FILE) in str(caught.value)
+    assert named == "--stl: " or str(FILE) in str(caught.value)
 
 
 def test_signals_to_record_must_be_there() -> None:
@@ -119,10 +120,11 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
 
 
 def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:
+    low = RequirementSection(formula="G[0,1] (h >= -9)")
     with pytest.raises(SpecError, match="--search"):
-        join_formula(fixture("Ball_2"), "G[0,1] (h >= -9)", changes=changes_from_options(stop_time=1.0))
+        join_formula(fixture("Ball_2"), low, changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
-        join_formula(tmp_path / "gone.fmu", "G (x >= 0)", changes=changes_from_options())
+        join_formula(tmp_path / "gone.fmu", low, changes=changes_from_options())
 
 
 def test_an_fmu_for_scheduled_execution_alone_cannot_be_used() -> None:

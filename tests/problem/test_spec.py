@@ -61,6 +61,12 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     bad.write_text("[model\n")
     with pytest.raises(SpecError, match=r"bad\.toml: not valid TOML: .*line 1"):
         read_spec(bad)
+    bad.write_text("[model]\n", encoding="utf-16")
+    with pytest.raises(SpecError, match=r"bad\.toml: is written in UTF-16; .* save the file"):
+        read_spec(bad)
+    bad.write_bytes("# Größe\n".encode("latin-1"))
+    with pytest.raises(SpecError, match=r"bad\.toml: cannot be read: .*save the file"):
+        read_spec(bad)
 
 
 def test_a_bare_number_fixes_a_parameter() -> None:

@@ -1,8 +1,8 @@
 import pytest
 
 from falsifier.errors import FormulaError, SpecError
+from falsifier.problem.shorthand import template_arguments
 from falsifier.problem.spec import parse_spec
-from falsifier.problem.template_arguments import template_arguments
 
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
