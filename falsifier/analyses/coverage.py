@@ -4,7 +4,8 @@ Ranges are divided into parts. A part counts as tried if a simulation with a ver
 time. Trajectories are read one by one: a long run's would not fit in memory together.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 from math import ceil, floor
@@ -36,14 +37,13 @@ PACES = ("constant", "slow", "medium", "fast", "steps")
 SLOW, FAST = 1 / 2, 1 / 20
 # Points of a cubic piece at which its slope is calculated.
 _PER_PIECE = np.linspace(0.0, 1.0, 5)
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.intp]
 # Slices of the simulated time in which the values of an input are counted.
 SLICES = 40
 # Samples of an input over the simulated time: several per slice.
 _SAMPLES = 201
 
+Array = NDArray[np.float64]
+Counts = NDArray[np.intp]
 Tried = Iterable[tuple[Candidate, Trajectory | None]]
 
 
@@ -232,109 +232,100 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
         tried: each candidate with a verdict, and its trajectory if there is one.
         failures: why the simulations without a verdict failed.
     """
-    count = _Count(described)
+    candidates: list[Candidate] = []
+    seen = _Seen(described)
     for candidate, trajectory in tried:
-        count.add(candidate)
+        candidates.append(candidate)
+        seen.give(candidate)
         if trajectory is not None:
-            count.reach(trajectory)
-    return count.coverage(failures)
+            seen.reach(trajectory)
+    stop_time = described.stop_time
+    ranges = [_of_input(r, [c.signals[r.name] for c in candidates], stop_time) for r in described.inputs]
+    ranges += [_of_parameter(p, [c.parameters[p.name] for c in candidates]) for p in described.parameters]
+    pairs = [_together(*one, *other) for one, other in combinations(ranges, 2)]
+    return Coverage(
+        simulations=len(candidates),
+        failures=failures,
+        trajectories=seen.trajectories,
+        stop_time=stop_time,
+        ranges=tuple(found for found, _ in ranges),
+        pairs=tuple(sorted(pairs, key=lambda pair: pair.tried.mean())),
+        outputs=tuple(seen.outputs.values()),
+        modes=tuple(
+            ModeCoverage(name, labels, frozenset(seen.values[name]), frozenset(seen.changes[name]))
+            for name, labels in seen.labels.items()
+        ),
+    )
 
 
-@dataclass(slots=True)
-class _Range:
-    """What was tried of one input or parameter so far."""
-
-    searched: InputRecord
-    is_input: bool
-    parts: Counts = field(init=False)
-    times: Counts = field(init=False)
-    paces: dict[str, int] = field(default_factory=lambda: dict.fromkeys(PACES, 0))
-    values: list[float] = field(default_factory=list)
-    rate: float | None = None
-    apart: float | None = None
-
-    def __post_init__(self) -> None:
-        count = len(edges_of(self.searched))
-        self.parts, self.times = np.zeros(count, np.intp), np.zeros((SLICES, count), np.intp)
-
-    def add(self, values: Array) -> Counts:
-        """Add the values of one simulation over time; return the part of each."""
-        cells = cells_of(self.searched, values)
-        self.parts[np.unique(cells)] += 1
-        within = np.arange(len(values)) * SLICES // len(values)
-        for slice_, part in np.unique(np.stack([within, cells]), axis=1).T:
-            self.times[slice_, part] += 1
-        known = [*self.values, *values]
-        self.values = [float(min(known)), float(max(known))]
-        return cells
-
-    def add_changes(self, signal: Signal, stop_time: float) -> None:
-        rate = fastest_rate(signal, stop_time)
-        self.paces[pace_of(signal, rate, self.searched, stop_time)] += 1
-        self.rate = max((x for x in (self.rate, rate) if x is not None), default=None)
-        self.apart = min((x for x in (self.apart, signal.shortest_dwell) if x is not None), default=None)
-
-    def coverage(self) -> RangeCoverage:
-        return RangeCoverage(
-            searched=self.searched,
-            low=self.values[0] if self.values else None,
-            high=self.values[1] if self.values else None,
-            parts=self.parts,
-            times=self.times if self.is_input else None,
-            paces=self.paces if self.is_input else {},
-            rate=self.rate,
-            apart=self.apart,
-        )
+def _of_input(r: InputRecord, signals: Sequence[Signal], stop_time: float) -> tuple[RangeCoverage, Counts]:
+    """Return what was tried of an input, and the part of each sample, shape (simulations, _SAMPLES)."""
+    times = np.linspace(0.0, stop_time, _SAMPLES)
+    values = np.array([s.sample(times) for s in signals]).reshape(len(signals), _SAMPLES)
+    found, cells = _of_values(r, values)
+    slices = np.arange(_SAMPLES) * SLICES // _SAMPLES
+    rates = [fastest_rate(s, stop_time) for s in signals]
+    paces = Counter(pace_of(s, rate, r, stop_time) for s, rate in zip(signals, rates, strict=True))
+    input_ = replace(
+        found,
+        times=np.stack([_had(cells[:, slices == k], len(found.parts)) for k in range(SLICES)]),
+        paces={pace: paces[pace] for pace in PACES},
+        rate=max((rate for rate in rates if rate is not None), default=None),
+        apart=min((s.shortest_dwell for s in signals if s.shortest_dwell is not None), default=None),
+    )
+    return input_, cells
 
 
-class _Count:
-    """Everything that is counted, simulation by simulation."""
+def _of_parameter(r: InputRecord, values: Sequence[float]) -> tuple[RangeCoverage, Counts]:
+    """Return what was tried of a parameter, and the part of each value, shape (simulations, 1)."""
+    return _of_values(r, np.array(values).reshape(len(values), 1))
+
+
+def _of_values(r: InputRecord, values: Array) -> tuple[RangeCoverage, Counts]:
+    cells = cells_of(r, values)
+    low, high = (float(values.min()), float(values.max())) if values.size else (None, None)
+    parts = _had(cells, len(edges_of(r)))
+    return RangeCoverage(r, low, high, parts, times=None, paces={}, rate=None, apart=None), cells
+
+
+def _had(cells: Counts, count: int) -> Counts:
+    """Return in how many simulations, the rows of cells, each of so many parts occurs."""
+    return np.array([(cells == part).any(axis=1).sum() for part in range(count)], np.intp)
+
+
+def _together(one: RangeCoverage, cells: Counts, other: RangeCoverage, others: Counts) -> PairCoverage:
+    tried = np.zeros((len(one.parts), len(other.parts)), np.bool_)
+    tried[cells, others] = True
+    return PairCoverage(one.searched.name, other.searched.name, tried)
+
+
+class _Seen:
+    """What the system did, simulation by simulation: outputs, modes and their changes."""
 
     def __init__(self, described: Manifest) -> None:
-        self.described = described
-        self.simulations = self.trajectories = 0
-        self.ranges = [_Range(r, is_input=True) for r in described.inputs]
-        self.ranges += [_Range(p, is_input=False) for p in described.parameters]
-        sizes = [len(r.parts) for r in self.ranges]
-        # Rows and columns: the parts of the first range, then those of the second, and so on.
-        self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
-        self.together = np.zeros((sum(sizes), sum(sizes)), np.bool_)
-        self.times = np.linspace(0.0, described.stop_time, _SAMPLES)
+        self.trajectories = 0
         self.outputs: dict[str, OutputCoverage] = {}
-        searched = [r.searched for r in self.ranges if r.searched.kind != "real"]
-        self.labels = {r.name: labels_of(r.kind, r.items) or allowed_labels(r) for r in searched}
+        self.inputs = {r.name for r in described.inputs}
+        discrete = [r for r in (*described.inputs, *described.parameters) if r.kind != "real"]
+        self.labels = {r.name: labels_of(r.kind, r.items) or allowed_labels(r) for r in discrete}
         self.labels |= {m.name: labels_of(m.kind, m.items) for m in described.modes}
-        self.seen: dict[str, set[int]] = {name: set() for name in self.labels}
+        self.values: dict[str, set[int]] = {name: set() for name in self.labels}
         self.changes: dict[str, set[tuple[int, int]]] = {name: set() for name in self.labels}
 
-    def add(self, candidate: Candidate) -> None:
-        """Count what one simulation tried."""
-        self.simulations += 1
-        rows = []
-        for r in self.ranges:
-            name = r.searched.name
-            if r.is_input:
-                signal = candidate.signals[name]
-                rows.append(r.add(signal.sample(self.times)))
-                r.add_changes(signal, self.described.stop_time)
-                self._modes(name, signal.values)
-            else:
-                value = candidate.parameters[name]
-                rows.append(r.add(np.full(_SAMPLES, value)))
-                self._modes(name, (value,))
-        if rows:
-            for column in np.unique(np.stack(rows), axis=1).T:
-                at = column + self.starts[:-1]
-                self.together[np.ix_(at, at)] = True
+    def give(self, candidate: Candidate) -> None:
+        """Add the modes that one simulation was given."""
+        for name, signal in candidate.signals.items():
+            self._mode(name, signal.values)
+        for name, value in candidate.parameters.items():
+            self._mode(name, (value,))
 
     def reach(self, trajectory: Trajectory) -> None:
-        """Count what one simulation reached."""
+        """Add what one simulation reached."""
         self.trajectories += 1
-        inputs = {r.name for r in self.described.inputs}
         for name, values in trajectory.columns.items():
             if name in self.labels:
-                self._modes(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
-            elif name not in inputs:
+                self._mode(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
+            elif name not in self.inputs:
                 known = self.outputs.get(name)
                 self.outputs[name] = OutputCoverage(
                     name,
@@ -344,33 +335,11 @@ class _Count:
                     values if known is None else np.maximum(known.highs, values),
                 )
 
-    def coverage(self, failures: tuple[Failure, ...]) -> Coverage:
-        """Return what was counted."""
-        return Coverage(
-            simulations=self.simulations,
-            failures=failures,
-            trajectories=self.trajectories,
-            stop_time=self.described.stop_time,
-            ranges=tuple(r.coverage() for r in self.ranges),
-            pairs=tuple(sorted(self._pairs(), key=lambda pair: pair.tried.mean())),
-            outputs=tuple(self.outputs.values()),
-            modes=tuple(
-                ModeCoverage(name, labels, frozenset(self.seen[name]), frozenset(self.changes[name]))
-                for name, labels in self.labels.items()
-            ),
-        )
-
-    def _modes(self, name: str, values: Iterable[float]) -> None:
+    def _mode(self, name: str, values: Iterable[float]) -> None:
         if name in self.labels:
             numbers = [round(value) for value in values]
-            self.seen[name].update(numbers)
+            self.values[name].update(numbers)
             self.changes[name].update((a, b) for a, b in pairwise(numbers) if a != b)
-
-    def _pairs(self) -> Iterator[PairCoverage]:
-        for i, k in combinations(range(len(self.ranges)), 2):
-            rows, columns = (slice(self.starts[j], self.starts[j + 1]) for j in (i, k))
-            names = self.ranges[i].searched.name, self.ranges[k].searched.name
-            yield PairCoverage(*names, self.together[rows, columns])
 
 
 def _allowed(r: InputRecord) -> list[int]:
@@ -391,7 +360,7 @@ def edges_of(r: InputRecord) -> list[tuple[float, float]]:
 
 
 def cells_of(r: InputRecord, values: Array) -> Counts:
-    """Return the part of the range in which each value is, shape (n,)."""
+    """Return the part of the range in which each value is, in the shape of the values."""
     edges = np.array(edges_of(r))
     between = (edges[1:, 0] + edges[:-1, 1]) / 2
     return np.searchsorted(between, values, side="right")
