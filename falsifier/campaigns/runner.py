@@ -269,4 +269,4 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
         if not holds_run(directory):
             write(directory, task.manifest)
-        journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent), at_once=True)
+        journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent))

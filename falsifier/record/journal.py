@@ -11,7 +11,7 @@
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
 a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
-is noticed. ``manifest`` and ``trajectory_files`` have the other files; ``repair`` drops what is damaged.
+is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops what is damaged.
 """
 
 import errno
@@ -21,16 +21,21 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from itertools import count
 from pathlib import Path
+from shutil import copy2
 from time import monotonic
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
+from falsifier.core.words import counted
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.record import manifest
 from falsifier.record.files import (
     TRAJECTORIES,
     TRAJECTORY_NAMES,
+    is_intact,
     locked,
     recorded_trajectory,
     save_trajectory,
@@ -48,14 +53,14 @@ from falsifier.record.records import (
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.request import Keep
 
-MANIFEST = "manifest.json"
 JOURNAL = "journal.jsonl"
 LOCK = "lock"
 STOP = "stop"
 
-# Maximum time in s that lines may stay in the operating system's cache before they are forced to disk;
-# replies of a language model cost money and are forced to disk at once.
+# Maximum time in s that lines may stay in the operating system's cache before they are forced to disk.
 _SYNC_PERIOD = 1.0
+# These are forced to disk at once: replies of a language model cost money, the others are results.
+_AT_ONCE = (ExchangeRecord, ConfirmedRecord, EndedRecord)
 # With Keep "history" the first so many trajectories are kept, then each that improves on the best.
 _KEPT_TRAJECTORIES = 200
 # Errors of the operating system that say that a path can never be a folder.
@@ -80,7 +85,7 @@ class Journal:
         _check_is_file(path)
         _drop_torn_line(path)
         remove_partial(directory / TRAJECTORIES, TRAJECTORY_NAMES)
-        remove_partial(directory, f"{re.escape(MANIFEST)}|{re.escape(JOURNAL)}")
+        remove_partial(directory, f"{re.escape(manifest.MANIFEST)}|{re.escape(JOURNAL)}")
         self.records = read_journal(directory)
         self._file = path.open("ab", buffering=0)
         # A resumed run repeats the events that are recorded already; they are not written again.
@@ -104,25 +109,21 @@ class Journal:
                 )
             case Exchanged():
                 exchange = event.exchange.model_dump(mode="json")
-                self._add(ExchangeRecord(exchange=exchange, elapsed=event.spent.seconds), at_once=True)
+                self._add(ExchangeRecord(exchange=exchange, elapsed=event.spent.seconds))
             case Evaluated():
                 self._evaluated(event)
             case Confirmed():
-                record = ConfirmedRecord.of(event.confirmation, index=event.index, spent=event.spent)
-                self._add(record, at_once=True)
+                self._add(ConfirmedRecord.of(event.confirmation, index=event.index, spent=event.spent))
             case RunEnded():
-                ended = EndedRecord(
-                    status=event.status,
-                    reason=event.reason,
-                    spent=event.spent,
-                    findings={r.problem.name: list(r.findings) for r in event.results if r.findings},
+                findings = {r.problem.name: list(r.findings) for r in event.results if r.findings}
+                self.write(
+                    EndedRecord(
+                        status=event.status, reason=event.reason, spent=event.spent, findings=findings
+                    )
                 )
-                self.write(ended, at_once=True)
-            case _:
-                pass
 
-    def write(self, record: Record, *, at_once: bool = False) -> None:
-        """Append a record; at_once forces it to disk before returning.
+    def write(self, record: Record) -> None:
+        """Append a record.
 
         Raises:
             OSError: if it cannot be written; then nothing of it remains in the file.
@@ -132,7 +133,7 @@ class Journal:
         try:
             while rest:
                 rest = rest[self._file.write(rest) :]
-            if at_once or monotonic() - self._synced > _SYNC_PERIOD:
+            if isinstance(record, _AT_ONCE) or monotonic() - self._synced > _SYNC_PERIOD:
                 os.fsync(self._file.fileno())
                 self._synced = monotonic()
         except BaseException as error:
@@ -149,10 +150,10 @@ class Journal:
             os.fsync(self._file.fileno())
         self._file.close()
 
-    def _add(self, record: Record, *, at_once: bool = False) -> None:
+    def _add(self, record: Record) -> None:
         """Append a record, unless the journal contains it already."""
         if not self._is_recorded(_key(record)):
-            self.write(record, at_once=at_once)
+            self.write(record)
 
     def _is_recorded(self, key: "_Key") -> bool:
         found = self._recorded[key] > 0
@@ -242,7 +243,7 @@ def _check_is_file(path: Path) -> None:
 def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
     with _can_be_a_folder(directory):
-        return (directory / MANIFEST).exists()
+        return (directory / manifest.MANIFEST).exists()
 
 
 def holds_lines(directory: Path) -> bool:
@@ -261,8 +262,7 @@ def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Recor
     Raises:
         JournalError: if a line is invalid, unless it is an incomplete last line.
     """
-    reader = JournalReader(directory, with_candidates=with_candidates)
-    return list(reader.new())
+    return list(JournalReader(directory, with_candidates=with_candidates).new())
 
 
 class JournalReader:
@@ -304,23 +304,18 @@ class JournalReader:
                 if not line.endswith(b"\n"):  # cut off by a crash, or still being written
                     return
                 self.line += 1
-                record = self._checked(line)
+                skipped = not self._with_candidates and _ASKED in line[:_KIND_WITHIN]
+                try:
+                    check_seal(line)
+                    record = None if skipped else parse_line(line, self.line)
+                except ValueError as error:
+                    raise JournalError(
+                        f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
+                        f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
+                    ) from None
                 self.offset += len(line)
                 if record is not None:
                     yield record
-
-    def _checked(self, line: bytes) -> Record | None:
-        """Check a line; return its record, or None if it is of a kind to skip."""
-        try:
-            check_seal(line)
-            if not self._with_candidates and _ASKED in line[:_KIND_WITHIN]:
-                return None
-            return parse_line(line, self.line)
-        except ValueError as error:
-            raise JournalError(
-                f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
-                f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
-            ) from None
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
@@ -350,14 +345,11 @@ def recorded_evaluations(
         with_trajectories: False: leave out the trajectories.
     """
     candidates = recorded_candidates(records)
-    turn: dict[int, str] = {}
+    asked = [record for record in records if isinstance(record, AskedRecord)]
+    turn = {record.first + i: record.requirement for record in asked for i in range(len(record.candidates))}
     evaluations = {}
     for record in records:
-        if isinstance(record, AskedRecord):
-            turn |= dict.fromkeys(
-                range(record.first, record.first + len(record.candidates)), record.requirement
-            )
-        elif isinstance(record, EvaluatedRecord):
+        if isinstance(record, EvaluatedRecord):
             evaluations[record.index] = Evaluation(
                 candidates[record.index],
                 record.status,
@@ -394,3 +386,56 @@ def _drop_torn_line(path: Path) -> None:
     if end < len(content):
         with path.open("r+b") as file:
             file.truncate(end)
+
+
+def repair(directory: Path) -> list[str]:
+    """Drop what is damaged in a run directory; return what was found, in words; empty if nothing was.
+
+    Of a journal, what stands before the damage is kept, as after a crash at that moment: ``resume`` simulates
+    the rest again with the same result, and asks for the replies of a language model again. A copy of every
+    file that is changed is kept beside it.
+
+    Raises:
+        JournalError: if the manifest is damaged, which nothing can replace, or a process writes here.
+    """
+    manifest.read(directory)
+    with run_lock(directory):
+        found = _repaired_journal(directory / JOURNAL)
+        folder = directory / TRAJECTORIES
+        damaged = [path for path in sorted(folder.glob("*.npz")) if not is_intact(path, path.read_bytes())]
+        return [
+            *found,
+            *(
+                f"{path}: damaged; kept as {set_aside(path).name}, simulated again if needed"
+                for path in damaged
+            ),
+        ]
+
+
+def set_aside(path: Path) -> Path:
+    """Rename a damaged file or folder, so that it is kept but no longer read; return its new path."""
+    return path.rename(_free(path))
+
+
+def _free(path: Path) -> Path:
+    names = (path.with_name(f"{path.name}.damaged-{i}") for i in count(1))
+    return next(name for name in names if not name.exists())
+
+
+def _repaired_journal(path: Path) -> list[str]:
+    if path.is_dir():
+        return [f"{path}: a folder, not a journal; kept as {set_aside(path).name}"]
+    reader = JournalReader(path.parent)
+    try:
+        for _ in reader.new():
+            pass
+    except JournalError:
+        lost = path.read_bytes()[reader.offset :].count(b"\n")
+        copy = Path(copy2(path, _free(path)))
+        with path.open("r+b") as file:
+            file.truncate(reader.offset)
+        return [
+            f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
+            f"original is kept as {copy.name}; falsifier resume repeats what is missing"
+        ]
+    return []

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
-from falsifier.core.space import InputRange, ParameterRange, ValueKind
+from falsifier.core.space import ValueKind
 from falsifier.errors import JournalError
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
@@ -23,11 +23,10 @@ from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
 from falsifier.record.files import read_sealed, write_sealed
-from falsifier.record.journal import MANIFEST
-from falsifier.search.budget import Budget
 from falsifier.search.refine_levels import levels_of, parameterization_note, parameterization_of
 from falsifier.search.request import RunRequest
 
+MANIFEST = "manifest.json"
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
 
 
@@ -135,11 +134,6 @@ class Manifest(_Strict):
         """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
         return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
 
-    def with_budget(self, budget: Budget) -> "Manifest":
-        """Return the manifest of the same run with other limits."""
-        request = self.request.model_copy(update={"budget": budget})
-        return self.model_copy(update={"request": request})
-
     def of(self, name: str) -> "Manifest":
         """Return the manifest reduced to one requirement.
 
@@ -186,8 +180,8 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
             LevelRecord(first=level.first, searched=parameterization_note(level.space))
             for level in (levels if is_refined else ())
         ),
-        inputs=tuple(_range_record(r) for r in space.inputs),
-        parameters=tuple(_range_record(p) for p in space.parameters),
+        inputs=tuple(InputRecord.model_validate(r, from_attributes=True) for r in space.inputs),
+        parameters=tuple(InputRecord.model_validate(p, from_attributes=True) for p in space.parameters),
         not_searched=problem.held,
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,
@@ -231,18 +225,6 @@ def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, 
     for name, digest in found.items():
         if recorded.get(name, digest) != digest:
             raise JournalError(f"{directory}: {name} has changed since the start; start a new run instead")
-
-
-def _range_record(range_: InputRange | ParameterRange) -> InputRecord:
-    return InputRecord(
-        name=range_.name,
-        low=range_.low,
-        high=range_.high,
-        unit=range_.unit,
-        description=range_.description,
-        kind=range_.kind,
-        items=range_.items,
-    )
 
 
 def _modes(problem: Problem) -> Iterator[ModeRecord]:

@@ -332,7 +332,7 @@ def carry_out(
             if recorded is None:
                 manifest.write(directory, described)
             elif recorded.request.budget != request.budget:
-                manifest.write(directory, recorded.with_budget(request.budget))
+                manifest.write(directory, recorded.model_copy(update={"request": request}))
             steps = replayed(directory, journal.records, steps)
             stop = directory / STOP
             stop.unlink(missing_ok=True)  # of an earlier process

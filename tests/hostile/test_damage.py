@@ -20,7 +20,7 @@ from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.replay import ScriptedChat
-from falsifier.record.repair import repair
+from falsifier.record.journal import repair
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem

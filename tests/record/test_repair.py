@@ -3,8 +3,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import JournalError
-from falsifier.record.journal import open_journal, read_journal
-from falsifier.record.repair import repair, set_aside
+from falsifier.record.journal import open_journal, read_journal, repair, set_aside
 from falsifier.record.run import falsify, resume
 from tests.hostile.test_damage import Led, Standing, outcome
 from tests.problems import easy
