@@ -157,8 +157,7 @@ def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
 def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) -> "Checked":
     """Check a problem and fail if its requirement is violated."""
     __tracebackhide__ = True
-    from falsifier.counterexamples.regression import check
-    from falsifier.counterexamples.store import Database
+    from falsifier.counterexamples.regression import Database, check
     from falsifier.problem.loading import load_problem
 
     config = item.config

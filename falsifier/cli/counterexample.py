@@ -27,7 +27,8 @@ from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
-from falsifier.counterexamples.store import EXPLANATION, Database, Replayed
+from falsifier.counterexamples.regression import Database
+from falsifier.counterexamples.store import EXPLANATION, Replayed
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface

@@ -193,20 +193,18 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     """
     described = manifest.read(directory)
     name = described.names[0] if requirement is None else requirement
-    judged = judged_candidates(directory, name)
+    judged = _judged(directory, name)
     misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
     if not misses:
         raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
     robustness, candidate = min(misses, key=lambda pair: pair[0])
-    source = described.of(name).request.source
-    suffix = f"-{file_name(name)}" if described.shared else ""
     return Case(
         directory,
         name,
-        source,
+        described.of(name).request.source,
         candidate,
         robustness,
-        suffix=suffix,
+        suffix=f"-{file_name(name)}" if described.shared else "",
         simulations=len(judged),
         allow=described.allow,
         deny=described.deny,
@@ -239,9 +237,12 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
         SpecError: if the place is none of these, or the run simulated nothing with success.
         CandidateError: naming the place and what does not fit the search space.
     """
-    found = replace(_contained(place, problem), origin=KNOWN, rationale=f"from {place}")
+    if place.suffix.lower() == ".csv" and not place.is_dir():
+        found = Candidate(read_inputs(place, problem.info).signals)
+    else:
+        found = recorded_inputs(place, problem.name)
     try:
-        return fit(problem.space, found)
+        return fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {place}"))
     except CandidateError as error:
         raise CandidateError(f"{place}: {error}") from None
 
@@ -259,19 +260,13 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
     if not holds_run(place):
         return Candidate.from_json(load(place).candidate)
     names = manifest.read(place).names
-    judged = judged_candidates(place, requirement if requirement in names else names[0])
+    judged = _judged(place, requirement if requirement in names else names[0])
     if not judged:
         raise SpecError(f"{place}: no simulation of this run has a verdict; choose another run")
     return min(judged, key=lambda pair: pair[0])[1]
 
 
-def judged_candidates(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
+def _judged(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
     """Return the robustness and the candidate of each recorded simulation with a verdict, in order."""
     evaluations = recorded_evaluations(directory, read_journal(directory), requirement).values()
     return [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
-
-
-def _contained(place: Path, problem: Problem) -> Candidate:
-    if place.suffix.lower() == ".csv" and not place.is_dir():
-        return Candidate(read_inputs(place, problem.info).signals)
-    return recorded_inputs(place, problem.name)

@@ -17,7 +17,13 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.words import candidate_lines
-from falsifier.counterexamples.shrink import constant_signal, stretches, with_signal
+from falsifier.counterexamples.shrink import (
+    constant_signal,
+    stretches,
+    with_parameter,
+    with_signal,
+    with_stretch,
+)
 from falsifier.counterexamples.simplicity import rest_value
 from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.problem.problem import Problem
@@ -56,8 +62,8 @@ class Effect:
     span: tuple[float, float] | None
     instead: float
     is_rest: bool
-    robustness: float | None
-    violated: bool
+    robustness: float | None = None
+    violated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,10 +86,8 @@ class Explanation:
     def text(self) -> str:
         """The explanation in one paragraph."""
         requirement = self.problem.requirement
-        demand = requirement.description or in_words(requirement.formula)
-        return " ".join(
-            (f"{self.problem.name} requires: {demand.rstrip('.')}.", *self._found(), *self._tried())
-        )
+        demand = (requirement.description or in_words(requirement.formula)).rstrip(".")
+        return " ".join((f"{self.problem.name} requires: {demand}.", *self._found(), *self._tried()))
 
     @property
     def violated(self) -> bool:
@@ -211,45 +215,39 @@ def _findings(explanation: Explanation) -> str:
 
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
+    """Reset each signal and each parameter, then each of the longest stretches, if that changes anything."""
+
+    def effect(reset: Candidate, to: Effect, span: tuple[float, float] | None = None) -> Iterator[Effect]:
+        if reset.key != candidate.key:
+            found = evaluate(problem, problem.space.admit(reset))
+            yield replace(to, span=span, robustness=found.robustness, violated=found.violated)
+
+    of_inputs = {r.name: _reset(problem, r, candidate.signals[r.name].values) for r in problem.space.inputs}
     for r in problem.space.inputs:
-        nominal = _nominal(problem, r, candidate.signals[r.name].values)
-        reset = with_signal(candidate, r.name, constant_signal(problem, r, nominal.value))
-        if any(v != nominal.value for v in candidate.signals[r.name].values):
-            yield nominal.effect(None, _reset(problem, reset))
+        to = of_inputs[r.name]
+        if set(candidate.signals[r.name].values) != {to.instead}:
+            constant = constant_signal(problem, r, to.instead)
+            yield from effect(with_signal(candidate, r.name, constant), to)
     for p in problem.space.parameters:
-        nominal = _nominal(problem, p, (candidate.parameters[p.name],))
-        if candidate.parameters[p.name] != nominal.value:
-            reset = replace(candidate, parameters={**candidate.parameters, p.name: nominal.value})
-            yield nominal.effect(None, _reset(problem, reset))
-    for r in problem.space.inputs:
-        signal = candidate.signals[r.name]
-        nominal = _nominal(problem, r, signal.values)
+        to = _reset(problem, p, (candidate.parameters[p.name],))
+        yield from effect(with_parameter(candidate, p.name, to.instead), to)
+    for name, to in of_inputs.items():
+        signal = candidate.signals[name]
         for first, end in _longest(signal):
-            values = (*signal.values[:first], *(nominal.value,) * (end - first), *signal.values[end:])
-            if values != signal.values:
-                reset = with_signal(candidate, r.name, replace(signal, values=values))
-                span = _span(signal, first, end, problem.space.stop_time)
-                yield nominal.effect(span, _reset(problem, reset))
+            span = _span(signal, first, end, problem.space.stop_time)
+            reset = with_signal(candidate, name, with_stretch(signal, first, end, to.instead))
+            yield from effect(reset, to, span)
 
 
-@dataclass(frozen=True, slots=True)
-class _Nominal:
-    """The value that an input or parameter is reset to."""
+def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> Effect:
+    """Return the effect of a reset that is still to be simulated.
 
-    name: str
-    value: float
-    is_rest: bool
-
-    def effect(self, span: tuple[float, float] | None, found: Evaluation) -> Effect:
-        return Effect(self.name, span, self.value, self.is_rest, found.robustness, found.violated)
-
-
-def _nominal(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> _Nominal:
-    """Rest, or the middle of the range if rest is unknown or all values are at rest already."""
+    It is to rest, or to the middle of the range if rest is unknown or all values are at rest already.
+    """
     rest = rest_value(problem, ranged.name)
     if rest is not None and any(v != rest for v in values):
-        return _Nominal(ranged.name, rest, is_rest=True)
-    return _Nominal(ranged.name, (ranged.low + ranged.high) / 2, is_rest=False)
+        return Effect(ranged.name, None, rest, is_rest=True)
+    return Effect(ranged.name, None, (ranged.low + ranged.high) / 2, is_rest=False)
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:
@@ -266,7 +264,3 @@ def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float
     if signal.interpolation == "constant":
         return signal.times[first], finish
     return signal.times[max(first - 1, 0)], finish
-
-
-def _reset(problem: Problem, candidate: Candidate) -> Evaluation:
-    return evaluate(problem, problem.space.admit(candidate))

@@ -1,17 +1,52 @@
-"""One requirement as a test: replays stored counterexamples first, then searches within a budget."""
+"""One requirement as a test: replays stored counterexamples first, then searches within a budget.
 
+::
+
+    counterexamples/AT.AT1/5f2c01ab.json      requirement AT1 of AT.toml
+"""
+
+from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.files import file_name
 from falsifier.counterexamples.shrink import shrink
-from falsifier.counterexamples.store import Database, Replayed, replay, to_store
+from falsifier.counterexamples.store import Replayed, StoredCounterexample, load, replay, save, to_store
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
+from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
+
+
+@dataclass(frozen=True, slots=True)
+class Database:
+    """A folder of counterexample files, one folder per requirement.
+
+    Attributes:
+        folder: the folder; it need not exist yet.
+    """
+
+    folder: Path
+
+    def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
+        """Write a counterexample; one with the same candidate is overwritten."""
+        key = repr(Candidate.from_json(stored.candidate).key)
+        return save(stored, self._place(problem) / f"{sha256(key.encode()).hexdigest()[:8]}.json")
+
+    def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
+        """Yield the stored counterexamples of a problem, by file name."""
+        for path in sorted(self._place(problem).glob("*.json")):
+            yield path, load(path)
+
+    def _place(self, problem: Problem) -> Path:
+        spec = None if problem.source is None else spec_file(problem.source)
+        return self.folder / file_name(f"{spec.stem}.{problem.name}" if spec else problem.name)
 
 
 @dataclass(frozen=True, slots=True)

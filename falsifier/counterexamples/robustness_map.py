@@ -5,14 +5,14 @@ interpolation are not. The size of a change is the largest share of a range by w
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
-from falsifier.counterexamples.shrink import stretches, with_signal
+from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
@@ -27,8 +27,7 @@ class Coordinate:
 
     Attributes:
         name: name of the input or parameter.
-        first: index of the stretch's first control point; None for a parameter.
-        end: index after its last control point; None for a parameter.
+        stretch: index of its first control point, and the index after its last one; None for a parameter.
         time: time of the first control point in s; None for a parameter or a constant signal.
         value: value without a change.
         low: lower bound.
@@ -37,8 +36,7 @@ class Coordinate:
     """
 
     name: str
-    first: int | None
-    end: int | None
+    stretch: tuple[int, int] | None
     time: float | None
     value: float
     low: float
@@ -98,20 +96,13 @@ class RobustnessMap:
     @property
     def text(self) -> str:
         """How far the violation extends, or whether one is near, in words."""
-        if self.original >= 0:
-            return self._near_miss
-        (size, share), *larger = self.persistence
-        shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
-        shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
         changes = counted(len(self.robustness), "random change")
-        return f"{shares} ({changes} of all inputs at once). {self._followed}"
-
-    @property
-    def _near_miss(self) -> str:
-        """Whether changes of a near miss violate, in words."""
-        tried = (
-            f"{counted(len(self.robustness), 'random change')} of up to {_percent(self.radius)} of the range"
-        )
+        if self.original < 0:
+            (size, share), *larger = self.persistence
+            shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
+            shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
+            return f"{shares} ({changes} of all inputs at once). {self._followed}"
+        tried = f"{changes} of up to {_percent(self.radius)} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
         least = "" if self.smallest is None else f"; the smallest robustness is {self.smallest:+.4g}"
@@ -159,9 +150,7 @@ def robustness_map(
 
     candidate = evaluation.candidate
     coordinates = tuple(_coordinates(problem, candidate))
-    start, low, high = (
-        np.array([getattr(c, name) for c in coordinates]) for name in ("value", "low", "high")
-    )
+    start, low, high = np.array([(c.value, c.low, c.high) for c in coordinates]).T
     reach = radius * (high - low)
     unit = Sobol(len(coordinates), seed=seed).random_base2((samples - 1).bit_length())[:samples]
     # One block of samples per shell: alternating shells would correlate with the bits of the Sobol sequence.
@@ -175,14 +164,10 @@ def robustness_map(
     grid = tuple(
         np.linspace(max(start[i] - reach[i], low[i]), min(start[i] + reach[i], high[i]), points) for i in axes
     )
-    surface = []
-    for second in grid[1] if len(grid) > 1 else (None,):
-        for first in grid[0]:
-            row = start.copy()
-            row[axes[0]] = first
-            if second is not None:
-                row[axes[1]] = second
-            surface.append(_robustness(problem, candidate, coordinates, row))
+    rows = np.tile(start, (points ** len(axes), 1))
+    # The second axis first, so that the first one varies along the rows of the surface.
+    rows[:, axes[::-1]] = np.stack(np.meshgrid(*grid[::-1], indexing="ij"), axis=-1).reshape(-1, len(axes))
+    surface = [_robustness(problem, candidate, coordinates, row) for row in rows]
     return RobustnessMap(
         evaluation.robustness,
         coordinates,
@@ -212,9 +197,9 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
         found = stretches(signal.values)
         for first, end in found:
             time = signal.times[first] if len(found) > 1 else None
-            yield Coordinate(r.name, first, end, time, signal.values[first], r.low, r.high, r.unit)
+            yield Coordinate(r.name, (first, end), time, signal.values[first], r.low, r.high, r.unit)
     for p in problem.space.parameters:
-        yield Coordinate(p.name, None, None, None, candidate.parameters[p.name], p.low, p.high, p.unit)
+        yield Coordinate(p.name, None, None, candidate.parameters[p.name], p.low, p.high, p.unit)
 
 
 def _robustness(
@@ -225,13 +210,11 @@ def _robustness(
 ) -> float:
     changed = candidate
     for c, value in zip(coordinates, values.tolist(), strict=True):
-        if c.first is None or c.end is None:
-            changed = replace(changed, parameters={**changed.parameters, c.name: value})
-            continue
-        signal = changed.signals[c.name]
-        kept = signal.values[: c.first], signal.values[c.end :]
-        moved = (*kept[0], *(value,) * (c.end - c.first), *kept[1])
-        changed = with_signal(changed, c.name, replace(signal, values=moved))
+        if c.stretch is None:
+            changed = with_parameter(changed, c.name, value)
+        else:
+            moved = with_stretch(changed.signals[c.name], *c.stretch, value)
+            changed = with_signal(changed, c.name, moved)
     robustness = evaluate(problem, problem.space.admit(changed)).robustness
     return np.nan if robustness is None else robustness
 

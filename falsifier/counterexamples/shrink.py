@@ -24,6 +24,7 @@ from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
 Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
+SignalPass = Callable[[Problem, InputRange, Signal], Iterator[Signal]]
 Progress = Callable[[Evaluation, int], None]
 
 # Share of a violation's margin that a simpler one keeps, unless something else is demanded.
@@ -96,11 +97,6 @@ def shrink(
     if start.violated:
         with suppress(_BudgetUsedUpError):
             hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)
-    return _descend(hunt, evaluation, start, progress)
-
-
-def _descend(hunt: "_Hunt", original: Evaluation, start: Evaluation, progress: Progress) -> Shrunk:
-    """Replace the start by simpler ones until no pass finds any."""
     best, minimal = start, False
     try:
         while not minimal:
@@ -114,7 +110,7 @@ def _descend(hunt: "_Hunt", original: Evaluation, start: Evaluation, progress: P
     except _BudgetUsedUpError:
         minimal = False
     unchanged = best.candidate.key == start.candidate.key
-    return Shrunk(original, original if unchanged else best, hunt.simulations, minimal, hunt.at_most)
+    return Shrunk(evaluation, evaluation if unchanged else best, hunt.simulations, minimal, hunt.at_most)
 
 
 class _BudgetUsedUpError(Exception):
@@ -132,7 +128,7 @@ class _Hunt:
     demands_half_step: bool = False
     simulations: int = 0
     _known: dict[object, Evaluation] = field(default_factory=dict)
-    _halved: dict[object, bool] = field(default_factory=dict)
+    _halved: dict[object, Evaluation] = field(default_factory=dict)
 
     def first(self, propose: Pass, best: Evaluation) -> Evaluation | None:
         """Find the first that keeps what is demanded among the simpler candidates that a pass proposes."""
@@ -148,9 +144,7 @@ class _Hunt:
 
     def kept(self, candidate: Candidate) -> Evaluation | None:
         """Simulate a candidate; return its evaluation if it has all that is demanded."""
-        if candidate.key not in self._known:
-            self._known[candidate.key] = self._simulate(self.problem, candidate)
-        found = self._known[candidate.key]
+        found = self._simulated(self.problem, candidate, self._known)
         if found.robustness is None or found.robustness > self.at_most:
             return None
         if self.demands_violation and not found.violated:
@@ -158,129 +152,135 @@ class _Hunt:
         return None if self.demands_half_step and not self.violates_at_half_step(candidate) else found
 
     def violates_at_half_step(self, candidate: Candidate) -> bool:
-        if candidate.key not in self._halved:
-            halved = self._simulate(half_step(self.problem), candidate)
-            self._halved[candidate.key] = halved.violated
-        return self._halved[candidate.key]
+        return self._simulated(half_step(self.problem), candidate, self._halved).violated
 
-    def _simulate(self, problem: Problem, candidate: Candidate) -> Evaluation:
-        if self.simulations >= self.budget:
-            raise _BudgetUsedUpError
-        self.simulations += 1
-        return evaluate(problem, candidate)
+    def _simulated(
+        self, problem: Problem, candidate: Candidate, known: dict[object, Evaluation]
+    ) -> Evaluation:
+        if candidate.key not in known:
+            if self.simulations >= self.budget:
+                raise _BudgetUsedUpError
+            self.simulations += 1
+            known[candidate.key] = evaluate(problem, candidate)
+        return known[candidate.key]
 
 
 def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
     """All inputs at rest and parameters nominal together, then each of them alone."""
     rests = {name: rest for name in problem.space.names if (rest := rest_value(problem, name)) is not None}
-    everything = candidate
-    for name, rest in rests.items():
-        everything = _with_constant(problem, everything, name, rest)
-    yield everything
-    for name, rest in rests.items():
-        yield _with_constant(problem, candidate, name, rest)
+    constants = {
+        r.name: constant_signal(problem, r, rests[r.name]) for r in problem.space.inputs if r.name in rests
+    }
+    nominal = {p.name: rests[p.name] for p in problem.space.parameters if p.name in rests}
+    yield replace(
+        candidate,
+        signals={**candidate.signals, **constants},
+        parameters={**candidate.parameters, **nominal},
+    )
+    for name, signal in constants.items():
+        yield with_signal(candidate, name, signal)
+    for name, value in nominal.items():
+        yield with_parameter(candidate, name, value)
 
 
-def constant(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each signal constant, at a bound or at one of its values."""
-    for r in problem.space.inputs:
-        values = candidate.signals[r.name].values
-        for value in dict.fromkeys((r.low, r.high, *sorted(values))):
-            yield _with_constant(problem, candidate, r.name, value)
+def constant(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Constant, at a bound or at one of its values."""
+    for value in dict.fromkeys((r.low, r.high, *sorted(signal.values))):
+        yield constant_signal(problem, r, value)
 
 
-def fewer_control_points(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each free signal without some of its control points: large blocks first, then single points."""
-    for r in _free(problem):
-        signal = candidate.signals[r.name]
-        size = len(signal.times) // 2
-        while size:
-            for start in range(len(signal.times) - size, 0, -1):
-                kept = [k for k in range(len(signal.times)) if not start <= k < start + size]
-                yield _with_points(candidate, r.name, kept)
-            size //= 2
+def fewer_control_points(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Free signals without some of their control points: large blocks first, then single points."""
+    count = len(signal.times)
+    size = count // 2 if r.free else 0
+    while size:
+        for start in range(count - size, 0, -1):
+            yield _with_points(signal, [k for k in range(count) if not start <= k < start + size])
+        size //= 2
 
 
-def fewer_changes(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each signal without one of its changes.
+def fewer_changes(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Without one of its changes.
 
     Everything after the change, everything before it, or only the neighbouring stretch is made equal.
     """
-    for r in problem.space.inputs:
-        values = candidate.signals[r.name].values
-        runs = stretches(values)
-        for (before, start), (_, end) in pairwise(runs):
-            left, right = values[before], values[start]
-            yield _with_values(candidate, r.name, (*values[:start], *(left,) * (len(values) - start)))
-            yield _with_values(candidate, r.name, ((right,) * start + values[start:]))
-            yield _with_values(candidate, r.name, (*values[:start], *(left,) * (end - start), *values[end:]))
-            yield _with_values(
-                candidate, r.name, (*values[:before], *(right,) * (start - before), *values[start:])
-            )
+    values = signal.values
+    for (before, start), (_, end) in pairwise(stretches(values)):
+        left, right = values[before], values[start]
+        yield with_stretch(signal, start, len(values), left)
+        yield with_stretch(signal, 0, start, right)
+        yield with_stretch(signal, start, end, left)
+        yield with_stretch(signal, before, start, right)
 
 
-def fewer_values(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each value of a signal replaced, at all its occurrences, by rest, a bound or another of its values."""
-    for r in problem.space.inputs:
-        values = candidate.signals[r.name].values
-        for old in sorted(set(values)):
-            for new in _simple_values(problem, r, values):
-                yield _with_values(candidate, r.name, tuple(new if v == old else v for v in values))
+def fewer_values(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Each value replaced, at all its occurrences, by rest, a bound or another of the values."""
+    for old in sorted(set(signal.values)):
+        for new in _simple_values(problem, r, signal):
+            yield _with_value(signal, old, new)
 
 
-def simple_stretches(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each stretch of equal values moved to rest, a bound or another value of the signal."""
-    for r in problem.space.inputs:
-        values = candidate.signals[r.name].values
-        for first, end in stretches(values):
-            for new in _simple_values(problem, r, values):
-                yield _with_values(
-                    candidate, r.name, (*values[:first], *(new,) * (end - first), *values[end:])
-                )
+def simple_stretches(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Each stretch of equal values moved to rest, a bound or another of the values."""
+    for first, end in stretches(signal.values):
+        for new in _simple_values(problem, r, signal):
+            yield with_stretch(signal, first, end, new)
 
 
-def simpler_interpolation(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each free signal with constant, then with linear interpolation."""
-    ways: tuple[Interpolation, ...] = ("constant", "linear")
-    for r in _free(problem):
-        for interpolation in ways:
-            signal = replace(candidate.signals[r.name], interpolation=interpolation)
-            yield with_signal(candidate, r.name, signal)
-            kept = [first for first, _ in stretches(signal.values)]
-            yield _with_points(with_signal(candidate, r.name, signal), r.name, kept)
+def simpler_interpolation(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Free signals with constant, then with linear interpolation."""
+    ways: tuple[Interpolation, ...] = ("constant", "linear") if r.free else ()
+    for interpolation in ways:
+        simpler = replace(signal, interpolation=interpolation)
+        yield simpler
+        yield _with_points(simpler, [first for first, _ in stretches(signal.values)])
 
 
-def rounder_numbers(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
-    """Each parameter, value and free time with fewer digits; parameters also at their bounds."""
+def rounder_parameters(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+    """Each parameter at a bound, or with fewer digits."""
     for p in problem.space.parameters:
-        value = candidate.parameters[p.name]
-        for new in (p.low, p.high, *rounder(value)):
-            yield replace(candidate, parameters={**candidate.parameters, p.name: new})
-    for r in problem.space.inputs:
-        values = candidate.signals[r.name].values
-        for old in sorted(set(values)):
-            for new in rounder(old):
-                yield _with_values(candidate, r.name, tuple(new if v == old else v for v in values))
-    for r in _free(problem):
-        signal = candidate.signals[r.name]
-        for k, time in enumerate(signal.times):
-            before = signal.times[k - 1] if k else -1.0
-            after = signal.times[k + 1] if k + 1 < len(signal.times) else problem.space.stop_time
-            for new in rounder(time):
-                if before < new < after:
-                    times = (*signal.times[:k], new, *signal.times[k + 1 :])
-                    yield with_signal(candidate, r.name, replace(signal, times=times))
+        for new in (p.low, p.high, *rounder(candidate.parameters[p.name])):
+            yield with_parameter(candidate, p.name, new)
+
+
+def rounder_values(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Each value with fewer digits."""
+    for old in sorted(set(signal.values)):
+        for new in rounder(old):
+            yield _with_value(signal, old, new)
+
+
+def rounder_times(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
+    """Each time of a free signal with fewer digits."""
+    around = (-1.0, *signal.times, problem.space.stop_time)
+    for k, time in enumerate(signal.times if r.free else ()):
+        for new in rounder(time):
+            if around[k] < new < around[k + 2]:
+                yield replace(signal, times=(*signal.times[:k], new, *signal.times[k + 1 :]))
+
+
+def _of_each(propose: SignalPass) -> Pass:
+    """Return the pass that proposes other signals for one input after the other."""
+
+    def proposals(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
+        for r in problem.space.inputs:
+            for signal in propose(problem, r, candidate.signals[r.name]):
+                yield with_signal(candidate, r.name, signal)
+
+    return proposals
 
 
 PASSES: tuple[Pass, ...] = (
     at_rest,
-    constant,
-    fewer_control_points,
-    fewer_changes,
-    fewer_values,
-    simple_stretches,
-    simpler_interpolation,
-    rounder_numbers,
+    _of_each(constant),
+    _of_each(fewer_control_points),
+    _of_each(fewer_changes),
+    _of_each(fewer_values),
+    _of_each(simple_stretches),
+    _of_each(simpler_interpolation),
+    rounder_parameters,
+    _of_each(rounder_values),
+    _of_each(rounder_times),
 )
 
 
@@ -307,29 +307,26 @@ def with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
     return replace(candidate, signals={**candidate.signals, name: signal})
 
 
-def _simple_values(problem: Problem, r: InputRange, values: tuple[float, ...]) -> list[float]:
-    rest = rest_value(problem, r.name)
-    known = (r.low, r.high, *sorted(set(values)))
-    return list(dict.fromkeys(known if rest is None else (rest, *known)))
-
-
-def _free(problem: Problem) -> Iterator[InputRange]:
-    return (r for r in problem.space.inputs if r.free is not None)
-
-
-def _with_constant(problem: Problem, candidate: Candidate, name: str, value: float) -> Candidate:
-    """Return the candidate with one input constant at a value, or one parameter set to it."""
-    for r in problem.space.inputs:
-        if r.name == name:
-            return with_signal(candidate, name, constant_signal(problem, r, value))
+def with_parameter(candidate: Candidate, name: str, value: float) -> Candidate:
+    """Return the candidate with one parameter replaced."""
     return replace(candidate, parameters={**candidate.parameters, name: value})
 
 
-def _with_values(candidate: Candidate, name: str, values: tuple[float, ...]) -> Candidate:
-    return with_signal(candidate, name, replace(candidate.signals[name], values=values))
+def with_stretch(signal: Signal, first: int, end: int, value: float) -> Signal:
+    """Return the signal with this value at the control points from the first to before the end."""
+    return replace(signal, values=(*signal.values[:first], *(value,) * (end - first), *signal.values[end:]))
 
 
-def _with_points(candidate: Candidate, name: str, kept: list[int]) -> Candidate:
-    signal = candidate.signals[name]
+def _with_value(signal: Signal, old: float, new: float) -> Signal:
+    return replace(signal, values=tuple(new if v == old else v for v in signal.values))
+
+
+def _with_points(signal: Signal, kept: list[int]) -> Signal:
     times, values = (tuple(part[k] for k in kept) for part in (signal.times, signal.values))
-    return with_signal(candidate, name, replace(signal, times=times, values=values))
+    return replace(signal, times=times, values=values)
+
+
+def _simple_values(problem: Problem, r: InputRange, signal: Signal) -> list[float]:
+    rest = rest_value(problem, r.name)
+    known = (r.low, r.high, *sorted(set(signal.values)))
+    return list(dict.fromkeys(known if rest is None else (rest, *known)))

@@ -1,17 +1,12 @@
 """Counterexamples as small, readable files that can be kept under version control and replayed at any time.
 
-::
-
-    counterexamples/AT.AT1/5f2c01ab.json      requirement AT1 of AT.toml
-
 A file states how to load its problem (relative to the file itself), what was simulated and with what result,
 so that it can be replayed after the FMU or the requirement has changed.
 """
 
 import json
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from typing import Any, Literal
@@ -21,19 +16,18 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
+from falsifier.errors import CandidateError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, resolved
-from falsifier.problem.loading import load_source, reloadable, spec_file
+from falsifier.problem.loading import load_source, reloadable
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource, Target
+from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import RequirementRecord
 from falsifier.record.records import ConfirmedRecord
 from falsifier.stl.margins import signed
-from falsifier.stl.monitor import Verdict
 
 FILE_NAME = "counterexample.json"
 # What falsifier explain has found out, beside the counterexample's file; reports repeat it.
@@ -41,15 +35,11 @@ EXPLANATION = "explanation.txt"
 
 ReplayStatus = Literal["violates", "fragile", "does not violate", "does not fit"]
 
-_STATUS: dict[Outcome, ReplayStatus] = {
-    "confirmed": "violates",
-    "fragile": "fragile",
-    "refuted": "does not violate",
-}
-_WORDS: dict[ReplayStatus, str] = {
-    "violates": "still violated",
-    "fragile": "fragile",
-    "does not violate": "no longer violated",
+# Of a confirmation's outcome: the status, and what is said of it.
+_STATUS: dict[Outcome, tuple[ReplayStatus, str]] = {
+    "confirmed": ("violates", "still violated"),
+    "fragile": ("fragile", "fragile"),
+    "refuted": ("does not violate", "no longer violated"),
 }
 
 
@@ -104,14 +94,11 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
     Raises:
         ValueError: if the evaluation has no verdict.
     """
-    problem, evaluation = confirmation.problem, confirmation.evaluation
-    if evaluation.verdict is None:
-        raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
+    problem = confirmation.problem
     return _content(
         RequirementRecord.of(problem.requirement),
         reloadable(problem),
-        evaluation.candidate,
-        evaluation.verdict,
+        confirmation.evaluation,
         outcome=confirmation.outcome,
         reason=confirmation.reason,
         fmu_sha256=fmus_sha256(fmu_files(problem.model).values()),
@@ -123,37 +110,38 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
 def _content(
     requirement: RequirementRecord,
     source: ProblemSource | None,
-    candidate: Candidate,
-    verdict: Verdict,
-    *,
-    outcome: Outcome,
-    reason: str,
-    fmu_sha256: str | None,
-    allow: tuple[str, ...],
-    deny: tuple[str, ...],
+    evaluation: Evaluation,
+    **recorded: Any,
 ) -> StoredCounterexample:
+    verdict = evaluation.verdict
+    if verdict is None:
+        raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
     return StoredCounterexample(
         requirement=requirement.name,
         formula=requirement.formula,
         problem=source,
-        candidate=candidate.to_json(),
+        candidate=evaluation.candidate.to_json(),
         robustness=verdict.robustness,
         critical_time=verdict.critical_time,
         predicate=verdict.predicate,
         what_broke=verdict.breach.text if verdict.breach else "",
-        outcome=outcome,
-        reason=reason,
-        fmu_sha256=fmu_sha256,
-        allow=allow,
-        deny=deny,
+        **recorded,
     )
 
 
 def save(stored: StoredCounterexample, path: Path) -> Path:
     """Write a counterexample file atomically, with the problem's paths relative to it; return its path."""
-    request = stored.problem and _seen_from(stored.problem, path.parent)
-    allow = stored.allow and tuple(_seen_right(word, path.parent) for word in stored.allow)
-    content = stored.model_copy(update={"problem": request, "allow": allow}).model_dump(mode="json")
+
+    def seen(other: str) -> str:
+        return Path(relpath(other, path.parent.resolve())).as_posix()
+
+    def seen_right(word: str) -> str:
+        kind, colon, place = word.partition(":")
+        return f"{kind}:{seen(place)}" if colon else word
+
+    source = stored.problem and _moved(stored.problem, lambda file: seen(str(Path(file).resolve())))
+    allow = stored.allow and tuple(map(seen_right, stored.allow))
+    content = stored.model_copy(update={"problem": source, "allow": allow}).model_dump(mode="json")
     del content["sum"]
     return write_whole(path, seal(json.dumps(content, indent=2)))
 
@@ -184,7 +172,7 @@ def load(path: Path | str) -> StoredCounterexample:
         raise SpecError(
             f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
         ) from None
-    found = stored.problem and _found_from(stored.problem, file.parent)
+    found = stored.problem and _moved(stored.problem, lambda relative: str(file.parent / relative))
     allow = stored.allow and resolved(stored.allow, file.parent)
     return stored.model_copy(update={"problem": found, "allow": allow, "sum": ""})
 
@@ -267,16 +255,11 @@ def keep_recorded(directory: Path) -> None:
             continue
         if name not in evaluations:
             evaluations[name] = recorded_evaluations(directory, records, name, with_trajectories=False)
-        evaluation, alone = evaluations[name][record.index], described.of(name)
-        if evaluation.verdict is None:
-            raise JournalError(
-                f"{directory}: the journal is damaged: the counterexample of {name} has no verdict"
-            )
+        alone = described.of(name)
         content = _content(
             alone.requirement,
             alone.request.source,
-            evaluation.candidate,
-            evaluation.verdict,
+            evaluations[name][record.index],
             outcome="confirmed",
             reason=record.reason,
             fmu_sha256=described.fmu_sha256,
@@ -340,40 +323,15 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
         how = "timed out" if evaluation.status == "timeout" else evaluation.status
         raise SimulationError(f"{problem.name}: the simulation {how}: {evaluation.reason}")
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
-    status = _STATUS[confirmation.outcome if confirmation else "refuted"]
+    status, said = _STATUS[confirmation.outcome if confirmation else "refuted"]
     breach = evaluation.verdict.breach if evaluation.verdict else None
     broke = f": {breach.text};" if breach else ","
     text = (
-        f"{problem.name}: {_WORDS[status]}{broke} robustness {signed(evaluation.robustness)} "
+        f"{problem.name}: {said}{broke} robustness {signed(evaluation.robustness)} "
         f"(recorded {signed(stored.robustness)})"
     )
     text += f"; {confirmation.reason}" if confirmation else ""
     return Replayed(status, confirmation, evaluation, text + changes)
-
-
-@dataclass(frozen=True, slots=True)
-class Database:
-    """A folder of counterexample files, one folder per requirement.
-
-    Attributes:
-        folder: the folder; it need not exist yet.
-    """
-
-    folder: Path
-
-    def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
-        """Write a counterexample; one with the same candidate is overwritten."""
-        key = repr(Candidate.from_json(stored.candidate).key)
-        return save(stored, self._place(problem) / f"{sha256(key.encode()).hexdigest()[:8]}.json")
-
-    def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
-        """Yield the stored counterexamples of a problem, by file name."""
-        for path in sorted(self._place(problem).glob("*.json")):
-            yield path, load(path)
-
-    def _place(self, problem: Problem) -> Path:
-        spec = None if problem.source is None else spec_file(problem.source)
-        return self.folder / file_name(f"{spec.stem}.{problem.name}" if spec else problem.name)
 
 
 def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
@@ -386,30 +344,10 @@ def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
         yield f"the requirement has changed from {stored.formula} to {formula}"
 
 
-def _split(target: str) -> tuple[Path | None, str]:
-    """Split a target into its file (None for a bundled name) and the rest with its colon."""
-    parts = Target.parse(target)
+def _moved(source: ProblemSource, move: Callable[[str], str]) -> ProblemSource:
+    """Return the source with another path of its file; one with a bundled name stays."""
+    parts = source.parts
     if not parts.file:
-        return None, ""
-    return Path(parts.file), f":{parts.requirement}" if parts.requirement else ""
-
-
-def _seen_right(word: str, folder: Path) -> str:
-    """Return what is allowed with its path, if it has one, relative to a folder."""
-    kind, colon, path = word.partition(":")
-    return f"{kind}:{Path(relpath(path, folder.resolve())).as_posix()}" if colon else word
-
-
-def _seen_from(request: ProblemSource, folder: Path) -> ProblemSource:
-    """Return the request with the path of its file relative to a folder."""
-    file, requirement = _split(request.target)
-    if file is None:
-        return request
-    seen = Path(relpath(file.resolve(), folder.resolve())).as_posix()
-    return request.model_copy(update={"target": f"{seen}{requirement}"})
-
-
-def _found_from(request: ProblemSource, folder: Path) -> ProblemSource:
-    """Return the request with its path, which is relative to a folder, made valid from here."""
-    file, requirement = _split(request.target)
-    return request if file is None else request.model_copy(update={"target": f"{folder / file}{requirement}"})
+        return source
+    requirement = f":{parts.requirement}" if parts.requirement else ""
+    return source.model_copy(update={"target": f"{move(parts.file)}{requirement}"})

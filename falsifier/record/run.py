@@ -45,8 +45,9 @@ LLM = LLMSettings | Chat | str
 _STOP_PERIOD = 0.2
 
 
+# A text is a sequence of texts, too, but one target: the first that fits decides.
 @overload
-def falsify(
+def falsify(  # type: ignore[overload-overlap]
     problem: Falsifiable,
     engine: str | Engine | None = ...,
     *,
@@ -63,24 +64,7 @@ def falsify(
 
 @overload
 def falsify(
-    problem: list[Falsifiable] | tuple[Falsifiable, ...],
-    engine: str | None = ...,
-    *,
-    llm: LLM | None = ...,
-    budget: Budget | int | None = ...,
-    seed: int = ...,
-    directory: Path | str | None = ...,
-    jobs: int = ...,
-    start_from: Iterable[Candidate] = ...,
-    refine: bool = ...,
-    listeners: Iterable[Listener] = ...,
-) -> list[Result]: ...
-
-
-# Sequence[Falsifiable] would include str, which is one target; and list is invariant.
-@overload
-def falsify(
-    problem: Sequence[Problem | ProblemSource] | list[str],
+    problem: Sequence[Falsifiable],
     engine: str | None = ...,
     *,
     llm: LLM | None = ...,
@@ -154,8 +138,10 @@ def falsify(
     if refine and not isinstance(engine, str | None):
         raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
     groups, known = alike(problems), list(start_from)
-    chat = llm if llm is not None and not isinstance(llm, LLMSettings | str) else None
-    name, settings = engine if isinstance(engine, str) or engine is None else engine.name, _settings(llm)
+    chat = None if isinstance(llm, LLMSettings | str | None) else llm
+    made = None if isinstance(engine, str | None) else engine
+    name = engine if isinstance(engine, str | None) else engine.name
+    settings = _settings(llm)
     results: dict[str, Result] = {}
     for same in groups:
         group = widened(same) if refine else same
@@ -173,14 +159,7 @@ def falsify(
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
             place = place / file_name(group[0].name)
-        found = carry_out(
-            request,
-            group,
-            place,
-            engine=None if isinstance(engine, str) else engine,
-            chat=chat,
-            listeners=listeners,
-        )
+        found = carry_out(request, group, place, engine=made, chat=chat, listeners=listeners)
         results |= {result.problem.name: result for result in found}
     ordered = [results[each.name] for each in problems]
     return ordered if several else ordered[0]

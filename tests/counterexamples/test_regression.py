@@ -3,8 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.counterexamples.regression import check
-from falsifier.counterexamples.store import Database
+from falsifier.counterexamples.regression import Database, check
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation

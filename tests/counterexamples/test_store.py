@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.store import Database, limited, load, problem_of, replay, save, to_store
+from falsifier.counterexamples.regression import Database
+from falsifier.counterexamples.store import limited, load, problem_of, replay, save, to_store
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import evaluate

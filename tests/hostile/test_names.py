@@ -27,7 +27,8 @@ from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.export.tables import matlab_names
-from falsifier.counterexamples.store import Database, file_of, to_store
+from falsifier.counterexamples.regression import Database
+from falsifier.counterexamples.store import file_of, to_store
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
