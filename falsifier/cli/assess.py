@@ -32,7 +32,8 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
-from falsifier.record.journal import MANIFEST, holds_run, read_journal, recorded_evaluations
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.manifest import MANIFEST
 from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
