@@ -1,7 +1,6 @@
 """Values of inputs and parameters at which a comparison in a file changes: solved for them where possible."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import islice, product
 
@@ -35,57 +34,34 @@ class _UnknownError(ValueError):
     """The value of a text is not known."""
 
 
-@dataclass(frozen=True, slots=True)
-class Definitions:
-    """What a file says of the values of variables.
-
-    Attributes:
-        equal: expressions by the variables that they are the only value of.
-        fed: variables on which others depend in one step; these follow them, if nothing better is known.
-    """
-
-    equal: Mapping[str, str] = field(default_factory=dict)
-    fed: Mapping[str, frozenset[str]] = field(default_factory=dict)
-
-
 def crossings_of(
-    found: Iterable[Threshold], known: Definitions, ranges: Mapping[str, tuple[float, float]]
+    found: Iterable[Threshold], ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[Crossing, ...]:
     """Return the values within their ranges at which signals make a comparison change.
 
     Args:
         found: the comparisons.
-        known: values of other variables in them.
         ranges: bounds of inputs and parameters, by their names in the model.
     """
     crossings: dict[str, set[float]] = {name: set() for name in ranges}
-    for threshold in islice((each for each in found if _is_known(each, known)), _MAX_THRESHOLDS):
+    for threshold in islice((each for each in found if each.names), _MAX_THRESHOLDS):
         for name, (low, high) in ranges.items():
             if low < high and len(crossings[name]) < _MAX_CROSSINGS:
-                short = name.rpartition(".")[2].strip("'")
-                crossings[name].update(_solutions(threshold, short, known, low, high))
+                crossings[name].update(_solutions(threshold, name, low, high))
     return tuple(
         Crossing(name, value) for name, each in crossings.items() for value in sorted(each)[:_MAX_CROSSINGS]
     )
 
 
-def _is_known(threshold: Threshold, known: Definitions) -> bool:
-    """Whether it has a variable of the model, or one of a function that is made of such."""
-    inner = (name for name, text in threshold.constants.items() if not text)
-    return bool(threshold.names) or any(name in known.equal for name in inner)
-
-
-def _solutions(
-    threshold: Threshold, name: str, known: Definitions, low: float, high: float
-) -> Iterator[float]:
+def _solutions(threshold: Threshold, name: str, low: float, high: float) -> Iterator[float]:
+    signal = name.rpartition(".")[2].strip("'")
     constants = sorted(threshold.constants)
     choices = [[v.strip() for v in threshold.constants[c].split(" or ")] for c in constants]
     for values in islice(product(*choices), _MAX_COMBINATIONS):
         stated = dict(zip(constants, values, strict=True))
 
         def margin(at: Array, stated: Mapping[str, str] = stated) -> Array:
-            scope = _Scope(name, known, stated, at)
-            left, right = (scope.value(side) for side in (threshold.left, threshold.right))
+            left, right = (_value(side, signal, at, stated) for side in (threshold.left, threshold.right))
             return np.broadcast_to(left - right, at.shape)
 
         try:
@@ -111,64 +87,27 @@ def _roots(margin: Callable[[Array], Array], at: Array) -> Iterator[float]:
         yield float(f"{float(above[0]):.9g}")
 
 
-@dataclass(frozen=True, slots=True)
-class _Scope:
-    """Evaluates expressions of Modelica, C and Simulink in which one signal varies.
+def _value(text: str, signal: str, at: Array, constants: Mapping[str, str], depth: int = 0) -> Array:
+    """Return the value of an expression for values of a signal.
 
-    States that feed each other are followed for some steps. Values of names are kept per step: without that,
-    time would grow with a power of the number of states.
-
-    Attributes:
-        signal: the signal.
-        known: values of other variables.
-        constants: values of the constants.
-        at: values of the signal.
+    Raises:
+        _UnknownError: if it has something else than arithmetic, constants and this signal.
     """
-
-    signal: str
-    known: Definitions
-    constants: Mapping[str, str]
-    at: Array
-    _kept: dict[tuple[str, int], Array | None] = field(default_factory=dict)
-
-    def value(self, text: str, depth: int = 0) -> Array:
-        """Return the value of an expression for each value of the signal.
-
-        Raises:
-            _UnknownError: if it has something else than arithmetic, or a variable of unknown value.
-        """
-        expression, names = _parsed(text)
-        if depth > _MAX_DEPTH or expression is None:
-            raise _UnknownError(text)
-        columns = {v: self._kept_value(names[int(v[1:])], depth) for v in expression.signals}
-        return expression.evaluate(columns)
-
-    def _kept_value(self, name: str, depth: int) -> Array:
-        if (name, depth) not in self._kept:
-            try:
-                self._kept[name, depth] = self._named(name, depth)
-            except _UnknownError:
-                self._kept[name, depth] = None
-        value = self._kept[name, depth]
-        if value is None:
-            raise _UnknownError(name)
-        return value
-
-    def _named(self, name: str, depth: int) -> Array:
-        if name not in self.constants and name not in self.known.equal:
+    expression, names = _parsed(text)
+    if expression is None or depth > _MAX_DEPTH:
+        raise _UnknownError(text)
+    columns = {}
+    for variable in expression.signals:
+        name = names[int(variable[1:])]
+        if name not in constants:
             name = name.rpartition(".")[2]  # of a.b, what is known of b
-        if name in self.constants and (self.constants[name] or name not in self.known.equal):
-            return self.value(self.constants[name], depth + 1)
-        if name == self.signal and name not in self.constants:
-            return self.at
-        if name in self.known.equal:
-            try:
-                return self.value(self.known.equal[name], depth + 1)
-            except _UnknownError:
-                pass  # it may follow the signal all the same
-        if self.signal in self.known.fed.get(name, ()):
-            return self.at
-        raise _UnknownError(name)
+        if name in constants:
+            columns[variable] = _value(constants[name], signal, at, constants, depth + 1)
+        elif name == signal:
+            columns[variable] = at
+        else:
+            raise _UnknownError(name)
+    return expression.evaluate(columns)
 
 
 @lru_cache(maxsize=10_000)

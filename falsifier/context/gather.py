@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from falsifier.context.crossings import crossings_of
-from falsifier.context.excerpts import Readable, of_diagram, of_text, parsed
+from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text, source_of
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
@@ -89,22 +89,22 @@ def gather(
                 left_out.append(f"context {fmu.name}: {entry} is left out, because it is not text")
             else:
                 found.append(inner)
-    texts = {f.content: parsed(f.content, f.name) for f in found if isinstance(f.content, str)}
-    library = {text: source for text, source in texts.items() if source is not None}
-    contents = [
-        (f, of_text(f.content, f.name, seeds, signals, is_named=f.is_named, library=library))
-        if isinstance(f.content, str)
-        else (f, of_diagram(f.content, seeds))
-        for f in found
-    ]
+    sources = {f.path: source_of(f.content, f.name) for f in found if isinstance(f.content, str)}
+    library = [source for source in sources.values() if source is not None]
+
+    def readable_of(file: _File) -> Readable:
+        if isinstance(file.content, Diagram):
+            return of_diagram(file.content, seeds)
+        source = sources[file.path]
+        if source is None:
+            return of_text(file.content, file.name, signals)
+        return of_source(source, library, seeds, signals, is_named=file.is_named)
+
+    contents = [(file, readable_of(file)) for file in found]
     # Of the files inside an FMU, those with one form say nothing about the signals.
     contents = [(file, readable) for file, readable in contents if file.is_named or len(readable.forms) > 1]
-    solved = (
-        crossing
-        for _, readable in contents
-        for crossing in crossings_of(readable.found, readable.known, ranges)
-    )
-    crossings = tuple(dict.fromkeys(solved))
+    limits = [threshold for _, readable in contents for threshold in readable.found]
+    crossings = crossings_of(limits, ranges)
     if sentry is None:
         return Context(crossings=crossings)
     compared = tuple(_limited(_compared(contents, signals)))

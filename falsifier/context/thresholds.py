@@ -1,14 +1,13 @@
 """Which constants are compared with which signals, in conditions of any of the languages that are read."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from math import isinf
 from typing import NamedTuple
 
 _RELATIONS = ("<", "<=", ">", ">=", "==", "!=", "<>")
-_SIGNS = ("<", ">", "==", "!=")
 # What ends an operand at its own depth of brackets.
 _BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := { } return"
 _BOUNDARIES = frozenset(_BOUNDING.split())
@@ -24,21 +23,22 @@ _TOKEN = re.compile(
     r"""
     (?P<blank>\s++)
   | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
+  | (?P<directive>^[ \t]*+\#(?:[^\n\\]|\\.)*+)
   | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+
              |(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?[a-zA-Z]*+)
   | (?P<name>[^\W\d]\w*+|'(?:[^'\\\n]|\\.){1,200}')
   | (?P<text>"(?:[^"\\]|\\.)*+(?:"|\\?\Z))
   | (?P<sign><=|>=|==|!=|<>|:=|&&|\|\||->|\+\+|--|[-+*/%&|^]=|.)
     """,
-    re.VERBOSE | re.DOTALL,
+    re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
 
 
 class Token(NamedTuple):
-    """One word, number, text or sign.
+    """One word, number, text, sign or line of C's preprocessor.
 
     Attributes:
-        kind: ``name``, ``number``, ``text`` or ``sign``.
+        kind: ``name``, ``number``, ``text``, ``sign`` or ``directive``.
         text: as written.
         start: its first character, from 0.
         end: the character behind it.
@@ -73,33 +73,39 @@ class Threshold:
 
 
 def thresholds(
-    texts: Iterable[tuple[str, int]], constants: Mapping[str, str], file: str, *, is_dotted: bool = False
+    text: str,
+    constants: Mapping[str, str],
+    place: str,
+    *,
+    is_dotted: bool = False,
+    has_lines: bool = False,
 ) -> Iterator[Threshold]:
     """Return the comparisons of variables with numbers or named constants.
 
     Args:
-        texts: conditions and statements, with their lines.
+        text: a condition, a statement or a whole file.
         constants: values of named constants, as written.
-        file: name of the file, for places.
+        place: file or block.
         is_dotted: whether ``a.b`` is a variable of this name, as in Modelica, and not the member ``b``.
+        has_lines: whether places have the number of the line.
     """
     seen = set()
-    for text, line in texts:
-        if not any(sign in text for sign in _SIGNS):
-            continue
-        tokens = list(tokens_of(text))
+    line, at = 1, 0
+    for tokens in statements(text):
         for i, token in enumerate(tokens):
-            if token.text in _RELATIONS:
-                first, last = _first(tokens, i), _last(tokens, i)
-                if first is None or last is None:
-                    continue
-                place = f"{file}:{line}" if line else file
-                found = _threshold(
-                    text, tokens[first : last + 1], i - first, constants, place, is_dotted=is_dotted
-                )
-                if found is not None and found.text not in seen:
-                    seen.add(found.text)
-                    yield found
+            if token.text not in _RELATIONS:
+                continue
+            first, last = _first(tokens, i), _last(tokens, i)
+            if first is None or last is None:
+                continue
+            line, at = line + text.count("\n", at, token.start), token.start
+            shown = f"{place}:{line}" if has_lines else place
+            found = _threshold(
+                text, tokens[first : last + 1], i - first, constants, shown, is_dotted=is_dotted
+            )
+            if found is not None and found.text not in seen:
+                seen.add(found.text)
+                yield found
 
 
 def at_breakpoints(signal: str, values: Sequence[str], place: str) -> Threshold:
@@ -220,11 +226,26 @@ def _last(tokens: Sequence[Token], i: int) -> int | None:
 def _ends(token: Token, depth: int, closing: Collection[str]) -> bool:
     """Whether an operand ends before a token."""
     text = token.text
-    return depth == 0 and (text in closing or text in _BOUNDARIES or text in _RELATIONS)
+    return depth == 0 and (
+        text in closing or text in _BOUNDARIES or text in _RELATIONS or token.kind == "directive"
+    )
 
 
-def tokens_of(text: str) -> Iterator[Token]:
-    """Return the tokens of an expression of any of the languages, without blanks and comments."""
-    for found in _TOKEN.finditer(text):
+def tokens_of(text: str, at: int = 0) -> Iterator[Token]:
+    """Return the tokens of a text in any of the languages, from a place on, without blanks and comments."""
+    for found in _TOKEN.finditer(text, at):
         if found.lastgroup not in ("blank", "comment"):
             yield Token(found.lastgroup or "", found[0], found.start(), found.end())
+
+
+def statements(text: str) -> Iterator[list[Token]]:
+    """Return the tokens between semicolons outside of square brackets, where they end rows of a matrix."""
+    tokens: list[Token] = []
+    depth = 0
+    for token in tokens_of(text):
+        depth += (token.text == "[") - (token.text == "]")
+        tokens.append(token)
+        if token.text == ";" and depth <= 0:
+            yield tokens
+            tokens, depth = [], 0
+    yield tokens

@@ -2,7 +2,7 @@ from falsifier.context.thresholds import number_in, thresholds, tokens_of, withi
 
 
 def found(text: str, **constants: str) -> list[str]:
-    return [t.text for t in thresholds([(text, 3)], constants, "a.mo")]
+    return [t.text for t in thresholds(text, constants, "a.mo")]
 
 
 def test_comparisons_with_numbers_and_named_constants() -> None:
@@ -22,9 +22,9 @@ def test_what_has_no_constant_or_no_variable_is_not_told() -> None:
 
 
 def test_names_values_and_place() -> None:
-    (one,) = thresholds([("m->pause * period < valid", 40), ("m->pause * period < valid", 50)],
-                        {"valid": "1.5", "period": "0.1"}, "a.c")  # fmt: skip
-    assert (one.names, one.place) == (frozenset({"pause"}), "a.c:40")
+    text = "a;\n/* \n */ m->pause * period < valid;\nm->pause * period < valid;"
+    (one,) = thresholds(text, {"valid": "1.5", "period": "0.1"}, "a.c", has_lines=True)
+    assert (one.names, one.place) == (frozenset({"pause"}), "a.c:3")
     assert (one.left, one.right) == ("m->pause * period", "valid")
     assert one.constants == {"valid": "1.5", "period": "0.1"}
 
@@ -42,15 +42,16 @@ def test_long_values_of_constants_are_not_told() -> None:
 
 
 def test_names_within_stand_for_others_outside() -> None:
-    (one,) = thresholds([("d - t > 3", 1)], {}, "a.slx")
+    (one,) = thresholds("d - t > 3", {}, "a.slx")
     seen = within(one, {"d": "speed", "t": "", "other": "x"})
     assert (seen.text, seen.names) == ("d - t > 3 (d = speed)", frozenset({"speed"}))
     assert seen.constants == {"d": "speed", "t": ""}
 
 
 def test_kinds_of_tokens_of_all_languages() -> None:
-    tokens = list(tokens_of('/* two\nlines */ x.y >= 1.5e-3f; // end\n\'a b\' "t\\"" :='))
+    tokens = list(tokens_of('/* two\nlines */\n#if A\nx.y >= 1.5e-3f; // end\n\'a b\' "t\\"" :='))
     assert [(t.kind, t.text) for t in tokens] == [
-        ("name", "x"), ("sign", "."), ("name", "y"), ("sign", ">="), ("number", "1.5e-3f"), ("sign", ";"),
+        ("directive", "#if A"), ("name", "x"), ("sign", "."), ("name", "y"), ("sign", ">="),
+        ("number", "1.5e-3f"), ("sign", ";"),
         ("name", "'a b'"), ("text", '"t\\""'), ("sign", ":=")
     ]  # fmt: skip

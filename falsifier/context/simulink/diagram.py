@@ -22,6 +22,7 @@ class Block:
         number: of an inport or outport, its position from 1; otherwise 0.
         system: what is within a subsystem; None if nothing is, and for charts, which are told apart.
         is_chart: whether a state chart or a MATLAB function is within.
+        inputs: of a chart, the names of its inputs.
         is_off: whether it is commented out.
     """
 
@@ -32,6 +33,7 @@ class Block:
     number: int = 0
     system: "BlockSystem | None" = None
     is_chart: bool = False
+    inputs: tuple[str, ...] = ()
     is_off: bool = False
 
     def parameter(self, name: str) -> str:

@@ -106,8 +106,8 @@ class _Systems:
     def system(self, node: Node, path: str = "") -> BlockSystem:
         where = path or "the model"
         nodes = [block for block in node.children if block.kind in ("Block", "Reference")]
-        names = {block.get("SID"): in_one_line(block.get("Name")) for block in nodes if block.get("SID")}
-        known = {in_one_line(block.get("Name")) for block in nodes}
+        names = {block.get("SID"): _in_one_line(block.get("Name")) for block in nodes if block.get("SID")}
+        known = {_in_one_line(block.get("Name")) for block in nodes}
         blocks = tuple(self._block(block, path) for block in nodes)
         wires = []
         for line in node.all("Line"):
@@ -122,7 +122,7 @@ class _Systems:
 
     def _block(self, node: Node, path: str) -> Block:
         kind = node.get("BlockType") or ("Reference" if node.kind == "Reference" else "")
-        name = in_one_line(node.get("Name"))
+        name = _in_one_line(node.get("Name"))
         if not kind or not node.get("Name"):
             missing = "type" if not kind else "name"
             raise SpecError(
@@ -136,12 +136,13 @@ class _Systems:
             type=kind,
             name=name,
             parameters=meaningful(kind, stated, self.defaults.get(kind, {})),
-            reference=in_one_line(
+            reference=_in_one_line(
                 node.get("SourceBlock", "ModelNameDialog", "ModelFile", "ModelName", "ReferencedSubsystem")
             ),
             number=_number(node.get("Port")) if kind in ("Inport", "Outport") else 0,
             system=None if below is None or is_chart else self.system(below, f"{path}/{name}".lstrip("/")),
             is_chart=is_chart,
+            inputs=_inputs(below) if is_chart else (),
             is_off=node.get("Commented") == "on",
         )
 
@@ -151,9 +152,16 @@ def _is_old_chart(node: Node) -> bool:
     return "Stateflow" in node.get("MaskType") or node.get("ErrorFcn").startswith("Stateflow")
 
 
+def _inputs(below: Node | None) -> tuple[str, ...]:
+    """Names of the inputs of a chart, in the order of their ports."""
+    inside = below.all("Block") if below is not None else ()
+    ports = [block for block in inside if block.get("BlockType") == "Inport"]
+    return tuple(_in_one_line(p.get("Name")) for p in sorted(ports, key=lambda p: _number(p.get("Port"))))
+
+
 def _wire(line: Node, names: Mapping[str, str]) -> Wire:
     source = _end(line, "Src", names)
-    return Wire(source, tuple(_targets(line, names)), in_one_line(line.get("Name")))
+    return Wire(source, tuple(_targets(line, names)), _in_one_line(line.get("Name")))
 
 
 def _targets(line: Node, names: Mapping[str, str]) -> Iterator[End]:
@@ -170,10 +178,10 @@ def _end(line: Node, side: str, names: Mapping[str, str]) -> End | None:
     if sid and sign:
         return End(names.get(sid, f"SID {sid}"), port.partition(":")[2] or port)
     block = line.get(f"{side}Block")
-    return End(in_one_line(block), line.get(f"{side}Port") or "1") if block else None
+    return End(_in_one_line(block), line.get(f"{side}Port") or "1") if block else None
 
 
-def in_one_line(name: str) -> str:
+def _in_one_line(name: str) -> str:
     """Return a name without the line breaks with which it is drawn."""
     return " ".join(name.split())
 

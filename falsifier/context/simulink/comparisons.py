@@ -1,0 +1,136 @@
+"""Comparisons with constants in block diagrams and state charts."""
+
+import re
+from collections.abc import Collection, Iterator, Mapping
+
+from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram
+from falsifier.context.thresholds import Threshold, at_breakpoints, thresholds, within
+
+# Of an If block, u1 is what leads to its first port, not a signal of that name.
+_PORT = re.compile(r"\bu(\d+)\b")
+_NUMBER = re.compile(r"[-+]?(\d++\.?\d*+|\.\d++)([eE][-+]?\d++)?$")
+# Tables by type: the parameter that has the breakpoints of each input.
+_TABLES: Mapping[str, Mapping[str, str]] = {
+    "Lookup": {"1": "InputValues"},
+    "Lookup2D": {"1": "RowIndex", "2": "ColumnIndex"},
+    "Lookup_n-D": {str(i): f"BreakpointsForDimension{i}" for i in range(1, 6)},
+}
+# A constant may state its type: single(5), int8(3).
+_CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
+
+
+def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = None) -> Iterator[Threshold]:
+    """Return the comparisons with constants, and the breakpoints of tables.
+
+    Args:
+        diagram: the model.
+        only: paths of the blocks to look at; None: all.
+    """
+    fed: dict[BlockPath, Mapping[str, str]] = {}  # what leads to the inports of each subsystem and chart
+    ports = {*diagram.root.ports("Inport"), *diagram.root.ports("Outport")}
+    for path, system in diagram.root.walk():
+        leading = _sources(system, fed.get(path, {}))
+        inner = {_quoted(b.name) for b in system.blocks if b.type not in ("Inport", "Outport")}
+        for block in system.blocks:
+            place = (*path, block.name)
+            inputs = leading.get(block.name, {})
+            inports = block.system.ports("Inport") if block.system is not None else block.inputs
+            # A block that only has a name of its own is left out: the inport's says more, unless it is the
+            # name of another signal, one of the model's ports.
+            fed[place] = {
+                name: inputs[str(i)]
+                for i, name in enumerate(inports, start=1)
+                if str(i) in inputs and (inputs[str(i)] not in inner or name in ports)
+            }
+            if block.is_off or (only is not None and place not in only):
+                continue
+            shown = f"{diagram.name}/{'/'.join(place)}"
+            for text in _compared(block, inputs):
+                yield from thresholds(text, {}, shown)
+            for signal, values in _breakpoints(block, inputs):
+                yield at_breakpoints(signal, values, shown)
+    for chart in diagram.charts:
+        place = tuple(chart.name.split("/"))
+        if only is None or place in only:
+            yield from _chart_thresholds(chart, fed.get(place, {}), f"{diagram.name}/{chart.name}")
+
+
+def _chart_thresholds(chart: Chart, fed: Mapping[str, str], shown: str) -> Iterator[Threshold]:
+    """Return the comparisons of a chart; its variables stand for what leads to it, or for nothing outside."""
+    constants = {d.name: d.initial for d in chart.data if d.initial and d.scope in ("constant", "parameter")}
+    own = {d.name: "" for d in chart.data if d.scope in ("local", "temporary")}
+    inputs = {d.name for d in chart.data if d.scope == "input"}
+    outside = own | {name: text for name, text in fed.items() if name in inputs and text != name}
+    for text in (*(t.label for t in chart.transitions), *(s.actions for s in chart.states), chart.script):
+        for threshold in thresholds(text, constants, shown):
+            yield within(threshold, outside)
+
+
+def _breakpoints(block: Block, inputs: Mapping[str, str]) -> Iterator[tuple[str, list[str]]]:
+    """Return what leads to each input of a table, with its breakpoints if they are numbers."""
+    for port, name in _TABLES.get(block.type, {}).items():
+        values = block.parameter(name).strip("[] ").replace(",", " ").split()
+        if port in inputs and values and all(_NUMBER.match(value) for value in values):
+            yield inputs[port], values
+
+
+def _sources(system: BlockSystem, fed: Mapping[str, str]) -> Mapping[str, Mapping[str, str]]:
+    """For each block, what leads to each input: a constant's value, or the name of a signal or block.
+
+    Args:
+        system: blocks and lines.
+        fed: what leads to its inports from outside.
+    """
+    values = {b.name: _uncast(b.parameter("Value")) for b in system.blocks if b.type == "Constant"}
+    inports, outports = set(system.ports("Inport")), set(system.ports("Outport"))
+    found: dict[str, dict[str, str]] = {}
+    for wire in system.wires:
+        if wire.source is not None:
+            outport = next((end.block for end in wire.targets if end.block in outports), "")
+            own = wire.source.block if wire.source.block in inports else ""  # before the name of its line
+            inner = own or wire.name or outport or wire.source.block
+            name = values.get(wire.source.block) or fed.get(wire.source.block) or inner
+            for target in wire.targets:
+                found.setdefault(target.block, {})[target.port] = _quoted(name)
+    return found
+
+
+def _uncast(value: str) -> str:
+    found = _CAST.match(value.strip())
+    return found[1].strip() if found else value
+
+
+def _quoted(name: str) -> str:
+    """Write a name of several words in quotes, so that it stays one name; numbers stay as they are."""
+    if name.isidentifier() or _NUMBER.match(name) or name.startswith("'"):
+        return name
+    return "'" + name.replace("'", " ").replace("\\", "/") + "'"
+
+
+def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
+    first = inputs.get("1", "u")
+    if block.type == "RelationalOperator":
+        yield f"{first} {_relation(block.parameter('Operator'))} {inputs.get('2', 'u2')}"
+    elif block.type == "Switch":
+        threshold = block.parameter("Threshold") or "0"
+        stated = {"u2": inputs.get("2", "u2"), "Threshold": threshold}
+        yield _relation(
+            re.sub(r"\b(u2|Threshold)\b", lambda word: stated[word[0]], block.parameter("Criteria"))
+        )
+    elif block.type == "Relay":
+        yield f"{first} >= {block.parameter('OnSwitchValue')}"
+        yield f"{first} <= {block.parameter('OffSwitchValue')}"
+    elif block.type in ("Saturate", "Saturation"):
+        yield f"{first} < {block.parameter('UpperLimit')}"
+        yield f"{first} > {block.parameter('LowerLimit')}"
+    elif block.type == "Reference" and block.parameter("relop"):  # Compare To Constant
+        yield f"{first} {_relation(block.parameter('relop'))} {block.parameter('const')}"
+    elif block.type == "If":
+        for text in (block.parameter("IfExpression"), *block.parameter("ElseIfExpressions").split(",")):
+            yield _relation(_PORT.sub(lambda port: inputs.get(port[1], port[0]), text))
+    elif block.type == "Fcn":
+        yield _relation(re.sub(r"\bu\b(?!\()", lambda _: first, block.parameter("Expr")))
+
+
+def _relation(operator: str) -> str:
+    return operator.replace("~=", "!=")
