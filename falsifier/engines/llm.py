@@ -19,14 +19,9 @@ from falsifier.evaluation.evaluate import Evaluation, start_values
 from falsifier.llm import ReplyKind
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
-from falsifier.llm.prompts import (
-    DEFAULT_PROMPT_TOKENS,
-    Questions,
-    Variant,
-    View,
-    choices,
-)
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, Variant, View
 from falsifier.llm.prompts.disguise import Disguise
+from falsifier.llm.prompts.published import as_point
 from falsifier.llm.replies import Answer
 from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted
 from falsifier.problem.problem import Problem
@@ -234,7 +229,7 @@ class LLMEngine:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
         shown = self._disguise.hidden_candidate(candidate) if self._disguise else candidate
         if not self._variant.has("names") or (self._variant.is_published and self._reply == "points"):
-            return "; ".join(choices.as_point(self._view, shown))
+            return "; ".join(as_point(self._view, shown))
         return in_one_line(shown)
 
     def told(self, reason: str) -> str:

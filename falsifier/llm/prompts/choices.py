@@ -13,49 +13,13 @@ from falsifier.llm.prompts.view import View
 
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
-_DIGITS_OF_PARAMETER = 7
+_DIGITS_OF_PARAMETER = 5
 # Switches of a signal up to which every one is told; of others those by more than a share of the range.
 _MOST_PIECES = 12
 _ROUGHLY = 0.02
-_PUBLISHED_DECIMALS = 3
 
 # Of a signal with more switches only their number and distances, and its mean are told in brief.
 _MOST_IN_BRIEF = 16
-
-# Said of values where the sample had other control points than those that are told.
-_READ = " (values at these times of an input with other control points)"
-
-
-def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
-    """The numbers in the order of the dimensions."""
-    is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
-    values = zip(view.space.encode(candidate), view.space.dimensions, strict=True)
-    listed = ", ".join(_published(float(value), d.low, d.high) for value, d in values)
-    return (f"point = [{listed}]{'' if is_exact else _READ}",)
-
-
-def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
-    """Values of each input at the fixed control points, by name, and parameters."""
-    signals = [(r, candidate.signals[r.name]) for r in view.space.inputs]
-    parameters = [(p, candidate.parameters[p.name]) for p in view.space.parameters]
-    return (
-        *(
-            f"{r.name} = [{', '.join(_published(v, r.low, r.high) for v in _fixed_values(view, r, s))}]"
-            f"{'' if _is_exact(view, r, s) else _READ}"
-            for r, s in signals
-        ),
-        *(f"{p.name} = {_published(value, p.low, p.high)}" for p, value in parameters),
-    )
-
-
-def _published(value: float, low: float, high: float) -> str:
-    """A value with the published three decimals; with more only if the range is too narrow for them."""
-    return plain(value, max(_PUBLISHED_DECIMALS, decimals_for(high - low, 2)))
-
-
-def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
-    """Whether the values at the fixed control points say all about a signal."""
-    return len(set(signal.values)) == 1 or view.space.is_fixed(r, signal)
 
 
 def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
@@ -136,13 +100,6 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
         points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
     shown = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
     return f"{manner} from [time, value] points [{shown}]"
-
-
-def _fixed_values(view: View, r: InputRange, signal: Signal) -> tuple[float, ...]:
-    times = view.space.fixed_times(r)
-    if signal.times == times:
-        return signal.values
-    return tuple(float(v) for v in signal.held(None).sample(np.asarray(times)))
 
 
 def _parameters(view: View, candidate: Candidate) -> Iterator[str]:

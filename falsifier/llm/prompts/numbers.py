@@ -33,18 +33,17 @@ def plain(value: float, decimals: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def bounds(low: float, high: float) -> tuple[str, str]:
+def bounds(low: float, high: float, digits: int = _BOUND_DIGITS) -> tuple[str, str]:
     """Bounds as text; rounded inward if rounded at all, so that a printed bound lies in the range.
 
     >>> bounds(0.0, 100.0), bounds(-1.25663706143591, 1 / 3)
     (('0', '100'), ('-1.256637061', '0.3333333333'))
     """
-    return _bound(low, ROUND_CEILING), _bound(high, ROUND_FLOOR)
 
+    def rounded(value: float, rounding: str) -> str:
+        return number(float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(repr(value)))))
 
-def _bound(value: float, rounding: str) -> str:
-    rounded = Context(prec=_BOUND_DIGITS, rounding=rounding).create_decimal(Decimal(repr(value)))
-    return number(float(rounded))
+    return rounded(low, ROUND_CEILING), rounded(high, ROUND_FLOOR)
 
 
 def number(value: float, digits: int = _BOUND_DIGITS) -> str:

@@ -1,5 +1,6 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -24,7 +25,7 @@ from falsifier.llm.prompts.courses import (
 from falsifier.llm.prompts.numbers import decimals_for, number, plain
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
-from falsifier.stl.formula import And, Iff, Implies, Or, Predicate
+from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
 
 # Digits of robustness values: the search depends on small differences between samples.
@@ -53,6 +54,7 @@ _SIDES: Mapping[type[Formula], str] = {
     Implies: "condition and consequence",
     Iff: "sides",
 }
+_MARGIN = re.compile(r" by [^ ]+$")
 # Maximum number of signals shown over time; those of the formula come first.
 _MAX_SIGNALS = 16
 
@@ -80,14 +82,10 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         return Observed((line,), (line,), line)
     monitor = monitor_for(view)
     diagnosis = diagnosis_of(monitor, trajectory)
-    reasons = [f"why: {diagnosis.text}"]
-    if verdict.breach is not None:
-        reasons.insert(0, f"what broke: {verdict.breach.text}")
+    reasons = tuple(_reasons(verdict, diagnosis))
     parts = tuple(_parts(view, monitor, diagnosis, trajectory))
     there = _values_there(view, trajectory, diagnosis)
-    predicates = (
-        _predicate(view, monitor, predicate, trajectory) for predicate in view.requirement.formula.predicates
-    )
+    predicates = tuple(_predicates(view, monitor, diagnosis, trajectory))
     inside = _looked_at(view, trajectory)
     discrete = tuple(_discrete(view, inside))
     close = tuple(_close_up(view, inside, evaluation))
@@ -96,6 +94,20 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         (*reasons, *parts, *discrete, *_continuous(view, evaluation, inside, of=_deciding(view, verdict))),
         line,
     )
+
+
+def _reasons(verdict: Verdict, diagnosis: Diagnosis) -> Iterator[str]:
+    """What broke, and what decided unless that is the same; the margin is the robustness, which is told."""
+    breach = verdict.breach
+    if breach is not None:
+        yield f"what broke: {breach.text}"
+        broke = breach.main
+        is_decider = (broke.part, broke.time) == (verdict.predicate, diagnosis.critical_time)
+        if is_decider and not broke.never and len(breach.shortfalls) == 1 and not diagnosis.vacuities:
+            return
+    *above, decider = (step.text for step in diagnosis.path if step.text)
+    decided = "; ".join(above) + ": " * bool(above) + _MARGIN.sub("", decider)
+    yield " ".join((f"why: {decided}.", *(v.text for v in diagnosis.vacuities)))
 
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
@@ -184,37 +196,33 @@ def _scale(view: View, part: Formula) -> str:
     return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
 
 
-def _predicate(view: View, monitor: Monitor, predicate: Predicate, trajectory: Trajectory) -> str:
-    """When a predicate was false, among the times at which the requirement asks for it."""
-    clock = _clock(view)
-    start, end = monitor.window(predicate)
-    first, last = round(start / trajectory.step), round(end / trajectory.step)
-    margin = monitor.course(trajectory, predicate)[first : last + 1]
-    times = trajectory.times[first : last + 1]
-    said = f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s"
-    wrong = margin < 0
-    stretch = longest_stretch(times, wrong)
-    nearest = int(np.abs(margin).argmin())
-    if stretch is None:
-        near = int(margin.argmin())
-        at = plain(float(times[near]), clock)
-        return f"{said}: always true, smallest margin {_short(margin[near])} at {at} s"
-    if wrong.all():
-        return (
-            f"{said}: never true, closest at {plain(float(times[nearest]), clock)} s, "
-            f"off by {_short(-margin[nearest])}"
-        )
-    step = trajectory.step
-    if int(wrong.sum()) == 1:
-        return f"{said}: false only at {plain(stretch[0], clock)} s"
-    return (
-        f"{said}: false for {number(round(float(wrong.sum()) * step, 6))} s in total, longest from "
-        f"{plain(stretch[0], clock)} to {plain(stretch[1], clock)} s"
-    )
+def _predicates(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
+    """When each predicate was false, among the times at which the requirement asks for it.
 
-
-def _short(margin: float) -> str:
-    return f"{shown(margin):.5g}"
+    Of the one that decided without being false all is told by then.
+    """
+    clock, step = _clock(view), trajectory.step
+    for predicate in view.requirement.formula.predicates:
+        start, end = monitor.window(predicate)
+        asked = slice(round(start / step), round(end / step) + 1)
+        margin, times = monitor.course(trajectory, predicate)[asked], trajectory.times[asked]
+        wrong = margin < 0
+        stretch = longest_stretch(times, wrong)
+        near = int(np.abs(margin).argmin())
+        nearest, closest = float(times[near]), f"{shown(abs(margin[near])):.5g}"
+        if stretch is None:
+            if predicate == diagnosis.path[-1].formula and nearest == diagnosis.critical_time:
+                continue
+            found = f"always true, smallest margin {closest} at {plain(nearest, clock)} s"
+        elif wrong.all():
+            found = f"never true, closest at {plain(nearest, clock)} s, off by {closest}"
+        elif wrong.sum() == 1:
+            found = f"false only at {plain(stretch[0], clock)} s"
+        else:
+            begin, stop = (plain(time, clock) for time in stretch)
+            total = number(round(float(wrong.sum()) * step, 6))
+            found = f"false for {total} s in total, longest from {begin} to {stop} s"
+        yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
 
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:

@@ -1,49 +1,192 @@
-"""What the published prompts tell of a sample: what was compared, when, and what decided.
+"""MP1 to MP4: what the published prompts tell, in the same places and with the same digits.
 
-The digits are theirs too; ``design/published-prompts.md`` compares line by line.
+``design/published-prompts.md`` compares line by line.
 """
 
+import json
 from collections.abc import Iterator
 
+import numpy as np
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation
+from falsifier.llm import ReplyKind
 from falsifier.llm.prompts.courses import Array
-from falsifier.llm.prompts.numbers import decimals_for
+from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
+from falsifier.llm.prompts.standing import (
+    INTERPOLATION_WORDS,
+    RATIONALE,
+    formula_text,
+    json_form,
+    points_form,
+)
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Always, Eventually, Formula, Until
 
-ROBUSTNESS_DECIMALS = 3
+# They tell so many of the latest samples.
+MOST_SAMPLES = 10
+_DECIMALS = 3
 # Decimals of an output: one, or as many as show that it is not zero.
-_FEWEST_DECIMALS, _MOST_DECIMALS = 1, 3
+_FEWEST_OF_OUTPUT, _MOST_OF_OUTPUT = 1, 3
 # Decimals of a critical time: those of the times in the formula, up to this many.
 _MOST_CLOCK_DECIMALS = 4
+# Said of values where the sample had other control points than those that are told.
+_READ = " (values at these times of an input with other control points)"
+
+_TASK = (
+    "Your task is to find {what} with which a system violates its specification. Each sample is judged by a "
+    "number, its robustness: lower is better, and below 0 the specification is violated."
+)
+_REQUIREMENT = "Requirement, in Signal Temporal Logic with times in seconds:\n{formula}"
+_GUIDANCE = "Consider which combinations of values had the lower robustness."
+_GUIDANCE_ON_NUMBERS = "Consider what each number may stand for and how it may act on the system."
+_GUIDANCE_ON_MEANING = (
+    "Use the meaning of the {what} and of the requirement: how each of the {what} acts on the output "
+    "signals, what the requirement demands of these, and what could break it."
+)
+_GUIDANCE_ON_OUTPUTS = (
+    "Study the output values of the samples: how they follow the {what}, and whether they move towards a "
+    "violation."
+)
 
 
-def clock(view: View, time: float) -> str:
-    """A time with one decimal, as published; with more only if the simulation is too short for one."""
-    return f"{time:.{max(1, decimals_for(view.space.stop_time, 2))}f} s"
+def published_standing(view: View, variant: Variant, *, count: int = 1, reply: ReplyKind = "json") -> str:
+    """Return the constant part of a question.
+
+    Args:
+        view: the problem.
+        variant: which parts it contains.
+        count: number of candidates wanted.
+        reply: what a reply is to consist of.
+    """
+    named, what = variant.has("names"), view.chosen
+    sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
+    if variant.has("requirement"):
+        sections.append(_REQUIREMENT.format(formula=formula_text(view.requirement.formula)))
+    if variant.has("outputs"):
+        sections.append(_outputs(view))
+    sections.append("\n".join(_numbers(view, named=named)))
+    guidance = [_GUIDANCE, _GUIDANCE_ON_MEANING.format(what=what) if named else _GUIDANCE_ON_NUMBERS]
+    if variant.has("values"):
+        guidance.append(_GUIDANCE_ON_OUTPUTS.format(what=what))
+    sections.append("\n".join(guidance))
+    if reply == "points":
+        sections.append(
+            points_form(count, f"{counted(len(view.space.dimensions), 'number')} in the order above")
+        )
+    else:
+        sections.append(f"{json_form(count)}\n{_blank(view, count, named=named)}")
+    return "\n\n".join(sections)
+
+
+def _outputs(view: View) -> str:
+    names = ", ".join(
+        f"{n} (0 is false, 1 is true)" if view.kind(n) == "boolean" and view.tells_kinds else n
+        for n in view.formula_outputs
+    )
+    return f"Output signals: {names or 'none; the requirement refers to inputs only.'}"
+
+
+def _numbers(view: View, *, named: bool) -> Iterator[str]:
+    """The numbers to choose, with or without their meanings."""
+    dimensions = view.space.dimensions
+    ranged = {r.name: r.kind for r in view.space.inputs} | {p.name: p.kind for p in view.space.parameters}
+    yield f"You choose {counted(len(dimensions), 'number')}."
+    for i, dimension in enumerate(dimensions, start=1):
+        low, high = bounds(dimension.low, dimension.high)
+        at = "" if dimension.time is None else f" at t = {_clock(view, dimension.time)}"
+        meaning = f": {dimension.name}{at}" if named else ""
+        boolean = named and ranged[dimension.name] == "boolean"
+        yield f"{i}{meaning}, {'0 (false) or 1 (true)' if boolean else f'from {low} to {high}'}"
+    for r in view.space.inputs if named else ():
+        held = "" if r.hold is None else f", sampled and held every {r.hold:g} s"
+        between = f"{r.name} between these times: {INTERPOLATION_WORDS[r.interpolation]}{held}"
+        yield f"{r.name}: one value for the whole time" if r.control_points == 1 else between
+
+
+def _blank(view: View, count: int, *, named: bool) -> str:
+    """The form of a reply with blanks in place of numbers: none are shown before the first sample."""
+    space, parts = view.space, [f'"rationale": {json.dumps(RATIONALE)}']
+    if not named:
+        parts.append(f'"point": [{counted(len(space.dimensions), "number")}]')
+    if named and space.inputs:
+        signals = (
+            f'{{"name": {json.dumps(r.name)}, "values": [{counted(r.control_points, "number")}]}}'
+            for r in space.inputs
+        )
+        parts.append(f'"signals": [{", ".join(signals)}]')
+    if named and space.parameters:
+        parameters = (f'{{"name": {json.dumps(p.name)}, "value": number}}' for p in space.parameters)
+        parts.append(f'"parameters": [{", ".join(parameters)}]')
+    one = f"{{{', '.join(parts)}}}"
+    return one if count == 1 else f'{{"candidates": [{one}]}}'
+
+
+def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
+    """Return the numbers of a candidate in the order of the dimensions, as one line."""
+    is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
+    values = zip(view.space.encode(candidate), view.space.dimensions, strict=True)
+    listed = ", ".join(_rounded(float(value), d.low, d.high) for value, d in values)
+    return (f"point = [{listed}]{'' if is_exact else _READ}",)
+
+
+def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
+    """Return values of each input at the fixed control points, by name, and parameters, a line each."""
+    lines = []
+    for r in view.space.inputs:
+        signal, times = candidate.signals[r.name], view.space.fixed_times(r)
+        values = signal.values
+        if signal.times != times:
+            values = tuple(float(v) for v in signal.held(None).sample(np.asarray(times)))
+        listed = ", ".join(_rounded(v, r.low, r.high) for v in values)
+        lines.append(f"{r.name} = [{listed}]{'' if _is_exact(view, r, signal) else _READ}")
+    return (
+        *lines,
+        *(
+            f"{p.name} = {_rounded(candidate.parameters[p.name], p.low, p.high)}"
+            for p in view.space.parameters
+        ),
+    )
+
+
+def _rounded(value: float, low: float, high: float) -> str:
+    """A value with the published three decimals; with more only if the range is too narrow for them."""
+    return plain(value, max(_DECIMALS, decimals_for(high - low, 2)))
+
+
+def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
+    """Whether the values at the fixed control points say all about a signal."""
+    return len(set(signal.values)) == 1 or view.space.is_fixed(r, signal)
 
 
 def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Iterator[str]:
-    """Lines on one judged sample."""
-    trajectory = evaluation.trajectory
+    """Lines on one judged sample: its robustness, what was compared when, and what decided."""
+    verdict, trajectory = evaluation.verdict, evaluation.trajectory
+    assert verdict is not None
+    yield f"robustness {verdict.robustness:.{_DECIMALS + view.more_decimals}f}"
+    told = {} if trajectory is None else _told_columns(view, trajectory)
     if variant.has("values") and trajectory is not None:
-        yield from _values_at_control_points(view, trajectory)
+        times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
+        for text, column in told.items():
+            values = (
+                f"{_output(view, column[trajectory.index(t)])} at {_clock(view, t)}"
+                for t in sorted(times or {0.0, view.space.stop_time})
+            )
+            yield f"{text}: {', '.join(values)}"
     if variant.has("critical"):
-        yield _decided(view, evaluation)
-
-
-def _values_at_control_points(view: View, trajectory: Trajectory) -> Iterator[str]:
-    stop_time = view.space.stop_time
-    times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
-    for text, column in _told_columns(view, trajectory).items():
-        values = (
-            f"{_output(view, column[trajectory.index(t)])} at {clock(view, t)}"
-            for t in sorted(times or {0.0, stop_time})
-        )
-        yield f"{text}: {', '.join(values)}"
+        there = {name: verdict.values[name] for name in view.formula_outputs if name in verdict.values}
+        if trajectory is not None:
+            at = trajectory.index(verdict.critical_time)
+            there = {text: float(column[at]) for text, column in told.items()}
+        values = (f"{name} = {_output(view, value)}" for name, value in there.items())
+        time = f"{verdict.critical_time:.{_clock_decimals(view.requirement.formula)}f} s"
+        yield f"the robustness was decided at t = {time}{' with ' if there else ''}{', '.join(values)}"
 
 
 def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
@@ -59,17 +202,9 @@ def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     return columns
 
 
-def _decided(view: View, evaluation: Evaluation) -> str:
-    verdict, trajectory = evaluation.verdict, evaluation.trajectory
-    assert verdict is not None
-    if trajectory is None:
-        there = {name: verdict.values[name] for name in view.formula_outputs if name in verdict.values}
-    else:
-        at = trajectory.index(verdict.critical_time)
-        there = {text: float(column[at]) for text, column in _told_columns(view, trajectory).items()}
-    values = ", ".join(f"{name} = {_output(view, value)}" for name, value in there.items())
-    time = f"{verdict.critical_time:.{_clock_decimals(view.requirement.formula)}f} s"
-    return f"the robustness was decided at t = {time}" + (f" with {values}" if values else "")
+def _clock(view: View, time: float) -> str:
+    """A time with one decimal; with more only if the simulation is too short for one."""
+    return f"{time:.{max(1, decimals_for(view.space.stop_time, 2))}f} s"
 
 
 def _clock_decimals(formula: Formula) -> int:
@@ -80,10 +215,6 @@ def _clock_decimals(formula: Formula) -> int:
 
 
 def _output(view: View, value: float) -> str:
-    fewest, most = _FEWEST_DECIMALS + view.more_decimals, _MOST_DECIMALS + view.more_decimals
-    for decimals in range(fewest, most):
-        if float(text := f"{value:.{decimals}f}"):
-            return text
-    if value == 0:
-        return f"{0:.{fewest}f}"
-    return f"{value:.{most}f}"
+    fewest, most = _FEWEST_OF_OUTPUT + view.more_decimals, _MOST_OF_OUTPUT + view.more_decimals
+    texts = (f"{value:.{decimals}f}" for decimals in range(fewest, most + 1))
+    return next((text for text in texts if float(text)), f"{value:.{most if value else fewest}f}")

@@ -16,10 +16,15 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm import ReplyKind
 from falsifier.llm.messages import Message
-from falsifier.llm.prompts import choices
-from falsifier.llm.prompts.advice import advice_on_first, advice_on_samples
-from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Observed, observed
-from falsifier.llm.prompts.published import ROBUSTNESS_DECIMALS, published_facts
+from falsifier.llm.prompts.choices import as_signals
+from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
+from falsifier.llm.prompts.published import (
+    MOST_SAMPLES,
+    as_point,
+    as_values,
+    published_facts,
+    published_standing,
+)
 from falsifier.llm.prompts.reached import Progress, Reached
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.prompts.view import Variant, View
@@ -33,8 +38,6 @@ USUAL_PROMPT_TOKENS = 6_000
 # Share of the tokens beside the constant part that samples may have, that they have once shortened, and that
 # they may have if each is told in a line; the rest is for what is new.
 _MOST_OF_SAMPLES, _SHORTENED, _MOST_OF_LINES = 0.7, 0.45, 0.6
-# The published prompts tell so many of the latest samples.
-_PUBLISHED_SAMPLES = 10
 # Characters of a rationale that are told back.
 _LONGEST_WHY = 300
 # Samples that are named as the best ones, or the ones that got furthest.
@@ -42,6 +45,33 @@ _NAMED = 3
 _RUN = re.compile(r'"[^" ]+ x \d+"')
 _PENDING = "Proposed and not simulated so far:"
 _RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
+_FIRST = {
+    "parameters": "The limits of the ranges are good first samples.",
+    "jumping": "One value throughout, and a single switch to another value, are good first samples.",
+    "inputs": (
+        "The limits of the ranges are good first samples, and so is a single switch from one limit to the "
+        "other."
+    ),
+}
+_ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
+_ON_TIME = (
+    "Look at the time that decided each robustness value, and change the {what} so that the signals at that "
+    "time move towards violating the requirement."
+)
+_ON_STRATEGY = (
+    "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
+    "strategy{such}."
+)
+_SUCH = (
+    ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
+    "the ranges are not always the worst"
+)
+_FLAT = (
+    "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction. Look "
+    "instead at how close a condition came to being true, how briefly a discrete value was held, and how far "
+    "a signal was from its switching point.\n\n"
+    "By what the recorded signals did, these got furthest: {named}."
+)
 
 # How much of a sample is told.
 _FULL, _SHORT, _LINE = range(3)
@@ -120,7 +150,7 @@ class Questions:
         if is_own:
             self._shorten()
         else:
-            del self._samples[:-_PUBLISHED_SAMPLES]
+            del self._samples[:-MOST_SAMPLES]
 
     def ask(
         self,
@@ -166,6 +196,8 @@ class Questions:
         )
 
     def _standing(self, count: int) -> str:
+        if self._variant.is_published:
+            return published_standing(self.view, self._variant, count=count, reply=self._reply)
         return standing(self.view, self._variant, count=count, reply=self._reply, start=self._start)
 
     def _aim(self) -> int:
@@ -182,12 +214,12 @@ class Questions:
         return "\n\n".join((f"Samples so far{left_out}, in the order in which they were simulated:", *told))
 
     def _latest(self) -> str:
-        """All of the latest sample, if less was told of it."""
+        """All else of the latest sample, if less was told of it."""
         if not self._samples or self._samples[-1].number != self._told:
             return ""
         sample = self._samples[-1]
-        told = sample.texts[sample.depth].splitlines()
-        more = [line for line in sample.texts[_FULL].splitlines() if line not in told]
+        told = {line.partition(":")[0] for line in sample.texts[sample.depth].splitlines()}
+        more = [line for line in sample.texts[_FULL].splitlines() if line.partition(":")[0] not in told]
         return "\n".join((f"More of sample {sample.number}:", *more)) if more else ""
 
     def _news(
@@ -205,7 +237,7 @@ class Questions:
         if not self._samples and not waiting and not notes:
             none = "" if budget is None else "Nothing has been simulated yet; "
             left = "" if budget is None else f"{counted(budget, 'simulation')} may be spent. "
-            first = f"{advice_on_first(self.view)} " if is_own else ""
+            first = f"{self._advice_on_first()} " if is_own else ""
             yield f"{first}{none}{left}Propose the first {wanted}."
             return
         if is_own and self._samples:
@@ -216,10 +248,23 @@ class Questions:
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._samples:
-            yield "\n".join(advice_on_samples(self.view, is_flat=self._is_flat()))
+            yield "\n".join(self._advice_on_samples())
             if _RUN.search(self._lasting()):
                 yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
+
+    def _advice_on_first(self) -> str:
+        if not self.view.space.inputs:
+            return _FIRST["parameters"]
+        return _FIRST["jumping" if all(map(self.view.only_jumps, self.view.space.inputs)) else "inputs"]
+
+    def _advice_on_samples(self) -> Iterator[str]:
+        what = self.view.chosen
+        yield _ON_OUTPUTS.format(one=what[:-1])
+        if not self._is_flat():
+            yield _ON_TIME.format(what=what)
+        only_jump = all(map(self.view.only_jumps, self.view.space.inputs))
+        yield _ON_STRATEGY.format(such="" if only_jump else _SUCH)
 
     def _standings(self) -> Iterator[str]:
         """Which samples are the best, or got furthest; where robustness says little, what is missing."""
@@ -228,14 +273,10 @@ class Questions:
         if len(judged) < 2:
             return
         if self._is_flat():
-            yield (
-                f"The robustness is flat: it was {signed(levels.lowest, 3)} in all {levels.simulations} "
-                "samples, so its value gives no direction. Look instead at how close a condition came to "
-                "being true, how briefly a discrete value was held, and how far a signal was from its "
-                "switching point."
-            )
             ranked = sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
-            yield f"By what the recorded signals did, these got furthest: {self._named(ranked)}."
+            yield _FLAT.format(
+                lowest=signed(levels.lowest, 3), count=levels.simulations, named=self._named(ranked)
+            )
         else:
             ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
             yield f"Lowest robustness so far: {self._named(ranked)}."
@@ -259,44 +300,38 @@ class Questions:
         return f"{self._told} of {counted(budget, 'simulation')} spent, {budget - self._told} left. "
 
     def _published(self, evaluation: Evaluation, doubt: str) -> _Sample:
-        verdict = evaluation.verdict
-        assert verdict is not None
-        inputs = self._chosen(evaluation.candidate)
-        digits = ROBUSTNESS_DECIMALS + self.view.more_decimals
-        text = _text(
-            inputs,
-            f"robustness {verdict.robustness:.{digits}f}",
-            doubt,
-            *published_facts(self.view, self._variant, evaluation),
-        )
-        return _Sample(self._told, (text,) * 3, (0, 0, 0), _FULL, verdict.robustness)
+        robustness, *facts = published_facts(self.view, self._variant, evaluation)
+        text = _text(self._chosen(evaluation.candidate), robustness, doubt, *facts)
+        return _Sample(self._told, (text,) * 3, (0, 0, 0), _FULL, evaluation.robustness)
 
     def _seen(self, evaluation: Evaluation, doubt: str, why: str) -> _Sample:
         """A sample of a variant of our own: how much of it is told depends on those before it only."""
         candidate, verdict = evaluation.candidate, evaluation.verdict
         inputs = self._chosen(candidate)
-        brief = inputs if why else choices.as_signals(self.view, candidate, in_brief=True)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
         if verdict is None:
             text = _text(inputs, _failure(evaluation), *notes)
-            return self._counted((text, text, text), _LINE, None)
-        progress = (
-            Progress() if evaluation.trajectory is None else Progress.of(self.view, evaluation.trajectory)
-        )
+            return self._counted((text,) * 3, _LINE, None)
+        progress = Progress.of(self.view, evaluation.trajectory) if evaluation.trajectory else Progress()
         news = self._reached.news(progress)
         predicates = self.view.requirement.formula.predicates
         self._climb.add(self._told, verdict, evaluation.trajectory, predicates)
         found = observed(self.view, evaluation)
-        best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
         robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
-        first = f"the first to reach: {', '.join(news)}" if news else ""
-        head = (robustness, doubt, *notes, first)
-        texts = _texts(inputs, brief, head, found)
+        head = (robustness, doubt, *notes, f"the first to reach: {', '.join(news)}" if news else "")
+        brief = inputs if why else as_signals(self.view, candidate, in_brief=True)
+        texts = (
+            _text(inputs, *head, *found.full),
+            _text(inputs, *head, *found.short),
+            _text(brief, *head, found.line),
+        )
+        best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
         is_better = best is None or verdict.robustness < best
-        depth = _FULL if is_better or news else _SHORT
-        return self._counted(texts, depth, verdict.robustness, progress, is_first=bool(news))
+        return self._counted(
+            texts, _FULL if is_better or news else _SHORT, verdict.robustness, progress, news
+        )
 
     def _counted(
         self,
@@ -304,13 +339,11 @@ class Questions:
         depth: int,
         robustness: float | None,
         progress: Progress | None = None,
-        *,
-        is_first: bool = False,
+        news: Sequence[str] = (),
     ) -> _Sample:
         full, short, line = map(self._count, texts)
-        return _Sample(
-            self._told, texts, (full, short, line), depth, robustness, progress or Progress(), is_first
-        )
+        tokens = (full, short, line)
+        return _Sample(self._told, texts, tokens, depth, robustness, progress or Progress(), bool(news))
 
     def _alike(self, inputs: str) -> str:
         """That a sample looks like an earlier one, if it does: numbers are rounded."""
@@ -349,21 +382,11 @@ class Questions:
         return sorted(self._samples, key=lambda s: (s is kept, s.is_first, s.number))
 
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
-        if not self._variant.has("names") or (self._variant.is_published and self._reply == "points"):
-            return choices.as_point(self.view, candidate)
-        if not self._variant.has("system"):
-            return choices.as_values(self.view, candidate)
-        return choices.as_signals(self.view, candidate)
-
-
-def _texts(
-    inputs: Sequence[str], brief: Sequence[str], head: Sequence[str], found: Observed
-) -> tuple[str, str, str]:
-    return (
-        _text(inputs, *head, *found.full),
-        _text(inputs, *head, *found.short),
-        _text(brief, *head, found.line),
-    )
+        if not self._variant.is_published:
+            return as_signals(self.view, candidate)
+        if not self._variant.has("names") or self._reply == "points":
+            return as_point(self.view, candidate)
+        return as_values(self.view, candidate)
 
 
 def _text(inputs: Sequence[str], *lines: str) -> str:

@@ -94,6 +94,6 @@ class Reached:
             least, most = self._ranges.get(name, (low, high))
             least_new = _FURTHER * (most - least)
             if high > most + least_new:
-                yield f"{name} above {number(most, 4)}"
+                yield f"{name} above {number(most, 3)}"
             if low < least - least_new:
-                yield f"{name} below {number(least, 4)}"
+                yield f"{name} below {number(least, 3)}"

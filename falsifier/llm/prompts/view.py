@@ -10,7 +10,7 @@ from typing import Literal
 
 from falsifier.context.values import Context
 from falsifier.core.model import Experiment, ModelInfo
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
@@ -76,6 +76,10 @@ class View:
         literals = self.info[name].literals if name in self.info else {}
         item = next((item for item, number in literals.items() if number == value), "")
         return f"{text} ({item})" if item else text
+
+    def only_jumps(self, r: InputRange) -> bool:
+        """Whether an input can only jump from value to value."""
+        return r.kind != "real" or r.name in self.levels
 
     @property
     def chosen(self) -> str:

@@ -1,6 +1,13 @@
+"""Inputs and numbers as prompts write them."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.llm.prompts.choices import as_point, as_signals, as_values, signal_text
+from falsifier.llm.prompts.choices import as_signals, signal_text
+from falsifier.llm.prompts.numbers import bounds, runs
+from falsifier.llm.prompts.published import as_point, as_values
 from falsifier.llm.prompts.view import View
 from falsifier.testing import FREE, START, lag_problem
 
@@ -14,11 +21,8 @@ STEP = PROBLEM.space.admit(
 )
 
 
-def test_a_point_is_all_numbers_in_order() -> None:
+def test_points_and_values_are_read_at_the_fixed_times() -> None:
     assert as_point(VIEW, FIXED) == ("point = [0, 0.5, 0.5, 1, -1, -1, -1, -1, 0.25]",)
-
-
-def test_values_have_names_and_free_signals_are_read_at_the_fixed_times() -> None:
     assert as_values(VIEW, FIXED) == ("u = [0, 0.5, 0.5, 1]", "v = [-1, -1, -1, -1]", "x0 = 0.25")
     # Control points at 0, 3.33, 6.67 and 10 s; the step is at 4 s.
     read = "(values at these times of an input with other control points)"
@@ -63,3 +67,16 @@ def test_a_signal_of_many_pieces_is_told_roughly() -> None:
         "u: told within 2% of the range: constant pieces from [time, value] points "
         "[[0, 0], [0.4, 0.5], [8.4, -1]]"
     )
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
+def test_printed_bounds_lie_inside_the_range(low: float, width: float) -> None:
+    for digits in (7, 10):
+        if width > 1e-5 * abs(low):
+            printed_low, printed_high = (float(text) for text in bounds(low, low + width, digits))
+            assert low <= printed_low <= printed_high <= low + width
+
+
+def test_runs_read_back() -> None:
+    assert runs([1.0] * 20 + [2.0]) == '["1 x 20", 2]'
+    assert runs([1.0] * 10) == f"[{', '.join(['1'] * 10)}]"

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError
@@ -203,3 +204,24 @@ def test_requirements_over_inputs_only_and_samples_without_trajectory(variant: s
     _, changing = told(lag_problem(), variant, [replace(bare, trajectory=None)])
     if variant in ("MP4", "MP5"):
         assert "decided at t = 10" in changing
+
+
+def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    mode = Variable("x", kind="enumeration", literals={"Idle": 0, "Run": 1})
+    view = View.of(problem)
+    view = replace(view, info=ModelInfo("m", variables=(mode,)))
+    assert view.items("x") == ("0 = Idle", "1 = Run") and view.items("other") == ()
+    assert view.labelled("x", 1.0, "1") == "1 (Run)" and view.labelled("x", 7.0, "7") == "7"
+    evaluation = evaluate(problem, problem.space.decode([0] * 4))
+    assert evaluation.trajectory is not None
+    steps = (evaluation.trajectory.times >= 5).astype(float)
+    changed = replace(
+        evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
+    )
+    standing, changing = told(view, "MP5", [changed], start={"x": (0.0, 0.0)})
+    assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle)" in standing
+    assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing
+    assert (
+        "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and still held at 10 s" in changing
+    )

@@ -102,13 +102,13 @@ def test_terms_are_signals_of_their_own_unless_they_are_of_inputs_alone() -> Non
 def test_the_part_of_the_simulation_that_matters_is_told(formula: str, part: str) -> None:
     text = standing(lag_problem(formula))
     assert f"The simulation runs {part}" in text
-    assert ("told up to 5.5 s, as the requirement looks no further" in text) == ("5.5" in part)
+    assert ("They are told up to 5.5 s" in text) == ("5.5" in part)
 
 
 def test_parameters_are_plain_numbers() -> None:
     start = ParameterRange("x0", -0.5, 1 / 3, nominal=0.0, unit="m", description="start")
     problem = lag_problem(parameters=(start,))
-    assert "- parameter x0 [m]: start; from -0.5 to 0.3333333333, nominally 0; one value" in standing(problem)
+    assert "- parameter x0 [m]: start; from -0.5 to 0.3333333, nominally 0; one value" in standing(problem)
     alone = standing(replace(problem, space=SearchSpace((), (START,), 10.0)))
     assert '"signals"' not in alone and "control points" not in alone and "switch" not in alone
     assert '"parameters": [{"name": "x0", "value": -0.74}]' in alone
@@ -233,5 +233,17 @@ def test_only_mp6_tells_context() -> None:
     assert standing(replace(view, context=Context()), "MP6") == texts["MP5"]
 
 
-def test_freedom_is_told_as_far_as_it_goes() -> None:
+def test_freedom_is_told_as_far_as_it_goes_and_once() -> None:
     assert "at most 7, at least 0.5 s apart" in standing(lag_problem(free=Freedom(7, 0.5)))
+    problem = lag_problem(inputs=2, free=Freedom(7, 0.5))
+    assert standing(problem).count("control points of u and v yourself: at most 7") == 1
+    u, v = problem.space.inputs
+    inputs = (u, replace(v, free=Freedom(9, 0.25)))
+    text = standing(replace(problem, space=replace(problem.space, inputs=inputs)))
+    assert "of u yourself: at most 7" in text and "of v yourself: at most 9, at least 0.25 s" in text
+
+
+def test_the_formulas_outputs_are_its_signals_that_are_not_searched() -> None:
+    problem = lag_problem("G[0,10] (u + x <= 3 and v >= x)", inputs=2)
+    partly = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
+    assert View.of(partly).formula_outputs == ("x", "v")
