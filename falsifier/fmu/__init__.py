@@ -2,7 +2,7 @@
 
 from falsifier.fmu.description import read_info
 from falsifier.fmu.model import FmuModel, fmu_files, fmus_sha256, is_packaged, with_local_files
-from falsifier.fmu.process import Policy, resolved, rights_text, stop_simulations, watching
+from falsifier.fmu.process import Rights, resolved, rights_text, stop_simulations, watching
 from falsifier.fmu.ssp import is_package, read_package
 from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System
 
@@ -12,7 +12,7 @@ __all__ = [
     "Coupling",
     "FmuModel",
     "Frame",
-    "Policy",
+    "Rights",
     "System",
     "fmu_files",
     "fmus_sha256",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import ClassVar, get_args
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,23 +15,12 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.description import WINDOWS, Description, describe, file_hash, needed_tool_text
-from falsifier.fmu.process import (
-    REGISTRY,
-    FmuOrder,
-    Policy,
-    Runner,
-    Task,
-    make_plan,
-    make_task,
-    resolved,
-    room_for,
-    run_task,
-)
+from falsifier.fmu.process import FmuOrder, Isolated, load, simulate
 from falsifier.fmu.systems import System
 
 
 @dataclass(frozen=True, slots=True)
-class FmuModel:
+class FmuModel(Isolated):
     """An FMU and how to simulate it; the library is loaded at the first simulation.
 
     Attributes:
@@ -52,17 +41,11 @@ class FmuModel:
 
     path: Path
     interface: Interface = "co-simulation"
-    has_own_processes: ClassVar[bool] = True
-    logging: bool = field(default=False, kw_only=True)
     windows: bool = field(default=False, kw_only=True)
-    allow: tuple[str, ...] = field(default=(), kw_only=True)
-    deny: tuple[str, ...] = field(default=(), kw_only=True)
     sha256: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
-        for name in ("allow", "deny"):
-            object.__setattr__(self, name, resolved(getattr(self, name), Path()))
-        Policy.of(self.allow, self.deny)
+        self._resolve_rights()
         object.__setattr__(self, "path", Path(self.path).absolute())
         object.__setattr__(self, "sha256", file_hash(self.path))
         _check_interface(self)
@@ -81,10 +64,8 @@ class FmuModel:
         model exchange the solver evaluates it at any time. Integer, Boolean and enumeration inputs are
         rounded.
         """
-        tables = self._pieces(signals, experiment)
-        task = _task(self, experiment, tuple(signals), tuple(parameters), room_for(tables))
         try:
-            return run_task(REGISTRY.runner(_order(self)), task, tables, parameters, self.info.name)
+            return simulate(self.order, experiment, self._pieces(signals, experiment), parameters)
         except (ModelError, SimulationError) as error:
             raise self._with_hint(error) from None
 
@@ -106,28 +87,25 @@ class FmuModel:
         Raises:
             ModelError: if that fails.
         """
-        runner = Runner(REGISTRY.workplace, replace(_order(self), logging=True))
-        try:
-            runner.load(_task(self, Experiment(1.0, 1.0, ()), (), (), 1).plan)
-        finally:
-            runner.close()
+        load(replace(self.order, logging=True))
 
-    def close(self) -> None:
-        """End the worker processes; the next simulation starts again."""
-        REGISTRY.drop(_order(self).key)
+    @property
+    def order(self) -> FmuOrder:
+        """What workers are asked to simulate."""
+        return _order(self)
 
-    def _pieces(self, signals: Mapping[str, Signal], experiment: Experiment) -> list[NDArray[np.float64]]:
+    def _pieces(
+        self, signals: Mapping[str, Signal], experiment: Experiment
+    ) -> dict[str, NDArray[np.float64]]:
         """Return the inputs as piecewise cubics; for a solver, discrete ones change on the output grid."""
-        if self.interface == "co-simulation":
-            return [signal.pieces(experiment.stop_time) for signal in signals.values()]
-        kinds = {v.name: v for v in self.info.inputs}
-        tables = []
-        for name, signal in signals.items():
-            variable = kinds.get(name)
-            if variable is not None and (variable.kind != "real" or variable.variability != "continuous"):
-                tables.append(_held_pieces(signal, experiment.times, whole=variable.kind != "real"))
-            else:
-                tables.append(signal.pieces(experiment.stop_time))
+        tables = {name: signal.pieces(experiment.stop_time) for name, signal in signals.items()}
+        if self.interface == "model-exchange":
+            for variable in self.info.inputs:
+                if variable.name in signals and not variable.is_continuous:
+                    whole = variable.kind != "real"
+                    tables[variable.name] = _held_pieces(
+                        signals[variable.name], experiment.times, whole=whole
+                    )
         return tables
 
     def _with_hint(self, error: ModelError | SimulationError) -> ModelError | SimulationError:
@@ -143,19 +121,6 @@ class FmuModel:
     @property
     def _description(self) -> Description:
         return describe(self.path, self.sha256)
-
-
-@lru_cache(maxsize=64)
-def _task(
-    model: FmuModel,
-    experiment: Experiment,
-    inputs: tuple[str, ...],
-    parameters: tuple[str, ...],
-    pieces: int,
-) -> Task:
-    description = describe(model.path, model.sha256)
-    plan = make_plan(description, experiment, inputs, parameters, pieces=pieces)
-    return make_task(plan, experiment, description.info)
 
 
 def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:
@@ -178,16 +143,19 @@ def _order(model: FmuModel) -> FmuOrder:
         model.interface,
         logging=model.logging,
         through_wine=model.windows or description.needs_wine(model.interface),
-        policy=Policy.of(model.allow, model.deny),
+        rights=model.rights,
     )
 
 
 def _check_interface(model: FmuModel) -> None:
     description = describe(model.path, model.sha256)
     info = description.info
-    if model.windows and model.interface in info.interfaces:
-        _check_windows(model, description)
     if model.interface in info.interfaces:
+        if model.windows and model.interface not in description.libraries.windows:
+            raise ModelError(
+                f"{model.path}: the FMU has no library for {WINDOWS}, only "
+                f"{', '.join(info.platforms) or 'no binaries at all'}"
+            )
         return
     if model.interface not in get_args(Interface):
         raise ModelError(f"unknown interface {model.interface!r}; expected one of {get_args(Interface)}")
@@ -199,14 +167,6 @@ def _check_interface(model: FmuModel) -> None:
     raise ModelError(
         f'{model.path}: the FMU does not offer {model.interface}; set interface = "{info.interfaces[0]}"'
     )
-
-
-def _check_windows(model: FmuModel, description: Description) -> None:
-    if model.interface not in description.libraries.windows:
-        raise ModelError(
-            f"{model.path}: the FMU has no library for {WINDOWS}, only "
-            f"{', '.join(description.info.platforms) or 'no binaries at all'}"
-        )
 
 
 def fmu_files(model: Model) -> dict[Path, str]:

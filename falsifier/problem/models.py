@@ -11,7 +11,7 @@ from falsifier.fmu import (
     Connection,
     Coupling,
     FmuModel,
-    Policy,
+    Rights,
     System,
     is_package,
     read_info,
@@ -64,7 +64,7 @@ def rights_of(
     allow = resolved(words, path.parent if path is not None else Path())
     deny = (*section.deny, *(word for layer in layers for word in layer.deny))
     with in_section(*((str(path), "model") if path is not None else ())):
-        Policy.of(allow, deny)
+        Rights.of(allow, deny)
     return allow, deny
 
 

@@ -49,7 +49,7 @@ def changes_from(
     Args:
         inputs: choices by input name.
         parameters: choices by parameter name.
-        allow: what the FMU may do beyond simulating; see Policy. Paths begin in the current folder.
+        allow: what the FMU may do beyond simulating; see Rights. Paths begin in the current folder.
         deny: what it may not do.
         experiment: fields of ModelChanges; None leaves a field unchanged.
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.core import posix, posix_files
-from falsifier.fmu.process.program import worker_program
-from falsifier.fmu.process.rights import Policy, encoded
+from falsifier.fmu.process.rights import Rights, encoded
+from falsifier.fmu.process.workplace import worker_program
 from tests.patience import HANG
 
 
@@ -25,7 +25,7 @@ def test_on_windows_the_import_says_where_to_install_it() -> None:
 def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
     """The shell takes the place of the worker; descriptors 0 and 3 are the connection."""
     script = "read line; echo here >&3; read line; exit 5"
-    policy = encoded(Policy(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", script))
+    policy = encoded(Rights(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", script))
     with posix_files.sealed_file(8) as output, posix_files.sealed_file(8) as shared:
         path = [str(worker_program(tmp_path))]
         program = posix.Program(path, {}, output.fileno(), policy, shared.fileno())

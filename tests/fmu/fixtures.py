@@ -8,8 +8,8 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
-from falsifier.fmu.model import _order
-from falsifier.fmu.process import REGISTRY, Runner
+from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.worker import Worker
 from tests.patience import HANG
 
@@ -30,7 +30,7 @@ def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:
 
 def runners(model: FmuModel) -> list[Runner]:
     """What simulates a model in this process, in each thread that has simulated it."""
-    return [runner for (key, _), runner in REGISTRY._runners.items() if key == _order(model).key]
+    return [runner for (key, _), runner in REGISTRY._runners.items() if key == model.order.key]
 
 
 def runner(model: FmuModel) -> Runner:

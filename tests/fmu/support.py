@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu.process.folders import sweep
+from falsifier.fmu.process.workplace import sweep
 from tests import patience
 from tests.command import listen_to_interrupts
 from tests.fmu import fixtures

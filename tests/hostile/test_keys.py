@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from falsifier.core.secrets import holds_credentials, redact, redact_held
 from falsifier.errors import ChatSetupError
-from falsifier.fmu.process.program import worker_environment
+from falsifier.fmu.process.workplace import worker_environment
 from falsifier.search.request import LLMSettings
 from tests.command import Done, falsifier
 from tests.hostile.servers import Behaviour, answers, completion, misbehaving, response, sends

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.model import Interface
+from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, windows_path
 
 # Storage types of values; their position is the number that request.c reads.
@@ -118,27 +119,10 @@ def _buffer(
     return values, begins
 
 
-def limits(description: Description, names: Sequence[str]) -> NDArray[np.float64]:
-    """Return the smallest and largest number of each variable's type, shape (n, 2); infinite for reals."""
-    return np.array([_limits(description.major, description.slot(name).type) for name in names]).reshape(
-        -1, 2
-    )
-
-
-def _limits(major: int, code: str) -> tuple[float, float]:
-    stored = STORED[major][code]
-    if code == "Boolean":
-        return 0.0, 1.0
-    if stored.startswith("f"):
-        return -np.inf, np.inf
-    kind = np.iinfo(stored)
-    return float(kind.min), float(kind.max)
-
-
 def fmu(
     description: Description,
+    shown: str,
     folder: Path,
-    library: Path,
     interface: Interface,
     *,
     logging: bool,
@@ -148,12 +132,20 @@ def fmu(
 
     Args:
         description: its description.
+        shown: what errors call it.
         folder: where it was unpacked.
-        library: path of its library.
         interface: interface to simulate with.
         logging: whether to ask it for messages.
         through_wine: whether the worker is the program for Windows.
+
+    Raises:
+        ModelError: if it has no library for the worker.
     """
+    libraries = description.libraries
+    found = libraries.windows if through_wine else libraries.here
+    if interface not in found:
+        raise ModelError(f"{shown}: {libraries.lacking[interface]}")
+    library = folder / found[interface]
     resources = folder / "resources"
     if through_wine:
         names = [windows_path(library), windows_path(resources) + "\\"]

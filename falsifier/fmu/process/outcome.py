@@ -1,11 +1,6 @@
 """What a worker's replies, and its end, mean in words."""
 
-from collections.abc import Sequence
-
-import numpy as np
-from numpy.typing import NDArray
-
-from falsifier.errors import FailureStatus, FalsifierError, ModelError, SimulationError
+from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.plan import Plan
 
@@ -33,40 +28,39 @@ def status_name(status: int) -> str:
     return f"status {status - (1 << 32) if status >> 31 else status}"
 
 
-def failure(name: str, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
+def failure(plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
     """Return the error for a simulation of an FMU that did not reach its stop time.
 
     Args:
-        name: of the model.
         plan: of the simulation.
         reply: how it ended.
         refusals: what the FMU tried and was refused, for the end of the message.
         log: what the FMU has said.
     """
     if reply.where == Where.IMPOSSIBLE:
-        return ModelError(f"{name}: {reply.text}{refusals}")
+        return ModelError(f"{plan.model}: {reply.text}{refusals}")
     end = refusals + last_lines(log)
     if reply.where == Where.TIMEOUT:
-        text = f"{name}: stopped at t = {reply.time:g} s {_out_of_time(plan)}{end}"
+        text = f"{plan.model}: stopped at t = {reply.time:g} s {_out_of_time(plan)}{end}"
         return SimulationError(text, status="timeout", time=reply.time, log=log)
     time = None if reply.time < 0 else reply.time
-    return SimulationError(f"{name}: {_reason(plan, reply)}{end}", time=time, log=log)
+    return SimulationError(f"{plan.model}: {_reason(plan, reply)}{end}", time=time, log=log)
 
 
-def overdue(name: str, plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
+def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation whose process was ended because it did not return in time."""
     at = f" at t = {reached:g} s" if 0.0 < reached <= plan.stop_time else ""
     return SimulationError(
-        f"{name}: did not return{at}{during} and was stopped {_out_of_time(plan)}{last_lines(log)}",
+        f"{plan.model}: did not return{at}{during} and was stopped {_out_of_time(plan)}{last_lines(log)}",
         status="timeout",
         time=reached if at else None,
         log=log,
     )
 
 
-def crash(name: str, reason: str, log: tuple[str, ...], status: FailureStatus = "crashed") -> SimulationError:
+def crash(plan: Plan, reason: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation that its process did not survive."""
-    return SimulationError(f"{name}: {reason}{last_lines(log)}", status=status, log=log)
+    return SimulationError(f"{plan.model}: {reason}{last_lines(log)}", status="crashed", log=log)
 
 
 def last_lines(log: tuple[str, ...]) -> str:
@@ -75,29 +69,6 @@ def last_lines(log: tuple[str, ...]) -> str:
     if len(lines) > 1:
         return f"; its last messages: {'; '.join(lines)}"
     return f"; its last message: {lines[0]}" if lines else ""
-
-
-def check_range(
-    model: str, names: Sequence[str], limits: NDArray[np.float64], rows: NDArray[np.float64]
-) -> None:
-    """Reject values outside the range of a variable's type.
-
-    Args:
-        model: name of the model.
-        names: names of the variables.
-        limits: smallest and largest number of each type, shape (variables, 2).
-        rows: values by variable, shape (variables, values).
-
-    Raises:
-        SimulationError: naming the variable and the range of its type.
-    """
-    for name, (low, high), row in zip(names, limits, rows, strict=True):
-        if not np.isinf(low) and not (low - 0.5 <= row.min() and row.max() <= high + 0.5):
-            raise SimulationError(
-                f"{model}: values from {row.min():g} to {row.max():g} do not fit {name!r}, "
-                f"whose type ranges from {low:g} to {high:g}",
-                time=0.0,
-            )
 
 
 def _out_of_time(plan: Plan) -> str:

@@ -1,31 +1,33 @@
-"""What all simulations of one search have in common, checked once; inputs in, a trajectory out."""
+"""What all simulations of one search have in common, checked once, and the arrays with what differs."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo, check_finite
-from falsifier.core.trajectory import Trajectory
-from falsifier.errors import ModelError, SpecError, did_you_mean
+from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
+from falsifier.errors import ModelError, SimulationError, SpecError, did_you_mean
 from falsifier.fmu.description import Description
 
 _DEFAULT_TOLERANCE = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
+# Numbers at the start of the memory; their positions are those of ``enum header`` in worker.h.
+HEADER = 8
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Plan:
     """What all simulations of a search have in common.
 
     Attributes:
+        model: name of the FMU or system.
         inputs: names of the inputs that are set, in the order of their rows.
         parameters: names of the parameters and start values that are set.
         outputs: names of the recorded variables, in the order of their rows.
-        stop_time: stop time in s.
-        samples: number of points of the output grid.
+        units: units of the outputs by name.
+        limits: smallest and largest number of the types of inputs and parameters, by name; not of reals.
+        times: the output grid in s.
         every: communication steps per output interval (co-simulation).
         pieces: maximum number of pieces of an input, see ``Signal.pieces``.
         max_step: maximum step of the solver in s (model exchange).
@@ -36,18 +38,30 @@ class Plan:
         strings: names and values of string parameters.
     """
 
+    model: str
     inputs: tuple[str, ...]
     parameters: tuple[str, ...]
     outputs: tuple[str, ...]
-    stop_time: float
-    samples: int
+    units: Mapping[str, str]
+    limits: Mapping[str, tuple[float, float]]
+    times: NDArray[np.float64]
     every: int
     pieces: int
     max_step: float
     tolerance: float | None
     time_limit: float
-    strings: tuple[tuple[str, str], ...] = ()
-    has_limit: bool = True
+    has_limit: bool
+    strings: tuple[tuple[str, str], ...]
+
+    @property
+    def stop_time(self) -> float:
+        """Stop time in s."""
+        return float(self.times[-1])
+
+    @property
+    def samples(self) -> int:
+        """Number of points of the output grid."""
+        return len(self.times)
 
     @property
     def steps(self) -> int:
@@ -74,12 +88,33 @@ def make_plan(
         ModelError: naming a variable that the model does not have or that cannot be set or recorded.
         SpecError: if the steps and the stop time are not multiples of each other.
     """
-    plan = Plan(
-        inputs=tuple(inputs),
-        parameters=tuple(parameters),
+    model = description.info.name
+    variables = {v.name: v for v in description.info.variables}
+    inputs, parameters = tuple(inputs), tuple(parameters)
+    for name in inputs:
+        description.slot(name)
+        if (role := variables[name].causality) != "input":
+            known = ", ".join(v.name for v in description.info.inputs) or "none"
+            raise ModelError(
+                f"{model}: {name!r} is not an input, its causality is {role}; the inputs are: {known}"
+            )
+    for name in parameters:
+        if refusal := description.slot(name).refusal:
+            raise ModelError(f"{model}: {name!r} cannot be set: {refusal}")
+    for name in experiment.outputs:
+        description.slot(name)
+    for name, _ in experiment.strings:
+        _check_string(description, name)
+    times = experiment.times
+    times.flags.writeable = False
+    return Plan(
+        model=model,
+        inputs=inputs,
+        parameters=parameters,
         outputs=experiment.outputs,
-        stop_time=experiment.stop_time,
-        samples=experiment.samples,
+        units={name: variables[name].unit for name in experiment.outputs if variables[name].unit},
+        limits={n: limits for n in (*inputs, *parameters) if (limits := variables[n].type_limits)},
+        times=times,
         every=_steps_per_output(experiment),
         pieces=pieces,
         max_step=experiment.step_size or experiment.output_interval,
@@ -88,25 +123,6 @@ def make_plan(
         strings=experiment.strings,
         has_limit=experiment.time_limit is not None,
     )
-    model = description.info.name
-    kinds = {v.name: v for v in description.info.variables}
-    for name in plan.inputs:
-        description.slot(name)
-        if kinds[name].causality != "input":
-            known = ", ".join(v.name for v in description.info.inputs) or "none"
-            role = kinds[name].causality
-            raise ModelError(
-                f"{model}: {name!r} is not an input, its causality is {role}; the inputs are: {known}"
-            )
-    for name in plan.parameters:
-        slot = description.slot(name)
-        if slot.refusal:
-            raise ModelError(f"{model}: {name!r} cannot be set: {slot.refusal}")
-    for name in plan.outputs:
-        description.slot(name)
-    for name, _ in plan.strings:
-        _check_string(description, name)
-    return plan
 
 
 def _check_string(description: Description, name: str) -> None:
@@ -133,74 +149,58 @@ def _steps_per_output(experiment: Experiment) -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Task:
-    """What the simulations of one search share in the process that requests them.
+class Room:
+    """Arrays that a plan's simulations read from and write to.
 
     Attributes:
-        plan: what the worker needs to know.
-        times: the trajectory's time grid in s.
-        units: units of the outputs by name.
+        header: what the worker tells while it simulates, shape (8,); it may write anything there.
+        parameters: values to set, shape (parameters,).
+        inputs: each input as a piecewise cubic (``Signal.pieces``), shape (inputs, 5 * pieces); unused pieces
+            start at inf.
+        outputs: recorded values by output and sample, shape (outputs, samples).
     """
 
-    plan: Plan
-    times: NDArray[np.float64]
-    units: Mapping[str, str]
+    header: NDArray[np.float64]
+    parameters: NDArray[np.float64]
+    inputs: NDArray[np.float64]
+    outputs: NDArray[np.float64]
+
+    @staticmethod
+    def size(plan: Plan) -> int:
+        """Return the number of float64 values that a plan needs."""
+        rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
+        return HEADER + len(plan.parameters) + rows
+
+    @classmethod
+    def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
+        """Return a plan's arrays as views of a flat array of at least ``size`` float64 values."""
+        a = HEADER + len(plan.parameters)
+        b = a + len(plan.inputs) * 5 * plan.pieces
+        c = b + len(plan.outputs) * plan.samples
+        return cls(
+            memory[:HEADER],
+            memory[HEADER:a],
+            memory[a:b].reshape(len(plan.inputs), 5 * plan.pieces),
+            memory[b:c].reshape(len(plan.outputs), plan.samples),
+        )
 
 
-class _Simulates(Protocol):
-    def simulate(
-        self, plan: Plan, fill: Callable[[Any], None]
-    ) -> tuple[NDArray[np.float64], tuple[str, ...]]: ...
-
-
-def make_task(plan: Plan, experiment: Experiment, info: ModelInfo) -> Task:
-    """Return the task of a plan."""
-    times = experiment.times
-    times.flags.writeable = False
-    units = {v.name: v.unit for v in info.variables if v.unit and v.name in plan.outputs}
-    return Task(plan, times, units)
-
-
-def room_for(tables: Sequence[NDArray[np.float64]]) -> int:
-    """Return the number of pieces per input to plan for.
-
-    Rounded up to a power of two, so that a few plans suffice for candidates with any number of control
-    points.
-    """
-    pieces = max(map(len, tables), default=1)
-    return 1 << (pieces - 1).bit_length()
-
-
-def run_task(
-    runner: _Simulates,
-    task: Task,
-    tables: Sequence[NDArray[np.float64]],
-    parameters: Mapping[str, float],
-    name: str,
-) -> Trajectory:
-    """Simulate once.
-
-    Args:
-        runner: what simulates.
-        task: what the simulations have in common.
-        tables: each input as a piecewise cubic (``Signal.pieces``), in the plan's order.
-        parameters: values, in the plan's order.
-        name: name of the model, for errors.
+def check_values(plan: Plan, room: Room) -> None:
+    """Reject values outside the range of a variable's type.
 
     Raises:
-        SimulationError: if there is no complete trajectory of finite numbers.
-        ModelError: if the model cannot be used.
+        SimulationError: naming the variable and the range of its type.
     """
-
-    def fill(room: Any) -> None:
-        if parameters:
-            room.parameters[:] = list(parameters.values())
-        for row, table in zip(room.inputs, tables, strict=True):
-            row[: table.size] = table.ravel()
-            row[table.size :] = np.inf
-
-    outputs, log = runner.simulate(task.plan, fill)
-    columns = dict(zip(task.plan.outputs, outputs, strict=True))
-    if not np.isfinite(outputs).all():
-        check_finite(name, task.times, columns)
-    return Trajectory(task.times, columns, task.units, log)
+    for name, (low, high) in plan.limits.items():
+        if name in plan.inputs:
+            # Interpolated values are always between those at the ends of a piece.
+            pieces = room.inputs[plan.inputs.index(name)].reshape(plan.pieces, 5)
+            values = pieces[np.isfinite(pieces[:, 0]), 1]
+        else:
+            values = room.parameters[plan.parameters.index(name)]
+        if not (low - 0.5 <= values.min() and values.max() <= high + 0.5):
+            raise SimulationError(
+                f"{plan.model}: values from {values.min():g} to {values.max():g} do not fit {name!r}, "
+                f"whose type ranges from {low:g} to {high:g}",
+                time=0.0,
+            )

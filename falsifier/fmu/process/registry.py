@@ -1,20 +1,33 @@
-"""The workers of this process: one per model and thread."""
+"""The workers of this process, one per model and thread; inputs in, a trajectory out."""
 
 import atexit
 import contextlib
 import os
 import threading
-from collections.abc import Collection, Hashable, Iterable
+import time
+from collections.abc import Collection, Hashable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.core.model import Experiment, check_finite
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError
-from falsifier.fmu.process import start
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.rights import Policy
+from falsifier.fmu.process.plan import Plan, Room, make_plan
+from falsifier.fmu.process.rights import Rights, described, read_told, resolved
 from falsifier.fmu.process.runner import Runner
-from falsifier.fmu.process.start import Workplace
+from falsifier.fmu.process.start import Started
+from falsifier.fmu.process.workplace import Workplace
 
 # A thread simulates with one worker at a time; the others save the start if it returns to their FMUs.
 _MOST_OF_A_THREAD = 12
+# A worker has told what is enforced after at most the first; it is looked for after the second.
+_SETUP_SECONDS, _LOOKING_SECONDS = 10.0, 0.001
 
 
 class Registry:
@@ -47,7 +60,9 @@ class Registry:
             with self._lock:
                 superfluous = self._take_superfluous(thread)
                 found = self._runners[order.key, thread] = Runner(self.workplace, order)
-            _close(superfluous)
+            for runner in superfluous:
+                with contextlib.suppress(ModelError):
+                    runner.close()
         return found
 
     def drop(self, key: Hashable) -> None:
@@ -92,27 +107,127 @@ class Registry:
         return [self._runners.pop(key) for key in keys]
 
 
-def _close(runners: Iterable[Runner]) -> None:
-    for runner in runners:
-        with contextlib.suppress(ModelError):
-            runner.close()
-
-
 REGISTRY = Registry()
+
+
+def simulate(
+    order: Order,
+    experiment: Experiment,
+    inputs: Mapping[str, NDArray[np.float64]],
+    parameters: Mapping[str, float],
+) -> Trajectory:
+    """Simulate once, in this thread's worker.
+
+    Args:
+        order: what to simulate.
+        experiment: times and outputs.
+        inputs: each input that is set as a piecewise cubic (``Signal.pieces``).
+        parameters: values of parameters and start values.
+
+    Raises:
+        SimulationError: if there is no complete trajectory of finite numbers.
+        ModelError: if the model cannot be used.
+    """
+    # Rounded up to a power of two, so that a few plans suffice for candidates with any number of control
+    # points.
+    pieces = 1 << (max(map(len, inputs.values()), default=1) - 1).bit_length()
+    plan = _plan(order, experiment, tuple(inputs), tuple(parameters), pieces)
+
+    def fill(room: Room) -> None:
+        if parameters:
+            room.parameters[:] = list(parameters.values())
+        for row, table in zip(room.inputs, inputs.values(), strict=True):
+            row[: table.size] = table.ravel()
+            row[table.size :] = np.inf
+
+    outputs, log = REGISTRY.runner(order).simulate(plan, fill)
+    columns = dict(zip(plan.outputs, outputs, strict=True))
+    if not np.isfinite(outputs).all():
+        check_finite(plan.model, plan.times, columns)
+    return Trajectory(plan.times, columns, plan.units, log)
+
+
+@lru_cache(maxsize=64)
+def _plan(
+    order: Order, experiment: Experiment, inputs: tuple[str, ...], parameters: tuple[str, ...], pieces: int
+) -> Plan:
+    return make_plan(order.description, experiment, inputs, parameters, pieces=pieces)
+
+
+def load(order: Order) -> None:
+    """Load an FMU and make an instance in a worker of its own, without simulating.
+
+    Raises:
+        ModelError: if that fails.
+    """
+    runner = Runner(REGISTRY.workplace, order)
+    try:
+        runner.load(make_plan(order.description, Experiment(1.0, 1.0, ()), (), ()))
+    finally:
+        runner.close()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Isolated:
+    """What models have in common whose FMUs run in processes of their own.
+
+    Attributes:
+        logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
+        allow: what they may do; see Rights.
+        deny: what they may not do.
+    """
+
+    has_own_processes: ClassVar[bool] = True
+    logging: bool = False
+    allow: tuple[str, ...] = ()
+    deny: tuple[str, ...] = ()
+
+    @property
+    def order(self) -> Order:
+        """What workers are asked to simulate."""
+        raise NotImplementedError
+
+    @property
+    def rights(self) -> Rights:
+        """What the FMUs may do."""
+        return Rights.of(self.allow, self.deny)
+
+    def close(self) -> None:
+        """End the worker processes; the next simulation starts again."""
+        REGISTRY.drop(self.order.key)
+
+    def _resolve_rights(self) -> None:
+        """Make the paths of what is allowed absolute.
+
+        Raises:
+            SpecError: if what is allowed or denied is unknown, or a path does not exist.
+        """
+        for name in ("allow", "deny"):
+            object.__setattr__(self, name, resolved(getattr(self, name), Path()))
+        _ = self.rights
 
 
 def rights_text(allow: Iterable[str] = (), deny: Iterable[str] = ()) -> str:
     """Say in one line what FMUs may do on this machine, and what of that it does not enforce.
 
+    It starts a worker to see that.
+
     Args:
-        allow: what users allow; see Policy.
+        allow: what users allow; see Rights.
         deny: what they deny.
 
     Raises:
         SpecError: if one of these is unknown.
         ModelError: if FMUs cannot be run on this machine.
     """
-    return start.rights_text(REGISTRY.workplace(), Policy.of(allow, deny))
+    wanted, workplace = Rights.of(allow, deny), REGISTRY.workplace()
+    told, until = b"", time.monotonic() + _SETUP_SECONDS
+    started = Started(workplace, workplace.scratch(), wanted, through_wine=False)
+    while not told.endswith(b"\0") and time.monotonic() < until:
+        told += started.program.told()
+        time.sleep(_LOOKING_SECONDS)
+    started.end()
+    return described(wanted, read_told(told).enforced)
 
 
 def stop_simulations(threads: Collection[int]) -> None:

@@ -48,7 +48,7 @@ _ADVICE = "allow it with `--allow {}`"
 
 
 @dataclass(frozen=True, slots=True)
-class Policy:
+class Rights:
     """What an FMU may do beyond reading files and changing those of its own folders.
 
     Attributes:
@@ -64,8 +64,8 @@ class Policy:
     network: bool = True
 
     @classmethod
-    def of(cls, allow: Iterable[str], deny: Iterable[str] = ()) -> "Policy":
-        """Return the policy for what a user allows and denies.
+    def of(cls, allow: Iterable[str], deny: Iterable[str] = ()) -> "Rights":
+        """Return the rights by what a user allows and denies.
 
         Args:
             allow: ``write:PATH``, ``read:PATH``, ``programs``; paths are absolute or begin in this folder.
@@ -137,7 +137,7 @@ def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_r
 
 
 def encoded(
-    policy: Policy,
+    rights: Rights,
     folders: Sequence[Path],
     hidden: Sequence[str],
     *,
@@ -148,20 +148,20 @@ def encoded(
     """Return what the guard of a worker is told; see worker/guard.c.
 
     Args:
-        policy: what the FMU may do.
+        rights: what the FMU may do.
         folders: its own folders, the working folder first.
         hidden: what it may not read.
         memory: bytes that its processes may use together; 0: no limit.
         readable: further places that it needs to read.
         command: the program that the process becomes, which is Wine; empty: the worker itself.
     """
-    own = [str(path) for path in (*map(Path.resolve, folders), *policy.writable)]
+    own = [str(path) for path in (*map(Path.resolve, folders), *rights.writable)]
     parts = [bytes([_WRITABLE]) + os.fsencode(path) for path in own]
-    parts += [bytes([_READABLE]) + os.fsencode(path.resolve()) for path in (*policy.readable, *readable)]
+    parts += [bytes([_READABLE]) + os.fsencode(path.resolve()) for path in (*rights.readable, *readable)]
     parts += [bytes([_HIDDEN]) + os.fsencode(path) for path in hidden]
     parts += [bytes([_COMMAND]) + os.fsencode(word) for word in command]
-    parts += [bytes([_PROGRAMS])] * (policy.programs or bool(command))
-    parts += [bytes([_NETWORK])] * policy.network + [bytes([_WINE])] * bool(command)
+    parts += [bytes([_PROGRAMS])] * (rights.programs or bool(command))
+    parts += [bytes([_NETWORK])] * rights.network + [bytes([_WINE])] * bool(command)
     parts.append(bytes([_MEMORY]) + str(memory).encode())
     text = b"".join(part + b"\0" for part in parts)
     return len(text).to_bytes(4, "little") + text
@@ -211,23 +211,23 @@ def read_told(data: bytes) -> Told:
     return Told("; ".join(causes), f"the FMU {'; it '.join(shown)}{more}" if shown else "", enforced)
 
 
-def policy_text(policy: Policy, enforced: int) -> str:
+def described(rights: Rights, enforced: int) -> str:
     """Say in one line what FMUs may do on this machine.
 
     Args:
-        policy: what users have allowed and denied.
+        rights: what users have allowed and denied.
         enforced: bits of ``enum enforced`` in worker/sandbox.h.
     """
-    places = "".join(f" and {path}" for path in policy.writable)
+    places = "".join(f" and {path}" for path in rights.writable)
     connecting, executing = "open network connections", "execute programs"
     may = [f"change files in its own folders{places}"]
-    may += [f"read {' and '.join(map(str, policy.readable))}"] if policy.readable else []
-    may += [connecting] * policy.network + [executing] * policy.programs
+    may += [f"read {' and '.join(map(str, rights.readable))}"] if rights.readable else []
+    may += [connecting] * rights.network + [executing] * rights.programs
     # What it may not do, and which of these bits keep it from that.
-    other = "other " if policy.writable or policy.readable else ""
+    other = "other " if rights.writable or rights.readable else ""
     may_not = [("change other files", _FILES), (f"read {other}known places of keys", _FILES)]
-    may_not += [] if policy.programs else [(executing, _FILES | _SYSTEM_CALLS)]
-    may_not += [] if policy.network else [(connecting, _SYSTEM_CALLS)]
+    may_not += [] if rights.programs else [(executing, _FILES | _SYSTEM_CALLS)]
+    may_not += [] if rights.network else [(connecting, _SYSTEM_CALLS)]
     may_not += [("reach other processes", _PROCESSES), ("change their settings", _SYSTEM_CALLS)]
     text = f"the FMU may {', '.join(may)}; it may not {', '.join(what for what, _ in may_not)}"
     lacking = [what for what, bits in may_not if not enforced & bits]

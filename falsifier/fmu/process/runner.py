@@ -8,13 +8,54 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu.process import outcome, patience
+from falsifier.fmu.process import outcome
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import Plan
-from falsifier.fmu.process.shared import Room
-from falsifier.fmu.process.start import Workplace
-from falsifier.fmu.process.worker import REUSES, Experience, Reuse, Worker
+from falsifier.fmu.process.plan import Plan, Room
+from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker, tell_if_slow
+from falsifier.fmu.process.workplace import Workplace
+
+# Failures of simulations in new processes that are repeated to hear the FMU's messages; more say the same.
+_MAX_REPEATS = 3
+# Longest wait for a trial of a way to start, in s and as a multiple of the first simulation's duration: one
+# trial makes an instance and two simulations, on a machine that may be busy.
+_LEAST_SECONDS, _DURATIONS = 1.0, 20.0
+
+
+class Experience:
+    """What is known of one FMU, whichever process it runs in.
+
+    Attributes:
+        reuse: how the next simulation starts; None until that was tested.
+        untrusted: ways that made the FMU crash or hang.
+        trying: the way that is being tested.
+    """
+
+    def __init__(self) -> None:
+        self.reuse: Reuse | None = None
+        self.untrusted: tuple[Reuse, ...] = ()
+        self.trying: Reuse = "reset"
+        self._repeats = 0
+        self._seconds = 0.0
+
+    def took(self, seconds: float) -> None:
+        """Remember how long loading the FMU and its first simulation took."""
+        self._seconds = max(self._seconds, seconds)
+
+    @property
+    def patience(self) -> float:
+        """How long to wait for a trial, in s."""
+        return _LEAST_SECONDS + _DURATIONS * self._seconds
+
+    def distrust(self, reuse: Reuse) -> None:
+        """Never start in this way again, nor in a cheaper one; test the others."""
+        self.untrusted = REUSES[: REUSES.index(reuse) + 1]
+        self.reuse = "process" if reuse == "process" else None
+
+    def is_worth_repeating(self) -> bool:
+        """Whether to repeat a failure in a new process for its messages; counts the repetitions."""
+        self._repeats += 1
+        return self._repeats <= _MAX_REPEATS
 
 
 class Runner:
@@ -123,7 +164,9 @@ class Runner:
         except TimeoutError:
             raise self._overdue(worker, plan) from None
         except Closed as error:
-            raise self._crashed(worker, error) from None
+            reason, log = worker.crash(error)
+            self._worker = None
+            raise outcome.crash(plan, reason, log) from None
         except SimulationError:  # before it began
             raise
         except BaseException:
@@ -139,7 +182,7 @@ class Runner:
         if worker.simulations == 1:
             seconds = time.perf_counter() - worker.started
             self._experience.took(seconds)
-            patience.took(self._order.name, plan, seconds)
+            tell_if_slow(plan, seconds)
         if reply.leaving:
             self._drop()
         return outputs, log
@@ -181,7 +224,7 @@ class Runner:
 
     def _prepare(self, worker: Worker, plan: Plan, *, is_new: bool) -> bool:
         """Prepare a worker; return False if an old one has died since its last simulation."""
-        limit = plan.time_limit + patience.GRACE_SECONDS
+        limit = plan.time_limit + GRACE_SECONDS
         try:
             if is_new:
                 self._check(worker, worker.load(limit), may_load_later=True)
@@ -202,7 +245,7 @@ class Runner:
             return
         name = self._order.component(reply.component)
         said = f"{name}: {reply.text}" if name else reply.text
-        text = f"{self._order.path}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
+        text = f"{self._order.shown}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
         # What has loaded before is not unusable for that.
         raise SimulationError(text) if may_load_later and self._has_loaded else ModelError(text)
 
@@ -217,7 +260,7 @@ class Runner:
             self._worker = None
             how, _, end = said.partition(": ")
             reason = f"{how} while it was loaded{f' ({end})' if end else ''}"
-        text = f"{self._order.path}: {reason}{outcome.last_lines(log)}"
+        text = f"{self._order.shown}: {reason}{outcome.last_lines(log)}"
         if not self._has_loaded:
             return ModelError(text)
         hangs = isinstance(error, TimeoutError)
@@ -247,12 +290,7 @@ class Runner:
     def _overdue(self, worker: Worker, plan: Plan) -> SimulationError:
         reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
         self._drop()
-        return outcome.overdue(self._order.name, plan, reached, during, log)
-
-    def _crashed(self, worker: Worker, error: Closed) -> SimulationError:
-        reason, log = worker.crash(error)
-        self._worker = None
-        return outcome.crash(self._order.name, reason, log)
+        return outcome.overdue(plan, reached, during, log)
 
     def _drop(self) -> None:
         worker, self._worker = self._worker, None

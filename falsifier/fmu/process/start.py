@@ -1,28 +1,31 @@
-"""Starting workers: the folder of this process's workers, unpacked FMUs, and the program that runs them."""
+"""A worker's process with its files: the memory that it shares, its output, and the configuration of Wine."""
 
+import mmap
 import os
 import signal
-import tempfile
-import threading
-import time
 from collections.abc import Mapping
 from functools import lru_cache
-from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from falsifier.core import posix, posix_files
+from falsifier.core.literals import printable
 from falsifier.errors import ModelError
-from falsifier.fmu.description import HOW_TO_INSTALL, extract, file_hash, find_wine, windows_path
-from falsifier.fmu.process import folders
+from falsifier.fmu.description import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.process.encoding import text
-from falsifier.fmu.process.program import protect_secrets, worker_environment, worker_program
-from falsifier.fmu.process.rights import Policy, encoded, hidden_places, policy_text, read_told
-from falsifier.fmu.process.shared import Memory, Output
+from falsifier.fmu.process.rights import Rights, encoded, hidden_places
+from falsifier.fmu.process.workplace import Workplace, worker_environment
 
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
-# A worker has told what is enforced after at most the first; it is looked for after the second.
-_SETUP_SECONDS, _LOOKING_SECONDS = 10.0, 0.001
+# Positions in the header of the memory, as in ``enum header`` of worker.h.
+RUNNING, SIMULATED = 0, 1
+_MOST_BYTES = 1 << 20
+# The end of long output says most about what went wrong.
+_SHOWN_BYTES = 64 << 10
+_DROPPED = "(further output was dropped)"
 # What Wine would start besides the worker, or ask the user to install.
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
@@ -35,69 +38,105 @@ _SIGNALS = {
 }
 
 
-class Workplace:
-    """The folder of this process's workers, and the FMUs that are unpacked to it.
+class Memory:
+    """Float64 values that this process and a worker share; they can become more.
 
-    Raises:
-        MachineError: if processes may not use enough memory.
+    Where no process can shorten the file, both map it. Elsewhere this process would die with it, and so it
+    writes and reads the file instead.
+
+    Args:
+        path: of the file, for a worker that cannot get a descriptor; None: it has no name.
+
+    Attributes:
+        values: the values.
+        path: as above.
     """
 
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = path
+        if path is None:
+            self._file = posix_files.sealed_file(0, may_grow=True)
+        else:
+            self._file = path.open("x+b", buffering=0)
+        self._is_mapped = path is None and posix_files.can_seal()
+        self.values: NDArray[np.float64] = np.zeros(0)
+
+    def fileno(self) -> int:
+        """Descriptor of the file."""
+        return self._file.fileno()
+
+    def fit(self, count: int) -> None:
+        """Make room for at least this many values.
+
+        Raises:
+            OSError: if there is none, or files may not be so large.
+        """
+        if count <= len(self.values):
+            return
+        try:
+            self._file.truncate(8 * count)
+        except OSError as error:
+            error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
+            raise
+        if self._is_mapped:
+            self.values = np.frombuffer(mmap.mmap(self.fileno(), 8 * count), dtype=np.float64)
+        else:
+            self.values = np.zeros(count)
+
+    def give(self) -> None:
+        """Let the worker see the values."""
+        if not self._is_mapped:
+            os.pwrite(self.fileno(), self.values.tobytes(), 0)
+
+    def take(self) -> None:
+        """See what the worker has written."""
+        if not self._is_mapped:
+            read = os.pread(self.fileno(), self.values.nbytes, 0)
+            found = np.frombuffer(read[: len(read) // 8 * 8], dtype=np.float64)
+            self.values[: len(found)] = found
+            self.values[len(found) :] = np.nan
+
+    def header(self, position: int) -> float:
+        """Return a number of the header, as the worker says; it may be anything."""
+        if self._is_mapped or self._file.closed:
+            return float(self.values[position]) if len(self.values) else 0.0
+        read = os.pread(self.fileno(), 8, 8 * position)
+        return float(np.frombuffer(read.ljust(8, b"\0"), dtype=np.float64)[0])
+
+    def close(self) -> None:
+        """Close the file; the values stay."""
+        self._file.close()
+
+
+class Output:
+    """A file for a process's output, with a position that it shares with this process."""
+
     def __init__(self) -> None:
-        posix.check_memory_limits()
-        protect_secrets(os.environ)
-        folders.sweep()
-        self._folder = folders.WorkFolder()
-        self._lock = threading.Lock()
+        self._file = posix_files.sealed_file(_MOST_BYTES)
 
-    @property
-    def root(self) -> Path:
-        """The folder."""
-        return self._folder.path
+    def fileno(self) -> int:
+        """Descriptor of the file, for the process that prints."""
+        return self._file.fileno()
 
-    def unpacked(self, archives: Mapping[str, tuple[Path, str]]) -> Path:
-        """Return the folder to which FMUs are unpacked; unpack them if necessary.
+    def take(self, until: int | None = None) -> tuple[str, ...]:
+        """Return the lines printed since the last call; only the last of much output.
 
-        Two components with the same FMU get a folder each: a library that is loaded from two files has its
-        static data twice.
-
-        Raises:
-            ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
+        Args:
+            until: position where they end, if the process goes on printing; it may say anything.
         """
-        key = sha256(repr([(name, sha) for name, (_, sha) in archives.items()]).encode()).hexdigest()[:16]
-        folder = self.root / key
-        with self._lock:
-            if not folder.is_dir():
-                partial = folder.with_suffix(".partial")
-                for name, (path, sha) in archives.items():
-                    _extract(path, sha, partial / name)
-                partial.rename(folder)
-        return folder
+        position = os.lseek(self.fileno(), 0, os.SEEK_CUR)
+        if not position:
+            return ()
+        # The process may have moved the position, which would otherwise be the number of bytes.
+        size = min(position, _MOST_BYTES if until is None else until, _MOST_BYTES)
+        text = os.pread(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        os.lseek(self.fileno(), 0, os.SEEK_SET)
+        lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
+        return lines if size < _MOST_BYTES else (*lines, _DROPPED)
 
-    def program(self, *, windows: bool = False) -> Path:
-        """Return the path of the program that runs FMUs; copy or compile it first if necessary.
-
-        Raises:
-            ModelError: if there is none for this machine, or no library can be loaded from the folder.
-        """
-        if not windows and posix_files.forbids_programs(self.root):
-            raise ModelError(
-                f"FMUs are unpacked to {self.root.parent}, from which this system loads no libraries "
-                "(noexec); set TMPDIR to another folder"
-            )
-        with self._lock:
-            return worker_program(self.root, windows=windows)
-
-    def scratch(self) -> Path:
-        """Return a new folder for one worker."""
-        return Path(tempfile.mkdtemp(prefix="work-", dir=self.root))
-
-    def remove(self) -> None:
-        """Remove the folder."""
-        self._folder.remove()
-
-    def forget(self) -> None:
-        """Leave the folder to another process, of which this is a copy."""
-        self._folder.forget()
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
 
 
 class Started:
@@ -106,7 +145,7 @@ class Started:
     Args:
         workplace: the folder of all workers.
         folder: where its FMUs are.
-        policy: what these may do.
+        rights: what these may do.
         through_wine: whether it is the program for Windows.
 
     Attributes:
@@ -119,7 +158,7 @@ class Started:
         ModelError: if there is no program for this machine, or Wine is not installed.
     """
 
-    def __init__(self, workplace: Workplace, folder: Path, policy: Policy, *, through_wine: bool) -> None:
+    def __init__(self, workplace: Workplace, folder: Path, rights: Rights, *, through_wine: bool) -> None:
         path = workplace.program()
         command: tuple[str, ...] = ()
         if through_wine:
@@ -134,7 +173,7 @@ class Started:
         self.memory = Memory(self.scratch / "memory" if through_wine else None)
         try:
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
-            told = encoded(policy, (self.scratch, folder), _hidden(), memory=memory, command=command)
+            told = encoded(rights, (self.scratch, folder), _hidden(), memory=memory, command=command)
             self.program = posix.Program(
                 [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), self._replies
             )
@@ -170,21 +209,6 @@ class Started:
         posix_files.remove_tree(self.scratch)
 
 
-def rights_text(workplace: Workplace, policy: Policy) -> str:
-    """Say in one line what FMUs may do, and what this system does not enforce; starts a worker to see that.
-
-    Raises:
-        ModelError: if there is no program for this machine.
-    """
-    told, until = b"", time.monotonic() + _SETUP_SECONDS
-    started = Started(workplace, workplace.scratch(), policy, through_wine=False)
-    while not told.endswith(b"\0") and time.monotonic() < until:
-        told += started.program.told()
-        time.sleep(_LOOKING_SECONDS)
-    started.end()
-    return policy_text(policy, read_told(told).enforced)
-
-
 def crash_code(exception: int) -> int:
     """Return the exit code that an exception of Windows has elsewhere: minus the number of a signal."""
     name = _SIGNALS.get(exception)
@@ -195,12 +219,6 @@ def crash_code(exception: int) -> int:
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
     return hidden_places(os.environ, posix_files.homes(), is_root=os.geteuid() == 0)
-
-
-def _extract(path: Path, sha: str, folder: Path) -> None:
-    if file_hash(path) != sha:
-        raise ModelError(f"{path}: the file has changed since the model was loaded; load the model again")
-    extract(path, folder)
 
 
 def _wine() -> str:

@@ -1,8 +1,11 @@
-"""One worker, as the process that requests simulations sees it, and how it can start again."""
+"""One worker, as the process that requests simulations sees it, and how long it waits for one."""
 
 import contextlib
+import logging
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Literal, get_args
 
@@ -21,11 +24,10 @@ from falsifier.fmu.process.connection import (
 )
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.patience import SHARES, Patience
-from falsifier.fmu.process.plan import Plan
+from falsifier.fmu.process.plan import Plan, Room, check_values
 from falsifier.fmu.process.rights import Told, read_told
-from falsifier.fmu.process.shared import Room
-from falsifier.fmu.process.start import Started, Workplace, crash_code
+from falsifier.fmu.process.start import RUNNING, SIMULATED, Started, crash_code
+from falsifier.fmu.process.workplace import Workplace
 
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
 _CUT_OFF, _ENDING_SECONDS = 74, 0.2
@@ -37,11 +39,76 @@ _STARTING_SECONDS = 120.0
 Reuse = Literal["reset", "state", "instance", "library", "process"]
 REUSES: tuple[Reuse, ...] = get_args(Reuse)
 
-# Failures of simulations in new processes that are repeated to hear the FMU's messages; more say the same.
-_MAX_REPEATS = 3
-# Longest wait for a trial of a way to start, in s and as a multiple of the first simulation's duration: one
-# trial makes an instance and two simulations, on a machine that may be busy.
-_LEAST_SECONDS, _DURATIONS = 1.0, 20.0
+# The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
+GRACE_SECONDS = 0.1
+# Without a limit of the user, each of so many shares of the simulated time may take as long as the default.
+SHARES = 10
+# How often to look how far a simulation is; from when on that is told.
+_LOOKING_SECONDS, _LONG_SECONDS = 1.0, 3.0
+# Simulations that take longer are told once.
+_SLOW_SECONDS = 10.0
+
+# Hears the name of a model, the simulated time and the stop time in s.
+Listener = Callable[[str, float, float], None]
+
+_LOG = logging.getLogger(__name__)
+_LISTENERS: list[Listener] = []
+_TOLD: set[str] = set()
+
+
+@contextmanager
+def watching(listener: Listener) -> Iterator[None]:
+    """Let a listener hear every second how far simulations are that take long, in whatever thread."""
+    _LISTENERS.append(listener)
+    try:
+        yield
+    finally:
+        _LISTENERS.remove(listener)
+
+
+class Patience:
+    """How long to wait for one simulation.
+
+    Args:
+        plan: what is simulated.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._started = time.monotonic()
+        self._limit = plan.time_limit + GRACE_SECONDS
+        self._deadline = self._started + self._limit
+        self._shares = 0 if plan.has_limit else SHARES
+        self._next = plan.stop_time / SHARES
+
+    @property
+    def seconds(self) -> float:
+        """How long to wait before the next look."""
+        return min(_LOOKING_SECONDS, max(0.0, self._deadline - time.monotonic()))
+
+    def look(self, reached: float) -> None:
+        """Take note of the simulated time in s, which the worker tells: it may be any number.
+
+        Raises:
+            TimeoutError: if the simulation takes too long.
+        """
+        now = time.monotonic()
+        if self._shares and reached >= self._next:
+            self._shares -= 1
+            self._deadline = now + self._limit
+            self._next = reached + self._plan.stop_time / SHARES
+        if now >= self._deadline:
+            raise TimeoutError
+        if now - self._started > _LONG_SECONDS and math.isfinite(reached):
+            for listener in _LISTENERS:
+                listener(self._plan.model, min(max(reached, 0.0), self._plan.stop_time), self._plan.stop_time)
+
+
+def tell_if_slow(plan: Plan, seconds: float) -> None:
+    """Tell once that simulations of a model take long."""
+    if seconds > _SLOW_SECONDS and plan.model not in _TOLD:
+        _TOLD.add(plan.model)
+        _LOG.warning("%s: a simulation of %g s takes %.0f s", plan.model, plan.stop_time, seconds)
 
 
 class Worker:
@@ -53,7 +120,6 @@ class Worker:
         reuse: how the next simulation starts; None: it finds out after the first.
         untrusted: ways to start that it does not try.
         logging: whether to ask the FMU for messages.
-        time_limit: longest time in s that loading may take.
 
     Attributes:
         plan: the plan for which it is prepared.
@@ -81,7 +147,7 @@ class Worker:
         known = len(REUSES) if reuse is None else REUSES.index(reuse)
         self._ways = integers(known, sum(1 << REUSES.index(way) for way in untrusted))
         self._load = order.load(folder, logging=logging)
-        self._started = Started(workplace, folder, order.policy, through_wine=order.through_wine)
+        self._started = Started(workplace, folder, order.rights, through_wine=order.through_wine)
         self._crash: int | None = None
         self.plan: Plan | None = None
         self.logging = logging
@@ -89,7 +155,6 @@ class Worker:
         self.simulations = 0
         self.started = time.perf_counter()
         self._is_quick = False
-        self._is_loaded = False
 
     @property
     def pid(self) -> int:
@@ -108,11 +173,15 @@ class Worker:
             send(program, Request.CONNECT, self._started.connect)
             self.receive(_STARTING_SECONDS)
         except (Closed, TimeoutError) as error:
-            raise ModelError(self._no_start()) from error
+            hint = (
+                f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
+                if self._order.through_wine
+                else ""
+            )
+            end = exit_text(self.end())
+            raise ModelError(f"the program that runs FMUs does not start ({end}){hint}") from error
         send(program, self._order.kind, self._ways + self._load)
-        reply = self.receive(limit)
-        self._is_loaded = reply.is_done
-        return reply
+        return self.receive(limit)
 
     def prepare(self, plan: Plan, limit: float) -> Reply:
         """Let the worker look up a plan's variables; errors as for ``load``."""
@@ -123,7 +192,7 @@ class Worker:
         send(started.program, Request.PREPARE, text(started.place) + self._order.prepare(plan))
         reply = self.receive(limit)
         if reply.is_done:
-            self.plan, self._check = plan, self._order.checks(plan)
+            self.plan = plan
         return reply
 
     def start(self, fill: Callable[[Room], None]) -> None:
@@ -135,7 +204,7 @@ class Worker:
         """
         assert self.plan is not None, "it is prepared"
         fill(self.room)
-        self._check(self.room)
+        check_values(self.plan, self.room)
         self._started.memory.give()
         payload = reals(self.plan.time_limit) + integers(0 if self.plan.has_limit else SHARES)
         send(self._started.program, Request.SIMULATE, payload)
@@ -149,7 +218,7 @@ class Worker:
         """
         assert self.plan is not None, "it is prepared"
         started = time.perf_counter()
-        patience = Patience(self._order.name, self.plan)
+        patience = Patience(self.plan)
         polling = QUICK_SECONDS if self._is_quick else 0.0
         while True:
             try:
@@ -175,12 +244,12 @@ class Worker:
     @property
     def reached(self) -> float:
         """Simulated time in s, as the worker says."""
-        return self._started.memory.simulated
+        return self._started.memory.header(SIMULATED)
 
     @property
     def position(self) -> int:
         """Position of the component of a system that runs or has failed; -1 if the worker tells nonsense."""
-        position = self._started.memory.component
+        position = self._started.memory.header(RUNNING)
         return int(position) if 0 <= position < 1e9 else -1
 
     @property
@@ -237,44 +306,3 @@ class Worker:
         # Wine's processes signal each other, in ways that are not needed here.
         kept = [part for part in parts if not (self._order.through_wine and part[:1] == b"s")]
         return read_told(b"\0".join(kept))
-
-    def _no_start(self) -> str:
-        code = self.end()
-        hint = f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}" if self._order.through_wine else ""
-        return f"the program that runs FMUs does not start ({exit_text(code)}){hint}"
-
-
-class Experience:
-    """What is known of one FMU, whichever process it runs in.
-
-    Attributes:
-        reuse: how the next simulation starts; None until that was tested.
-        untrusted: ways that made the FMU crash or hang.
-        trying: the way that is being tested.
-    """
-
-    def __init__(self) -> None:
-        self.reuse: Reuse | None = None
-        self.untrusted: tuple[Reuse, ...] = ()
-        self.trying: Reuse = "reset"
-        self._repeats = 0
-        self._seconds = 0.0
-
-    def took(self, seconds: float) -> None:
-        """Remember how long loading the FMU and its first simulation took."""
-        self._seconds = max(self._seconds, seconds)
-
-    @property
-    def patience(self) -> float:
-        """How long to wait for a trial, in s."""
-        return _LEAST_SECONDS + _DURATIONS * self._seconds
-
-    def distrust(self, reuse: Reuse) -> None:
-        """Never start in this way again, nor in a cheaper one; test the others."""
-        self.untrusted = REUSES[: REUSES.index(reuse) + 1]
-        self.reuse = "process" if reuse == "process" else None
-
-    def is_worth_repeating(self) -> bool:
-        """Whether to repeat a failure in a new process for its messages; counts the repetitions."""
-        self._repeats += 1
-        return self._repeats <= _MAX_REPEATS

@@ -3,7 +3,7 @@
 ``falsifier/fmu/worker/system_request.c`` is the other side. Components come in the order in which they step.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,22 +11,16 @@ from falsifier.errors import FalsifierError, SimulationError
 from falsifier.fmu.process import (
     Order,
     Plan,
-    Policy,
     Reply,
     Request,
-    Room,
+    Rights,
     Where,
     encoding,
     is_held,
-    library_of,
     outcome,
     solver_tolerance,
-    value_checks,
 )
 from falsifier.fmu.systems.network import SYSTEM, Member, Network, Place
-
-# A variable of a component, and the row of the plan's parameters, inputs or outputs that has its values.
-Row = tuple[str, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,35 +34,32 @@ class SystemOrder(Order):
     network: Network
 
     @classmethod
-    def of(cls, network: Network, system: str, *, logging: bool, policy: Policy) -> "SystemOrder":
+    def of(cls, network: Network, system: str, *, logging: bool, rights: Rights) -> "SystemOrder":
         """Return the order for a system; its hash stands for all that determines its trajectories."""
         return cls(
-            name=network.name,
-            path=Path(network.name),
-            key=(system, logging, policy),
+            description=network.description,
+            shown=network.name,
+            key=(system, logging, rights),
             archives={m.folder: (m.path, m.sha256) for m in network.members},
             kind=Request.LOAD_SYSTEM,
             logging=logging,
-            policy=policy,
+            rights=rights,
             network=network,
         )
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
-        return _load(self.network, folder, logging=logging)
+        members = [self.network.members[m] for m in self.network.order]
+        is_separate = self.network.coupling.isolation == "each"
+        parts = [
+            encoding.fmu(m.description, str(m.path), folder / m.folder, m.interface, logging=logging)
+            for m in members
+        ]
+        return encoding.integers(is_separate, len(members)) + b"".join(parts)
 
     def prepare(self, plan: Plan) -> bytes:
         """See Order."""
         return _prepare(self.network, plan)
-
-    def checks(self, plan: Plan) -> Callable[[Room], None]:
-        """See Order."""
-        members = self.network.members
-        parts = [_part_of(self.network, plan, k) for k in range(len(members))]
-        return value_checks(
-            plan,
-            [(m.description, part.parameters, part.driven) for m, part in zip(members, parts, strict=True)],
-        )
 
     def failure(self, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
         """See Order."""
@@ -77,10 +68,10 @@ class SystemOrder(Order):
             text = f"{said}{refusals}{outcome.last_lines(log)}"
             return SimulationError(text, time=max(reply.time, 0.0), log=log)
         name = self.component(reply.component)
-        if reply.where == Where.TIMEOUT or not name:
-            return outcome.failure(self.name, plan, reply, refusals, log)
-        part = _part_of(self.network, plan, self.network.order[reply.component])
-        return outcome.failure(name, replace(plan, strings=part.strings), reply, refusals, log)
+        if name and reply.where != Where.TIMEOUT:
+            strings = _strings_of(self.network, plan, self.network.order[reply.component])
+            plan = replace(plan, model=name, strings=strings)
+        return outcome.failure(plan, reply, refusals, log)
 
     def component(self, position: int) -> str:
         """See Order."""
@@ -93,14 +84,14 @@ class SystemOrder(Order):
         before = f"{reached}, before the stop time {plan.stop_time:g} s"
         if reply.where == Where.UNSETTLED:
             return (
-                f"{self.name}: the initialisation does not converge: after {rounds} rounds through the "
+                f"{plan.model}: the initialisation does not converge: after {rounds} rounds through the "
                 f"connections, these still change: {self._changes(reply)}; they depend on each other in a "
                 "loop: give a component other start values or a delay, or raise coupling.max_rounds or "
                 "coupling.tolerance"
             )
         if reply.where == Where.NOT_CONVERGED:
             return (
-                f"{self.name}: the loop of {', '.join(self._loop(reply.component))} does not converge at "
+                f"{plan.model}: the loop of {', '.join(self._loop(reply.component))} does not converge at "
                 f"{reached}: after {rounds} rounds, these still change: {self._changes(reply)}; raise "
                 "coupling.max_rounds or coupling.tolerance, or accept a delay of one communication step: "
                 'loops = "delay"'
@@ -151,44 +142,16 @@ def _short(number: str) -> str:
         return "an unknown number"
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """What a plan has of one component.
-
-    Attributes:
-        parameters: parameters and start values that are set.
-        strings: string parameters and their values.
-        inputs: inputs with a source.
-        driven: those of them that follow a signal from outside.
-        connected: outputs that feed inputs.
-        recorded: other variables that are recorded.
-    """
-
-    parameters: tuple[Row, ...]
-    strings: tuple[tuple[str, str], ...]
-    inputs: tuple[str, ...]
-    driven: tuple[Row, ...]
-    connected: tuple[str, ...]
-    recorded: tuple[Row, ...]
+def _strings_of(network: Network, plan: Plan, member: int) -> tuple[tuple[str, str], ...]:
+    """Return the string parameters of the component at this position of the network's members."""
+    places = [(network.places[name], value) for name, value in plan.strings]
+    return tuple((place.name, value) for place, value in places if place.member == member)
 
 
-def _part_of(network: Network, plan: Plan, member: int) -> Part:
-    """Return what a plan has of the component at this position of the network's members."""
-    places = network.places
-    signals = _connected_outputs(network)
-    parameters = [(places[name], k) for k, name in enumerate(plan.parameters)]
-    outputs = [(places[name], k) for k, name in enumerate(plan.outputs)]
-    sources = _sources_of(network, plan)
-    rows = {places[name]: k for k, name in enumerate(plan.inputs)}
-    own = [place for place in sources if place.member == member]
-    return Part(
-        parameters=tuple((p.name, k) for p, k in parameters if p.member == member),
-        strings=tuple((places[n].name, value) for n, value in plan.strings if places[n].member == member),
-        inputs=tuple(place.name for place in own),
-        driven=tuple((p.name, rows[sources[p]]) for p in own if sources[p] not in signals),
-        connected=tuple(place.name for place in signals if place.member == member),
-        recorded=tuple((p.name, k) for p, k in outputs if p.member == member and p not in signals),
-    )
+def _rows_of(network: Network, names: Sequence[str], member: int) -> list[tuple[Place, int]]:
+    """Return the variables of a component among these names, each with its row."""
+    places = [network.places[name] for name in names]
+    return [(place, row) for row, place in enumerate(places) if place.member == member]
 
 
 def _sources_of(network: Network, plan: Plan) -> dict[Place, Place]:
@@ -203,25 +166,6 @@ def _connected_outputs(network: Network) -> dict[Place, int]:
     sources = {link.source for link in network.links if link.source.member != SYSTEM}
     ordered = sorted(sources, key=lambda place: (network.order.index(place.member), place.name))
     return {place: k for k, place in enumerate(ordered)}
-
-
-def _load(network: Network, folder: Path, *, logging: bool) -> bytes:
-    """Return what the worker needs to load the components that were unpacked to subfolders of a folder.
-
-    Raises:
-        ModelError: if one has no library for this machine.
-    """
-    members = [network.members[m] for m in network.order]
-    is_separate = network.coupling.isolation == "each"
-    return encoding.integers(is_separate, len(members)) + b"".join(
-        _fmu(m, folder, logging=logging) for m in members
-    )
-
-
-def _fmu(member: Member, folder: Path, *, logging: bool) -> bytes:
-    own, description = folder / member.folder, member.description
-    library = library_of(member.path, description, own, member.interface, windows=False)
-    return encoding.fmu(description, own, library, member.interface, logging=logging)
 
 
 def _prepare(network: Network, plan: Plan) -> bytes:
@@ -247,26 +191,28 @@ def _prepare(network: Network, plan: Plan) -> bytes:
 
 
 def _component(network: Network, plan: Plan, position: int) -> bytes:
-    number = network.order[position]
-    member, part = network.members[number], _part_of(network, plan, number)
+    number, signals = network.order[position], _connected_outputs(network)
+    member, strings = network.members[number], _strings_of(network, plan, number)
     description = member.description
+    given = _rows_of(network, plan.parameters, number)
+    recorded = [(p, row) for p, row in _rows_of(network, plan.outputs, number) if p not in signals]
+    inputs = [place.name for place in _sources_of(network, plan) if place.member == number]
+    held = [name for name in inputs if is_held(description, member.interface, name)]
+    plain = [name for name in inputs if name not in held]
+    parameters = [place.name for place, _ in given]
     loop_end = dict(network.loops).get(position, 0)
     is_iterated = any(first <= position < last for first, last in network.loops)
-    kinds = {v.name: v for v in description.info.variables}
-    held = [n for n in part.inputs if is_held(description, member.interface, kinds[n])]
-    plain = [n for n in part.inputs if n not in held]
-    slots, parameters = description.slots, [name for name, _ in part.parameters]
     parts = [
         encoding.reals(solver_tolerance(plan, description.info)),
-        encoding.integers(_steps(member, plan), loop_end, is_iterated, len(part.strings)),
-        *(encoding.integers(slots[name].reference) + encoding.text(value) for name, value in part.strings),
+        encoding.integers(_steps(member, plan), loop_end, is_iterated, len(strings)),
+        *(encoding.integers(description.slots[n].reference) + encoding.text(value) for n, value in strings),
         encoding.ports(description, parameters),
-        encoding.integers(*(row for _, row in part.parameters)),
+        encoding.integers(*(row for _, row in given)),
         *(encoding.inputs(description, names, parameters) for names in (plain, held)),
         _feeds(network, plan, [Place(number, name) for name in (*plain, *held)]),
-        encoding.ports(description, part.connected),
-        encoding.ports(description, [name for name, _ in part.recorded]),
-        encoding.integers(*(row for _, row in part.recorded)),
+        encoding.ports(description, [place.name for place in signals if place.member == number]),
+        encoding.ports(description, [place.name for place, _ in recorded]),
+        encoding.integers(*(row for _, row in recorded)),
     ]
     return b"".join(parts)
 

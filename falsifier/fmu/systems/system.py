@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import ClassVar, get_args
+from typing import get_args
 
 from falsifier.core.arguments import instance, one_of, positive, whole
 from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
@@ -13,16 +13,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.fmu.description import file_hash
-from falsifier.fmu.process import (
-    REGISTRY,
-    Policy,
-    Task,
-    make_plan,
-    make_task,
-    resolved,
-    room_for,
-    run_task,
-)
+from falsifier.fmu.process import Isolated, simulate
 from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
 from falsifier.fmu.systems.order import SystemOrder
 from falsifier.fmu.systems.wiring import Connection, make_network
@@ -58,7 +49,7 @@ class Component:
 
 
 @dataclass(frozen=True, slots=True)
-class System:
+class System(Isolated):
     """Several connected FMUs, simulated together; their variables are ``component.variable``.
 
     Attributes:
@@ -90,15 +81,9 @@ class System:
     name: str = field(default="system", kw_only=True)
     package: Path | None = field(default=None, kw_only=True, compare=False)
     key: str = field(default="", init=False, repr=False, compare=False)
-    has_own_processes: ClassVar[bool] = True
-    logging: bool = field(default=False, kw_only=True)
-    allow: tuple[str, ...] = field(default=(), kw_only=True)
-    deny: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __post_init__(self) -> None:
-        for name in ("allow", "deny"):
-            object.__setattr__(self, name, resolved(getattr(self, name), Path()))
-        Policy.of(self.allow, self.deny)
+        self._resolve_rights()
         instance("components", self.components, Mapping, "FMUs by name")
         instance("connections", self.connections, Mapping, "outputs by input")
         if not self.components:
@@ -148,19 +133,21 @@ class System:
             SimulationError: if there is no complete trajectory; names the component that failed.
             SpecError: if a component's own step is not an integer multiple of the communication step.
         """
-        tables = [signal.pieces(experiment.stop_time) for signal in signals.values()]
+        if experiment.outputs:
+            self.check_steps(experiment)
         values = dict(self.frame.values)
         texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
         experiment = replace(experiment, strings=(*texts, *experiment.strings)) if texts else experiment
         numbers = {n: v for n, v in values.items() if not isinstance(v, str) and n not in signals}
         numbers |= parameters
         # An input of the whole that no signal drives is constant.
-        constants = {v.name: v for v in self.frame.inputs if v.name not in signals}
-        for name, variable in constants.items():
-            start = numbers.pop(name, float(variable.start or 0.0))
-            tables.append(Signal((0.0,), (start,), "constant").pieces(experiment.stop_time))
-        task = _task(self, experiment, (*signals, *constants), tuple(numbers), room_for(tables))
-        return run_task(REGISTRY.runner(_order(self)), task, tables, numbers, self.info.name)
+        driven = dict(signals)
+        for variable in self.frame.inputs:
+            if variable.name not in signals:
+                start = numbers.pop(variable.name, float(variable.start or 0.0))
+                driven[variable.name] = Signal((0.0,), (start,), "constant")
+        tables = {name: signal.pieces(experiment.stop_time) for name, signal in driven.items()}
+        return simulate(self.order, experiment, tables, numbers)
 
     def check_steps(self, experiment: Experiment) -> None:
         """Check that each component's own step is an integer multiple of the communication step, and fits in.
@@ -188,9 +175,10 @@ class System:
                     key=key,
                 )
 
-    def close(self) -> None:
-        """End the worker processes; the next simulation starts again."""
-        REGISTRY.drop(_order(self).key)
+    @property
+    def order(self) -> SystemOrder:
+        """What workers are asked to simulate."""
+        return _order(self)
 
 
 def _key(system: System) -> str:
@@ -202,8 +190,7 @@ def _key(system: System) -> str:
 
 @lru_cache(maxsize=64)
 def _order(system: System) -> SystemOrder:
-    policy = Policy.of(system.allow, system.deny)
-    return SystemOrder.of(system.network, system.key, logging=system.logging, policy=policy)
+    return SystemOrder.of(system.network, system.key, logging=system.logging, rights=system.rights)
 
 
 @lru_cache(maxsize=32)
@@ -213,20 +200,6 @@ def _network(system: System) -> Network:
     }
     connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
     return make_network(system.name, components, connections, system.coupling, system.frame)
-
-
-@lru_cache(maxsize=64)
-def _task(
-    system: System,
-    experiment: Experiment,
-    inputs: tuple[str, ...],
-    parameters: tuple[str, ...],
-    pieces: int,
-) -> Task:
-    if experiment.outputs:
-        system.check_steps(experiment)
-    plan = make_plan(system.network.description, experiment, inputs, parameters, pieces=pieces)
-    return make_task(plan, experiment, system.info)
 
 
 def _check_coupling(coupling: Coupling) -> None:

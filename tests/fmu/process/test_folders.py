@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.fmu.process.folders import WorkFolder, sweep
-from falsifier.fmu.process.shared import _DROPPED, _MOST_BYTES, Output
+from falsifier.fmu.process.start import _DROPPED, _MOST_BYTES, Output
+from falsifier.fmu.process.workplace import WorkFolder, sweep
 
 
 @pytest.fixture(autouse=True)
@@ -33,7 +33,7 @@ def test_a_folder_whose_owner_lives_is_not_swept() -> None:
 KILLED = """
 import os, sys, tempfile
 tempfile.tempdir = sys.argv[1]
-from falsifier.fmu.process.folders import WorkFolder
+from falsifier.fmu.process.workplace import WorkFolder
 folder = WorkFolder()
 (folder.path / "left").write_text("behind")
 os.kill(os.getpid(), 9)

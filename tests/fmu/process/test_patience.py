@@ -7,8 +7,8 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu.description import read_description
-from falsifier.fmu.process.patience import Patience
 from falsifier.fmu.process.plan import make_plan
+from falsifier.fmu.process.worker import Patience
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated
 from tests.fmu.support import HANG
@@ -42,22 +42,22 @@ def test_without_a_limit_slow_simulations_go_on_and_hanging_ones_do_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock(monkeypatch)
-    assert lasts(clock, Patience("m", PLAN), pace=0.5, until=50.0) == pytest.approx(100.0, abs=2.0)
+    assert lasts(clock, Patience(PLAN), pace=0.5, until=50.0) == pytest.approx(100.0, abs=2.0)
     clock.now = 0.0
-    assert lasts(clock, Patience("m", PLAN), pace=0.0, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(PLAN), pace=0.0, until=50.0) == pytest.approx(60.1)
     clock.now = 0.0
-    assert lasts(clock, Patience("m", PLAN), pace=0.01, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(PLAN), pace=0.01, until=50.0) == pytest.approx(60.1)
 
 
 def test_a_limit_of_the_user_is_for_the_whole_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(monkeypatch)
     limited = make_plan(DESCRIPTION, Experiment(50.0, 1.0, ("y",), time_limit=60.0), (), ())
-    assert lasts(clock, Patience("m", limited), pace=0.5, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(limited), pace=0.5, until=50.0) == pytest.approx(60.1)
 
 
 @pytest.mark.parametrize("told", [math.nan, math.inf, 1e300])
 def test_progress_that_an_fmu_makes_up_ends(monkeypatch: pytest.MonkeyPatch, told: float) -> None:
-    clock, waiting, count = Clock(monkeypatch), Patience("m", PLAN), 0
+    clock, waiting, count = Clock(monkeypatch), Patience(PLAN), 0
     with pytest.raises(TimeoutError):
         for count in range(10_000):
             clock.now += waiting.seconds

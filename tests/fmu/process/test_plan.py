@@ -7,18 +7,16 @@ from falsifier.errors import FalsifierError, ModelError, SpecError
 from falsifier.fmu.description import read_description
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.outcome import failure
-from falsifier.fmu.process.plan import Plan, make_plan
+from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 
-PLAN = Plan((), (), (), 1.0, 2, 1, 1, 0.1, None, 5.0, (("file", "a.txt"),))
+LAG = read_description(fixtures.path("Lag_2"))
 
 
 def test_an_fmu_that_cannot_be_used_is_no_failed_simulation() -> None:
-    with pytest.raises(ModelError, match=r"^M: it lacks fmi2DoStep$"):
-        raise failure("M", PLAN, Reply(Where.IMPOSSIBLE, text="it lacks fmi2DoStep"), "", ())
-
-
-LAG = read_description(fixtures.path("Lag_2"))
+    plan = make_plan(LAG, Experiment(1.0, 0.1, ("y",)), ["u"], [])
+    with pytest.raises(ModelError, match=r"^Lag: it lacks fmi2DoStep$"):
+        raise failure(plan, Reply(Where.IMPOSSIBLE, text="it lacks fmi2DoStep"), "", ())
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ import pytest
 from falsifier.core import posix_files
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import this_platform
-from falsifier.fmu.process import REGISTRY, program
+from falsifier.fmu.process import REGISTRY, workplace
 from falsifier.fmu.process.connection import Request, Where
-from falsifier.fmu.process.program import WORKER
 from falsifier.fmu.process.worker import REUSES
+from falsifier.fmu.process.workplace import WORKER
 from tests.fmu import fixtures
 
 EXPORT_PYTHON = Path(__file__).parents[3] / ".venv-export" / "bin" / "python"
@@ -67,7 +67,7 @@ class TestElsewhere:
 
     @pytest.fixture(autouse=True)
     def unknown_platform(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(program, "this_platform", lambda: "riscv64-linux")
+        monkeypatch.setattr(workplace, "this_platform", lambda: "riscv64-linux")
         monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
 
     def test_the_machines_compiler_builds_it_once_and_it_simulates(
@@ -78,19 +78,21 @@ class TestElsewhere:
         compiled = fixtures.run(model, ("y",))["y"]
         REGISTRY.close()
         (kept,) = (tmp_path / "cache" / "falsifier" / "workers").iterdir()
-        monkeypatch.setattr(program, "compile_c", None)
-        assert program.worker_program(tmp_path / "of another process") == kept
+        monkeypatch.setattr(workplace, "compile_c", None)
+        assert workplace.worker_program(tmp_path / "of another process") == kept
         monkeypatch.undo()
         np.testing.assert_array_equal(compiled, fixtures.run(model, ("y",))["y"])
 
     def test_where_others_could_exchange_it_nothing_is_kept(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr(program, "compile_c", lambda what, folder, arguments: Path(arguments[-1]).touch())
+        monkeypatch.setattr(
+            workplace, "compile_c", lambda what, folder, arguments: Path(arguments[-1]).touch()
+        )
         shared = tmp_path / "cache" / "falsifier" / "workers"
         shared.mkdir(parents=True)
         shared.chmod(0o777)
-        assert program.worker_program(tmp_path).parent == tmp_path and not list(shared.iterdir())
+        assert workplace.worker_program(tmp_path).parent == tmp_path and not list(shared.iterdir())
 
     def test_without_a_compiler_one_line_says_so(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -98,7 +100,7 @@ class TestElsewhere:
         monkeypatch.setenv("PATH", str(tmp_path))
         monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
         with pytest.raises(ModelError, match=r"no program to run FMUs on riscv64-linux.*no C compiler found"):
-            program.worker_program(tmp_path)
+            workplace.worker_program(tmp_path)
 
 
 def test_a_folder_that_forbids_programs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

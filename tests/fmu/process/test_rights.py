@@ -6,8 +6,8 @@ from pathlib import Path
 from falsifier.core.model import ModelInfo
 from falsifier.fmu.description import Description, Slot
 from falsifier.fmu.process import encoding
-from falsifier.fmu.process.program import MORE, worker_environment
-from falsifier.fmu.process.rights import Policy, encoded, hidden_places, policy_text, read_told
+from falsifier.fmu.process.rights import Rights, described, encoded, hidden_places, read_told
+from falsifier.fmu.process.workplace import MORE, worker_environment
 
 ALL = 15
 
@@ -28,7 +28,7 @@ def test_keys_are_hidden_by_every_path_that_leads_to_them(tmp_path: Path) -> Non
 def test_the_guard_is_told_paths_without_links(tmp_path: Path) -> None:
     (tmp_path / "logs").mkdir()
     (tmp_path / "link").symlink_to("logs")
-    policy = Policy.of([f"write:{tmp_path / 'link'}", "programs"], ["network"])
+    policy = Rights.of([f"write:{tmp_path / 'link'}", "programs"], ["network"])
     told = encoded(policy, [tmp_path], ["/hidden"], memory=7)
     assert int.from_bytes(told[:4], "little") == len(told) - 4
     real = str(tmp_path.resolve())
@@ -47,18 +47,18 @@ def test_what_was_refused_is_told_with_the_way_out() -> None:
 
 
 def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
-    may, may_not = policy_text(Policy(), ALL).split("may not")
+    may, may_not = described(Rights(), ALL).split("may not")
     assert "network" in may and "programs" in may_not and "enforce" not in may_not
-    may, may_not = policy_text(Policy((Path("/data/logs"),), programs=True, network=False), ALL).split(
+    may, may_not = described(Rights((Path("/data/logs"),), programs=True, network=False), ALL).split(
         "may not"
     )
     assert "/data/logs" in may and "programs" in may and "network" in may_not
     assert "other known places of keys" in may_not, "what may be changed may be read"
-    may, may_not = policy_text(Policy(readable=(Path("/home/me/.config"),)), ALL).split("may not")
+    may, may_not = described(Rights(readable=(Path("/home/me/.config"),)), ALL).split("may not")
     assert "read /home/me/.config" in may and "other known places of keys" in may_not
-    _, filtered = policy_text(Policy(), ALL - 4 - 8).split("not enforce")
+    _, filtered = described(Rights(), ALL - 4 - 8).split("not enforce")
     assert "change their settings" in filtered and "files" not in filtered, "no filter of system calls"
-    _, nothing = policy_text(Policy(network=False), 0).split("not enforce")
+    _, nothing = described(Rights(network=False), 0).split("not enforce")
     for lacking in ("files", "keys", "processes", "connections", "programs"):
         assert lacking in nothing
 

@@ -13,8 +13,9 @@ import pytest
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 from falsifier.fmu.description import read_description
-from falsifier.fmu.process import FmuOrder, Runner
+from falsifier.fmu.process import FmuOrder
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
+from falsifier.fmu.process.runner import Runner
 from tests import patience
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, run, worker

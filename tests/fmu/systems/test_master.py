@@ -143,6 +143,6 @@ def test_the_time_limit_counts_for_the_whole_system() -> None:
 def test_values_that_do_not_fit_their_type_are_refused_with_the_component() -> None:
     model = system({"a": "Echo_3"}, {})
     with pytest.raises(
-        SimulationError, match=r"^a: values from 0 to 300 do not fit 'in_Int8', .* -128 to 127"
+        SimulationError, match=r"^system: values from 0 to 300 do not fit 'a.in_Int8', .* -128 to 127"
     ):
         run(model, "a.out_Int8", signals={"a.in_Int8": Signal((0.0, 1.0), (0.0, 300.0), "linear")})

@@ -1,0 +1,267 @@
+"""Where workers run: a folder of this process, unpacked FMUs, the program that runs them, its environment."""
+
+import contextlib
+import os
+import platform
+import re
+import stat
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from uuid import uuid4
+
+from falsifier.core import posix, posix_files
+from falsifier.core.compiler import compile_c
+from falsifier.core.files import cache_directory, checksum, private_folder
+from falsifier.core.secrets import holds_secrets, scrubbed
+from falsifier.errors import ModelError
+from falsifier.fmu.description import WINDOWS, extract, file_hash, this_platform
+
+_PREFIX = "falsifier-fmu-"
+_LOCK_SUFFIX = ".lock"
+# Only what this module has made is swept.
+_MADE = re.compile(rf"{_PREFIX}[0-9a-f]{{32}}({re.escape(_LOCK_SUFFIX)})?")
+# A lock without a folder belongs to a process that is about to make the folder, unless it is older than this.
+_MAKING_SECONDS = 3600.0
+
+WORKER = Path(__file__).parents[1] / "worker"
+# Platforms whose system calls sandbox_linux.c knows.
+_CONFINED = ("x86_64-linux", "aarch64-linux")
+_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+_NOT_HERE = ("platform_windows.c", "sandbox_linux.c", "calls_linux.c", "sandbox_none.c")
+# Names of further variables to pass on, separated by commas.
+MORE = "FALSIFIER_FMU_VARIABLES"
+
+# Where programs and libraries are, who the user is, language and time zone, and licences.
+_PASSED = re.compile(
+    r"PATH|HOME|USER|LOGNAME|LANG|LANGUAGE|LC_\w+|TZ|LD_LIBRARY_PATH|DYLD_(FALLBACK_)?LIBRARY_PATH"
+    r"|\w*LICEN[SC]E\w*",
+    re.IGNORECASE,
+)
+
+
+class WorkFolder:
+    """A folder in the system's temporary folder, with a lock beside it that says that its owner is alive."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.gettempdir()) / f"{_PREFIX}{uuid4().hex}"
+        # Locked before the folder exists: a folder whose lock is free has lost its owner.
+        self._lock = posix_files.lock_file(_lock_of(self.path))
+        self.path.mkdir(mode=0o700)
+
+    def remove(self) -> None:
+        """Remove the folder with all its contents, and the lock."""
+        remove_work_folder(self.path)
+        self.forget()
+
+    def forget(self) -> None:
+        """Leave the folder to another process, such as the one that this is a copy of."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+def remove_work_folder(path: Path) -> None:
+    """Remove a folder that a WorkFolder made, perhaps in another process, and its lock."""
+    posix_files.remove_tree(path)
+    with contextlib.suppress(OSError):
+        _lock_of(path).unlink()
+
+
+def sweep() -> None:
+    """Remove the folders of processes that were killed before they could do so."""
+    temporary = Path(tempfile.gettempdir())
+    for path in temporary.glob(f"{_PREFIX}*"):
+        with contextlib.suppress(OSError):
+            if not (_MADE.fullmatch(path.name) and path.lstat().st_uid == os.getuid()):
+                continue
+            if path.name.endswith(_LOCK_SUFFIX):
+                _sweep_lock(path)
+            else:
+                _sweep_folder(path)
+
+
+def _lock_of(path: Path) -> Path:
+    return path.with_name(path.name + _LOCK_SUFFIX)
+
+
+def _sweep_folder(path: Path) -> None:
+    lock = posix_files.lock_file(_lock_of(path))
+    if lock is not None:
+        try:
+            remove_work_folder(path)
+        finally:
+            os.close(lock)
+
+
+def _sweep_lock(path: Path) -> None:
+    if not path.with_name(path.name.removesuffix(_LOCK_SUFFIX)).exists():
+        age = time.time() - path.lstat().st_mtime
+        if age > _MAKING_SECONDS:
+            path.unlink()
+
+
+class Workplace:
+    """The folder of this process's workers, and the FMUs that are unpacked to it.
+
+    Raises:
+        MachineError: if processes may not use enough memory.
+    """
+
+    def __init__(self) -> None:
+        posix.check_memory_limits()
+        _protect_secrets(os.environ)
+        sweep()
+        self._folder = WorkFolder()
+        self._lock = threading.Lock()
+
+    @property
+    def root(self) -> Path:
+        """The folder."""
+        return self._folder.path
+
+    def unpacked(self, archives: Mapping[str, tuple[Path, str]]) -> Path:
+        """Return the folder to which FMUs are unpacked; unpack them if necessary.
+
+        Two components with the same FMU get a folder each: a library that is loaded from two files has its
+        static data twice.
+
+        Raises:
+            ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
+        """
+        key = sha256(repr([(name, sha) for name, (_, sha) in archives.items()]).encode()).hexdigest()[:16]
+        folder = self.root / key
+        with self._lock:
+            if not folder.is_dir():
+                partial = folder.with_suffix(".partial")
+                for name, (path, sha) in archives.items():
+                    if file_hash(path) != sha:
+                        raise ModelError(
+                            f"{path}: the file has changed since the model was loaded; load the model again"
+                        )
+                    extract(path, partial / name)
+                partial.rename(folder)
+        return folder
+
+    def program(self, *, windows: bool = False) -> Path:
+        """Return the path of the program that runs FMUs; copy or compile it first if necessary.
+
+        Raises:
+            ModelError: if there is none for this machine, or no library can be loaded from the folder.
+        """
+        if not windows and posix_files.forbids_programs(self.root):
+            raise ModelError(
+                f"FMUs are unpacked to {self.root.parent}, from which this system loads no libraries "
+                "(noexec); set TMPDIR to another folder"
+            )
+        with self._lock:
+            return worker_program(self.root, windows=windows)
+
+    def scratch(self) -> Path:
+        """Return a new folder for one worker."""
+        return Path(tempfile.mkdtemp(prefix="work-", dir=self.root))
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        self._folder.remove()
+
+    def forget(self) -> None:
+        """Leave the folder to another process, of which this is a copy."""
+        self._folder.forget()
+
+
+def worker_program(root: Path, *, windows: bool = False) -> Path:
+    """Return the path of the program that runs FMUs.
+
+    Args:
+        root: folder for a copy, if the installed one may not be executed, or for one that is compiled and
+            cannot be kept.
+        windows: whether it is the program for Windows, which is executed by Wine.
+
+    Raises:
+        ModelError: if there is none for this machine, and it cannot be compiled either.
+    """
+    if windows:
+        return WORKER / "bin" / WINDOWS / "worker.exe"
+    found = this_platform()
+    path = WORKER / "bin" / found / "worker"
+    if not path.is_file() or not _has_its_library():
+        return _compiled(root, found)
+    if os.access(path, os.X_OK):
+        return path
+    copy = root / path.name
+    if not copy.exists():
+        copy.write_bytes(path.read_bytes())
+        copy.chmod(stat.S_IRWXU)
+    return copy
+
+
+@lru_cache(maxsize=1)
+def _has_its_library() -> bool:
+    """Whether this system has the C library that the built program needs; others are used with musl."""
+    return sys.platform != "linux" or platform.libc_ver()[0] == "glibc"
+
+
+def _compiled(root: Path, found: str) -> Path:
+    """Return the program, compiled by this machine's C compiler, once for all processes of this user."""
+    path = (_kept() or root) / f"worker-{found}-{_sum_of_sources()}"
+    if path.exists():
+        return path
+    kept = ("sandbox_linux.c", "calls_linux.c") if found in _CONFINED else ("sandbox_none.c",)
+    sources = [p.name for p in sorted(WORKER.glob("*.c")) if p.name in kept or p.name not in _NOT_HERE]
+    libraries = ("-lm", "-ldl") if found.endswith("-linux") else ("-lm",)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        compile_c(WORKER, WORKER, [*_FLAGS, *sources, *libraries, "-o", str(partial)])
+    except ModelError as error:
+        raise ModelError(
+            f"there is no program to run FMUs on {found}, and it cannot be compiled: {error}"
+        ) from None
+    partial.replace(path)
+    return path
+
+
+def _kept() -> Path | None:
+    """Return the folder where compiled programs are kept; None if there is none from which they may run."""
+    try:
+        folder = private_folder(cache_directory() / "workers")
+    except RuntimeError:  # the user has no home
+        return None
+    return None if folder is None or posix_files.forbids_programs(folder) else folder
+
+
+@lru_cache(maxsize=1)
+def _sum_of_sources() -> str:
+    """Return a checksum of what the program is compiled from, so that no other version's is taken."""
+    files = sorted((*WORKER.glob("*.c"), *WORKER.glob("*.h")))
+    return checksum(b"".join(file.read_bytes() for file in files) + " ".join(_FLAGS).encode())
+
+
+def _protect_secrets(environment: Mapping[str, str]) -> None:
+    """Keep FMUs from reading this process's secrets where they are not confined to their own processes.
+
+    On Linux, any process could otherwise read the environment of another one of the same user. Without
+    secrets, or if FMUs can be confined, this process stays open to debuggers.
+    """
+    if holds_secrets(environment) and not posix.can_confine():
+        posix.hide_memory()
+
+
+def worker_environment(environment: Mapping[str, str], scratch: Path) -> dict[str, str]:
+    """Return the environment of a worker.
+
+    Args:
+        environment: that of this process.
+        scratch: the worker's folder, where its temporary files go.
+    """
+    more = {name.strip() for name in environment.get(MORE, "").split(",")}
+    passed = {name: value for name, value in environment.items() if _PASSED.fullmatch(name) or name in more}
+    folders = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(scratch))
+    # One thread each, because workers run in parallel.
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    return {**scrubbed(passed), **folders, **threads}
