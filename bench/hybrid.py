@@ -33,7 +33,7 @@ import numpy as np
 from falsifier import Candidate, Problem, Signal, falsify, load_problem
 from falsifier.core.space import InputRange
 from falsifier.engines.hybrid import Hybrid
-from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -135,7 +135,7 @@ def simulations(
 
 def led(problem: Problem, one: StandIn, budget: int) -> int:
     """Return the number of simulations of the hybrid with a stand-in."""
-    engine = Hybrid(problem, seed=one.seed, adviser=make_llm_engine(problem, one.chat))
+    engine = Hybrid(problem, seed=one.seed, adviser=LLMEngine(problem, one.chat))
     engine.attach(lambda _: None, lambda chat: chat)
     engine.begin(budget)
     return simulations(problem, engine, budget, one.see)

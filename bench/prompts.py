@@ -18,7 +18,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
-from falsifier.engines.preview import preview
+from falsifier.engines.briefing import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, View

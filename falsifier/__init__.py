@@ -68,8 +68,8 @@ if TYPE_CHECKING:
     from falsifier.counterexamples.store import Replayed, StoredCounterexample, replay
     from falsifier.counterexamples.store import load as load_counterexample
     from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
-    from falsifier.engines.llm import make_llm_engine
-    from falsifier.engines.preview import preview
+    from falsifier.engines.briefing import preview
+    from falsifier.engines.llm import LLMEngine
     from falsifier.engines.protocol import AsksLLM, Engine
     from falsifier.errors import FalsifierError
     from falsifier.evaluation.confirm import Confirmation, confirm
@@ -178,12 +178,12 @@ _EXPORTS = {
     "load_problem": "falsifier.problem.loading",
     "load_problems": "falsifier.problem.loading",
     "make_engine": "falsifier.engines",
-    "make_llm_engine": "falsifier.engines.llm",
+    "LLMEngine": "falsifier.engines.llm",
     "margin": "falsifier.analyses.margin",
     "monitor_for": "falsifier.evaluation.evaluate",
     "parse": "falsifier.stl",
     "plot": "falsifier.views.plotting",
-    "preview": "falsifier.engines.preview",
+    "preview": "falsifier.engines.briefing",
     "progress": "falsifier.views.progress",
     "read_info": "falsifier.fmu",
     "read_package": "falsifier.fmu",
@@ -234,6 +234,7 @@ __all__ = [
     "Freedom",
     "FunctionModel",
     "InputRange",
+    "LLMEngine",
     "LLMSettings",
     "LintFinding",
     "Listener",
@@ -279,7 +280,6 @@ __all__ = [
     "load_problem",
     "load_problems",
     "make_engine",
-    "make_llm_engine",
     "margin",
     "monitor_for",
     "parse",

@@ -76,8 +76,8 @@ def prompt(
 
     With --at, print a question that a run sent.
     """
+    from falsifier.engines.briefing import preview, preview_tool
     from falsifier.engines.hybrid import Settings as HybridSettings
-    from falsifier.engines.preview import preview, preview_tool
     from falsifier.record.journal import read_journal, recorded_evaluations
     from falsifier.record.questions import doubtful_confirmations
 
@@ -93,7 +93,7 @@ def prompt(
     told = list(evaluations.values())[: None if at is None else at - 1]
     limit = _limit(directory)
     settings = HybridSettings()
-    count = 1 if engine == "llm" else settings.count if told else settings.opening
+    count = 1 if engine == "llm" else settings.count if told else 1
     messages = preview(
         problem,
         variant=variant,

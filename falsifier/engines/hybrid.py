@@ -1,20 +1,19 @@
-"""A language model and the surrogate engine, sharing one history.
+"""A language model (LLM) and the surrogate engine, sharing one history.
 
 The LLM proposes the first candidate, because its first guess is better than any corner; the surrogate then
-shows how the system responds, with an input that steps or switches. From then on the rule in
-``falsifier.engines.turns`` decides who is next, from what each half has brought.
+shows how the system responds, with an input that steps or switches. From then on ``Turns`` decides who is
+next, from what each half has brought.
 
 A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
-starts of its own search; the best predicted one is simulated if that is worth it, see
-``turns.is_worth_simulating``. One that is the same experiment as an earlier sample is not simulated on
-untested predictions, and the LLM is told so. Before it answers, the LLM is told why the surrogate chose its
-samples and what it would do next, and may request predictions; if it does not, it is told them afterwards
-and may revise its candidates once, or insist on some.
+starts of its own search; the best predicted one is simulated if that is worth it. One that is the same
+experiment as an earlier sample is not simulated on untested predictions, and the LLM is told so. Before it
+answers, the LLM is told why the surrogate chose its samples and what it would do next, and may request
+predictions; if it does not, it is told them afterwards and may revise its candidates once, or insist on some.
 """
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from textwrap import shorten
 
 import numpy as np
@@ -26,7 +25,6 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.engines.surrogate.planning import is_seen
-from falsifier.engines.turns import TRIAL, Half, Who, helps, is_worth_simulating, next_turn
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -37,6 +35,18 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 
 _LOG = logging.getLogger(__name__)
+# Answers of the LLM, the first of which knows nothing of the system, before it must have helped.
+_TRIAL = 2
+# Factor of the surrogate's turns for each further answer that did not help, so that an LLM that does not help
+# has few of the simulations.
+_GROWTH = 4
+# A new best counts if it lowers the best robustness by at least this share; else a half that creeps downwards
+# would keep its turns for ever.
+_NOTABLE = 0.1
+# A candidate is the same experiment as a sample if it is within this share of each range of it at all times.
+_SAME = 0.1
+# Maximum number of the surrogate's latest samples of which the LLM is told the reason.
+_MOST_REASONS = 4
 # Characters of a reason in a remark.
 _LONGEST_REASON = 240
 # What the surrogate says in its reasons.
@@ -52,40 +62,63 @@ class Settings:
     """How the LLM is asked, and how its answers are used.
 
     Attributes:
-        opening: number of candidates of the first answer, all simulated.
-        count: number of candidates requested later.
-        tries: maximum number of candidates of a later answer that are simulated, best predicted first.
+        count: number of candidates requested after the first answer, which has one.
         promising: share of the best robustness by which an answer must be predicted to lower it to be
             simulated, unless it is predicted to be better than what the surrogate would do next.
-        same: share of each range within which a candidate is the same experiment as a sample, if it is that
-            near to it in every input at all times and in every parameter.
         misses: number of successive predicted violations that did not occur after which predictions are no
             longer trusted and the LLM is told so.
-        reasons: maximum number of the surrogate's latest samples of which the LLM is told the reason.
-        what_if: whether the LLM gets predictions of its candidates before any is simulated.
         what_if_calls: maximum number of requests for predictions per question. Each sends the whole
             conversation again, so three cost up to four requests plus rejected replies: enough to compare,
             correct and check.
     """
 
-    opening: int = 1
     count: int = 5
-    tries: int = 1
     promising: float = 0.1
-    same: float = 0.1
     misses: int = 3
-    reasons: int = 4
-    what_if: bool = True
     what_if_calls: int = 3
 
 
 @dataclass(slots=True)
-class _Answer:
-    """Candidates of one answer: those still to be returned by ``ask``, and those whose evaluation is due."""
+class Turns:
+    """What each half has brought, and who is next.
 
-    queue: list[Candidate]
-    helped: bool = False
-    asked: set[object] = field(default_factory=set)
+    The LLM answers the first and the third time: two turns on trial. Each turn after that which does not help
+    multiplies the number of turns that the surrogate gets before the LLM is asked again, and then these must
+    have brought nothing new either. After an answer that helped, it is asked again at once.
+
+    Attributes:
+        answers: number of answers of the LLM.
+        useless: number of answers since the last one that helped.
+        waited: number of the surrogate's simulations since the last answer.
+        dry: number of the surrogate's simulations since the last one that helped.
+    """
+
+    answers: int = 0
+    useless: int = 0
+    waited: int = 0
+    dry: int = 0
+
+    def answered(self, *, helped: bool) -> None:
+        """Note an answer of the LLM."""
+        self.answers += 1
+        self.useless = 0 if helped else self.useless + 1
+        self.waited = 0
+
+    def simulated(self, *, helped: bool) -> None:
+        """Note a simulation of the surrogate's."""
+        self.waited += 1
+        self.dry = 0 if helped else self.dry + 1
+
+    @property
+    def is_on_trial(self) -> bool:
+        """Whether the LLM need not have helped yet."""
+        return self.answers < _TRIAL
+
+    @property
+    def is_llm_next(self) -> bool:
+        """Whether the LLM has the next turn."""
+        patience = _GROWTH ** (self.useless - 1) if self.useless else 0
+        return (self.waited if self.is_on_trial else min(self.waited, self.dry)) >= patience
 
 
 class Hybrid:
@@ -105,19 +138,20 @@ class Hybrid:
         self.adviser = adviser
         self.settings = settings or Settings()
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
-        self._llm, self._numerical = Half(), Half()
-        self._best = np.inf
-        self._best_candidate: Candidate | None = None
-        self._since_best = self._told = 0
-        self._answer: _Answer | None = None
+        self.turns = Turns()
+        self._best: tuple[float, Candidate] | None = None
+        self._since_best = 0
+        self._points: list[Array] = []
+        # The LLM's candidate that is being simulated, the surrogate's, and what it would simulate next.
+        self._awaited: object = None
         self._own: set[object] = set()
+        self._next: Candidate | None = None
+        self._insisted: set[object] = set()
+        # What the LLM will be told: why the surrogate chose its samples, and what repeats a sample.
         self._reasons: list[str] = []
-        self._numeric: Candidate | None = None
+        self._repeats: list[str] = []
         self._unanswered: list[str] = []
         self._unrevised: list[str] = []
-        self._insisted: set[object] = set()
-        self._points: list[Array] = []
-        self._repeats: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the adviser, which has the chat, to a run."""
@@ -149,7 +183,7 @@ class Hybrid:
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return how many questions had no valid answer, or answers no revision, and why."""
-        questions = counted(self._llm.turns, "question")
+        questions = counted(self.turns.answers, "question")
         return tuple(
             f"{len(errors)} of {questions} {what}: {shorten(errors[-1], _LONGEST_REASON, placeholder=' ...')}"
             for errors, what in (
@@ -159,85 +193,62 @@ class Hybrid:
             if errors
         )
 
-    @property
-    def next(self) -> Who:
-        """Which half has the next turn."""
-        return next_turn(self._llm, self._numerical)
-
     def _note(self, evaluation: Evaluation) -> None:
-        self._told += 1
         self._points.append(self.surrogate.layout.point(evaluation.candidate))
         self._since_best += 1
         key, robustness = evaluation.candidate.key, evaluation.robustness
-        helped = helps(robustness, self._best)
-        if robustness is not None and robustness < self._best:
-            self._best, self._since_best = robustness, 0
-            self._best_candidate = evaluation.candidate
+        helped = False
+        if robustness is not None and (self._best is None or robustness < self._best[0]):
+            # Against the best just before it: the surrogate may have improved that while the answer waited.
+            helped = self._best is not None and helps(robustness, self._best[0])
+            self._best, self._since_best = (robustness, evaluation.candidate), 0
         if key in self._own:
             self._own.discard(key)
-            self._numerical = self._numerical.had_turn(helped=helped)
-            self._llm = self._llm.yielded()
-            self._reasons.append(f"Sample {self._told}: {evaluation.candidate.rationale}")
-            del self._reasons[: -self.settings.reasons]
-        if self._answer is not None and key in self._answer.asked:
-            # Against the best just before it: the surrogate may have improved that while the answer waited.
-            self._answer.asked.discard(key)
-            self._answer.helped |= helped
-            if not self._answer.asked and not self._answer.queue:
-                self._close(helped=self._answer.helped)
+            self.turns.simulated(helped=helped)
+            self._reasons.append(f"Sample {len(self._points)}: {evaluation.candidate.rationale}")
+            del self._reasons[:-_MOST_REASONS]
+        if key == self._awaited:
+            self._awaited = None
+            self.turns.answered(helped=helped)
 
     def _ask_one(self) -> Candidate:
-        if self._answer is None and self.next == "llm":
-            self._question()
-        answer = self._answer
-        if answer is not None and answer.queue and self._is_worth_it(answer):
-            candidate = answer.queue.pop(0)
-            answer.asked.add(candidate.key)
-            if self._numeric is not None and self._is_same(candidate, self._numeric):
-                self._numeric = None  # the LLM was told of it, and agrees
-            return candidate
-        candidate, self._numeric = self._numeric or self.surrogate.ask(1)[0], None
+        if self._awaited is None and self.turns.is_llm_next:
+            answer = self._answer()
+            if answer is not None:
+                self._awaited = answer.key
+                if self._next is not None and self._is_same(answer, self._next):
+                    self._next = None  # the LLM was told of it, and agrees
+                return answer
+            self.turns.answered(helped=False)
+        candidate, self._next = self._next or self.surrogate.ask(1)[0], None
         self._own.add(candidate.key)
         return replace(candidate, origin=self.name, rationale=f"surrogate: {candidate.rationale}")
 
-    def _question(self) -> None:
-        """Ask the LLM; what it brought is noted as soon as its candidates are simulated."""
-        is_first = self._llm.turns == 0
+    def _answer(self) -> Candidate | None:
+        """Ask the LLM; return its candidate that is worth a simulation, if any."""
+        is_first = self.turns.answers == 0
+        found: list[Candidate] = []
         try:
-            queue = self._opened() if is_first else self._advised()
-        except NoValidReplyError as error:
-            _LOG.warning("%s. Continuing with the surrogate.", error)
-            queue = []
-            self._unanswered.append(str(error))
+            found = self.adviser.propose(1).candidates if is_first else self._advised()
         except ChatError as error:
             # The search does not need advice to continue; the LLM is asked again much later.
-            if is_first:
+            if isinstance(error, NoValidReplyError):
+                _LOG.warning("%s. Continuing with the surrogate.", error)
+            elif is_first:
                 raise
-            queue = []
             self._unanswered.append(str(error))
         self._reasons.clear()
-        self._answer = _Answer(queue)
-        if not queue:
-            self._close(helped=False)
-
-    def _close(self, *, helped: bool) -> None:
-        self._answer = None
-        self._llm = self._llm.had_turn(helped=helped)
-        self._numerical = self._numerical.yielded()
-
-    def _opened(self) -> list[Candidate]:
-        return self.adviser.propose(self.settings.opening).candidates[: self.settings.opening]
+        return found[0] if found and (is_first or self._is_worth_simulating(found[0])) else None
 
     def _advised(self) -> list[Candidate]:
-        """Ask for several candidates; return those to simulate, the most promising one first."""
+        """Ask for several candidates; return them, the most promising one first."""
         settings = self.settings
         notes = [*self._standing(), *self._repeats, *self._reasons_told()]
         self._repeats.clear()
         advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
         candidates = advice.candidates
         predictions = self._trusted_predictions(candidates)
-        unheard = settings.what_if and not advice.foresaw
-        if unheard and predictions is not None and min(p.robustness for p in predictions) >= 0:
+        if not advice.foresaw and predictions and min(p.robustness for p in predictions) >= 0:
             heard = self._predictions_told(candidates, predictions)
             try:
                 revised = self.adviser.propose(
@@ -250,34 +261,30 @@ class Hybrid:
             predictions = self._trusted_predictions(candidates)
             self._insisted = {c.key for c in revised.kept}
         self.surrogate.suggest(candidates)
-        if predictions is None:
-            candidates = sorted(candidates, key=lambda c: self._repeated(c) is not None)
-        else:
+        if predictions:
             order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
             candidates = [_ranked(candidates[i], predictions[i].robustness) for i in order]
-        candidates.sort(key=lambda c: c.key not in self._insisted)
-        return candidates[: settings.tries]
+        else:
+            candidates = sorted(candidates, key=lambda c: self._repeated(c) is not None)
+        return sorted(candidates, key=lambda c: c.key not in self._insisted)
 
-    def _is_worth_it(self, answer: _Answer) -> bool:
-        """Whether the next candidate of an answer is simulated; drop it if not."""
-        if self._llm.turns == 0:
-            return True
-        candidate = answer.queue[0]
+    def _is_worth_simulating(self, candidate: Candidate) -> bool:
+        """Whether a candidate of a later answer is simulated; of one that repeats a sample, the LLM is told.
+
+        Predictions that have not been tested do not tell a right answer from a useless one.
+        """
         if candidate.key in self._insisted:
             return True
-        repeated = self._repeated(candidate)
-        if is_worth_simulating(
-            repeats=repeated is not None,
-            promising=self._is_promising(candidate),
-            trusted=self._is_trusted,
-            on_trial=self._llm.turns < TRIAL,
-        ):
+        repeated, is_promising = self._repeated(candidate), self._is_promising(candidate)
+        if repeated is None:
+            return is_promising or self.turns.is_on_trial or not self._is_trusted
+        if is_promising and self._is_trusted:
             return True
-        if repeated is not None:
-            self._repeats.append(self._repeat_told(candidate, repeated))
-        answer.queue.clear()
-        if not answer.asked:
-            self._close(helped=False)
+        self._repeats.append(
+            f"Your candidate ({self.adviser.briefing.describe(candidate)}) was not simulated: sample "
+            f"{repeated} differs from it by at most {100 * _SAME:.2g} % of each range at any time. Suggest "
+            "another structure; the optimiser tunes numbers."
+        )
         return False
 
     def _repeated(self, candidate: Candidate) -> int | None:
@@ -287,30 +294,36 @@ class Hybrid:
         point = self.surrogate.layout.point(candidate)
         distances = np.abs(np.array(self._points) - point).max(axis=1, initial=0.0)
         nearest = int(np.argmin(distances))
-        return nearest + 1 if distances[nearest] <= self.settings.same else None
+        return nearest + 1 if distances[nearest] <= _SAME else None
 
     def _is_same(self, one: Candidate, other: Candidate) -> bool:
         """Whether two candidates differ by no more than the digits in which the LLM was told one of them."""
         layout = self.surrogate.layout
         return one.key == other.key or is_seen(layout.point(one), layout.point(other)[None])
 
-    def _repeat_told(self, candidate: Candidate, sample: int) -> str:
-        return (
-            f"Your candidate ({self.adviser.describe(candidate)}) was not simulated: sample {sample} differs "
-            f"from it by at most {100 * self.settings.same:.2g} % of each range at any time. Suggest another "
-            "structure; the optimiser tunes numbers."
-        )
-
     def _is_promising(self, candidate: Candidate) -> bool:
         """Whether a candidate is predicted to improve on the best sample, or to be better than the rival."""
-        if self._best_candidate is None or len(self.surrogate.history.samples) < 2:
+        if self._best is None or len(self.surrogate.history.samples) < 2:
             return True
-        rivals = [] if self._numeric is None else [self._numeric]
+        robustness, sample = self._best
+        rivals = [] if self._next is None else [self._next]
         # Against the prediction of the best sample, not its robustness: early predictions are off as a whole.
-        new, best, *other = (
-            v.robustness for v in self.surrogate.foresee([candidate, self._best_candidate, *rivals])
-        )
-        return best - new >= self.settings.promising * abs(self._best) or any(new < r for r in other)
+        new, best, *other = (v.robustness for v in self.surrogate.foresee([candidate, sample, *rivals]))
+        return best - new >= self.settings.promising * abs(robustness) or any(new < r for r in other)
+
+    @property
+    def _is_trusted(self) -> bool:
+        """Whether recent predictions were good."""
+        return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
+
+    def _offer(self) -> WhatIf | None:
+        """Return the permission to request predictions; None if they are disabled or not trusted."""
+        calls = self.settings.what_if_calls
+        return WhatIf(self.surrogate, calls) if calls and self._is_trusted else None
+
+    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[Verdict]:
+        """Return the predicted verdicts on candidates; none if recent predictions were poor."""
+        return self.surrogate.foresee(candidates) if self._is_trusted else []
 
     def _standing(self) -> list[str]:
         """Return how the search stands, in the words that the LLM is told."""
@@ -329,17 +342,17 @@ class Hybrid:
 
     def _reasons_told(self) -> list[str]:
         """Return why the surrogate chose its samples and what it would do next, in words for the LLM."""
-        adviser = self.adviser
-        reasons = [told for reason in self._reasons if (told := adviser.told(reason))]
+        briefing = self.adviser.briefing
+        reasons = [told for reason in self._reasons if (told := briefing.reason(reason))]
         lines = []
         if reasons:
             lines.append(f"Why the numerical optimiser that shares this search chose: {'; '.join(reasons)}.")
-        self._numeric = self._numeric or self.surrogate.ask(1)[0]
-        why = adviser.told(self._numeric.rationale)
+        self._next = self._next or self.surrogate.ask(1)[0]
+        why = briefing.reason(self._next.rationale)
         because = f" ({why})" if why else ""
         lines.append(
             "The optimiser would simulate this next, if you propose nothing better: "
-            f"{adviser.describe(self._numeric)}{because}."
+            f"{briefing.describe(self._next)}{because}."
         )
         if any(_SCALED in line for line in lines):
             lines.append(
@@ -351,37 +364,20 @@ class Hybrid:
                 *lines,
                 "Its recent predictions were poor, or there are none yet; rely on the samples only.",
             ]
-        for verdict in self.surrogate.foresee([self._numeric]):
+        for verdict in self.surrogate.foresee([self._next]):
             lines.append(
-                f"The model that it fits to the samples expects of this: {adviser.foretold(verdict)}; "
+                f"The model that it fits to the samples expects of this: {briefing.foretold(verdict)}; "
                 f"its recent predictions erred by {100 * self.surrogate.recent_error:.2g} % of the signals' "
                 "usual spread."
             )
         return lines
 
-    @property
-    def _is_trusted(self) -> bool:
-        """Whether recent predictions were good."""
-        return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
-
-    def _offer(self) -> WhatIf | None:
-        """Return the permission to request predictions; None if they are disabled or not trusted."""
-        settings = self.settings
-        if not (settings.what_if and settings.what_if_calls and self._is_trusted):
-            return None
-        return WhatIf(self.surrogate, settings.what_if_calls)
-
-    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[Verdict] | None:
-        """Return the predicted verdicts on candidates; None if recent predictions were poor."""
-        if not self._is_trusted:
-            return None
-        return self.surrogate.foresee(candidates) or None
-
     def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[Verdict]) -> list[str]:
         """Return the predictions of the LLM's candidates, one line each, in words for the LLM."""
+        briefing = self.adviser.briefing
         lines = [
-            f"Your candidate {i} ({self.adviser.describe(c)}) was not simulated; the optimiser's model of "
-            f"the samples says: {self.adviser.foretold(p)}."
+            f"Your candidate {i} ({briefing.describe(c)}) was not simulated; the optimiser's model of "
+            f"the samples says: {briefing.foretold(p)}."
             for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
         ]
         return [
@@ -389,6 +385,11 @@ class Hybrid:
             "None is predicted to violate the requirement: revise them, or insist on some as they are by "
             'adding their numbers to your reply, such as "keep": [1], and say why.',
         ]
+
+
+def helps(robustness: float, best: float) -> bool:
+    """Whether a robustness is below the best one so far by a notable share of that."""
+    return best - robustness >= _NOTABLE * abs(best)
 
 
 def _ranked(candidate: Candidate, prediction: float) -> Candidate:

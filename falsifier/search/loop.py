@@ -9,8 +9,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from falsifier.engines.known_first import KNOWN
-from falsifier.engines.protocol import AsksLLM, Engine, FollowsRun, HasRemarks
-from falsifier.engines.stand_ins import RANDOM_CHANGE
+from falsifier.engines.protocol import RANDOM_CHANGE, AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge

@@ -83,7 +83,7 @@ def told_problems(
     if llm is None:
         engine = ENGINES.get(request.engine or DEFAULT_ENGINE)
         return [with_crossings(p) for p in known] if engine is not None and engine.uses_context else known
-    from falsifier.engines.told import told_context
+    from falsifier.engines.briefing import told_context
 
     return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
 
@@ -153,10 +153,10 @@ def price_of(llm: LLMSettings) -> "Price | None":
 
 
 def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: int, chat: Chat) -> Engine:
-    from falsifier.engines.llm import make_llm_engine
+    from falsifier.engines.llm import LLMEngine
 
     fallback = make_engine(llm.fallback, problem, seed=seed) if llm.fallback else None
-    led = make_llm_engine(
+    led = LLMEngine(
         problem,
         chat,
         variant=llm.variant,

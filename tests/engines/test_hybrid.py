@@ -11,8 +11,9 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.engines import make_engine
-from falsifier.engines.hybrid import Hybrid, Settings
-from falsifier.engines.llm import Advice, LLMEngine, make_llm_engine
+from falsifier.engines.briefing import Briefing
+from falsifier.engines.hybrid import Hybrid, Settings, Turns, helps
+from falsifier.engines.llm import Advice, LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
@@ -25,7 +26,6 @@ from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
-from falsifier.stl import Verdict
 from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem, simulated
 from tests.engines.support import HASTY, wide_problem
 
@@ -42,6 +42,9 @@ class Script(LLMEngine):
     name: str = "scripted"
     notes: list[Sequence[str]] = field(default_factory=list)
     heard: list[Evaluation] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.briefing = Briefing(self.problem)
 
     def propose(
         self,
@@ -61,15 +64,6 @@ class Script(LLMEngine):
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         self.on_exchange = on_exchange
 
-    def describe(self, candidate: Candidate) -> str:
-        return str(candidate.key)
-
-    def told(self, reason: str) -> str:
-        return reason
-
-    def foretold(self, verdict: Verdict) -> str:
-        return f"predicted robustness {verdict.robustness:.4g}"
-
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         self.heard += evaluations
 
@@ -78,6 +72,30 @@ class Script(LLMEngine):
         parameters = {p.name: 0.0 for p in self.problem.space.parameters}
         candidate = Candidate(signals, parameters, self.name, f"{level:g} throughout")
         return self.problem.space.admit(candidate)
+
+
+def turns_taken(count: int, *, llm: str = "", surrogate: str = "") -> str:
+    """Who has each turn, L or S; the strings say which turns of a half help: ``+``, otherwise ``-``."""
+    turns, course = Turns(), ""
+    for _ in range(count):
+        who, outcomes = ("L", llm) if turns.is_llm_next else ("S", surrogate)
+        had = course.count(who)
+        note = turns.answered if who == "L" else turns.simulated
+        note(helped=outcomes[had : had + 1] == "+")
+        course += who
+    return course
+
+
+def test_turns_follow_what_each_half_brings() -> None:
+    assert turns_taken(26) == "LSL" + 4 * "S" + "L" + 16 * "S" + "L" + "S", "ever more rarely"
+    assert turns_taken(8, llm="-+++-") == "LSLLLLSL", "as long as its answers help"
+    assert turns_taken(13, surrogate="-+---+----") == "LSL" + 9 * "S" + "L"
+    assert turns_taken(3, surrogate="+++") == "LSL", "the trial does not depend on what the surrogate brings"
+
+
+def test_a_best_that_is_only_a_little_lower_does_not_count() -> None:
+    assert helps(0.89, 1.0) and not helps(0.95, 1.0)
+    assert helps(-1.2, -1.0) and not helps(-1.05, -1.0)
 
 
 def hybrid(problem: Problem, answers: list[list[float] | Exception], seed: int = 0) -> tuple[Hybrid, Script]:
@@ -177,7 +195,7 @@ def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told(
     engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
     judge = simulated(problem, lambda x: float(9 - x.max()))
     asked = drive(engine, judge, rounds=3)
-    assert engine.next == "surrogate", "an answer that was not simulated has not helped"
+    assert not engine.turns.is_llm_next, "an answer that was not simulated has not helped"
     asked += drive(engine, judge, rounds=37)
     assert course(asked) == "L" + 39 * "S"
     told = [
@@ -201,7 +219,7 @@ def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> No
 
     class Agrees(Script):
         def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> Advice:
-            told = engine._numeric
+            told = engine._next
             if told is None:
                 return super().propose(count, notes)
             signals = {
@@ -275,7 +293,7 @@ def test_a_scripted_chat_leads_through_the_real_prompts() -> None:
         return json.dumps({"candidates": [{"rationale": "a guess", "signals": s} for s in signals]})
 
     chat = ScriptedChat([answer(0.1, 0.2), answer(0.3, 0.4, 0.5, 0.6, 0.7), answer(1.5)])
-    adviser = make_llm_engine(problem, chat)
+    adviser = LLMEngine(problem, chat)
     engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=SETTINGS)
     asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=10)
     assert [c.origin for c in asked[:2]] == [adviser.name, "hybrid"]
@@ -370,7 +388,7 @@ class TestResume:
             text = json.dumps({"candidates": [{"rationale": "", "signals": signals}]})
             return ChatReply(text=text, seconds=0.02, usage=Usage(cost=0.0))
 
-        adviser = make_llm_engine(problem, ScriptedChat(script))
+        adviser = LLMEngine(problem, ScriptedChat(script))
         engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=SETTINGS)
         if holds_run(directory):
             return resume(directory, problems=[problem], engine=engine, budget=simulations)[0]

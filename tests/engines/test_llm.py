@@ -6,12 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.core.space import Freedom
 from falsifier.engines import make_engine
-from falsifier.engines.llm import make_llm_engine
-from falsifier.engines.preview import preview
+from falsifier.engines.briefing import preview
+from falsifier.engines.llm import LLMEngine, random_change
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
@@ -30,7 +31,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Event, Exchanged
 from falsifier.search.result import Result
-from falsifier.testing import EngineContract, lag_problem
+from falsifier.testing import START, EngineContract, lag_problem
 from tests.llm.server import Step, serving
 
 
@@ -56,7 +57,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     with serving(*(Step(a) for a in answers)) as server:
         chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
         events: list[Event] = []
-        engine = make_llm_engine(problem, chat, variant="MP4")
+        engine = LLMEngine(problem, chat, variant="MP4")
         result = falsify(problem, engine, budget=5, listeners=[events.append])
     assert result.status == "falsified"
     assert [e.robustness for e in result.evaluations] == pytest.approx([0.419, -0.213], abs=1e-3)
@@ -80,7 +81,7 @@ def test_replies_as_points(variant: str) -> None:
     problem = lag_problem(free=Freedom(100, 0.1))
     asked = "<point>0, 0, 9, -9</point>", "So: <point>0, 0, 0.25, 1</point>", "<point>1, 1, 1, 1</point>"
     chat = ScriptedChat(list(asked))
-    engine = make_llm_engine(problem, chat, variant=variant, reply="points")
+    engine = LLMEngine(problem, chat, variant=variant, reply="points")
     engine.tell([evaluate(problem, *engine.ask())])
     (second,) = engine.ask()
     assert second.signals["u"].values == (1, 1, 1, 1)
@@ -113,7 +114,7 @@ def test_the_road_to_a_valid_reply() -> None:
     exchanges: list[Exchange] = []
     with serving(*script) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
-        engine = make_llm_engine(problem, chat, variant="MP4", on_exchange=exchanges.append)
+        engine = LLMEngine(problem, chat, variant="MP4", on_exchange=exchanges.append)
         engine.tell([evaluate(problem, *engine.ask())])
         (instead,) = engine.ask()
         assert (instead.origin, instead.rationale) == (
@@ -131,9 +132,22 @@ def test_the_road_to_a_valid_reply() -> None:
     assert exchanges[1].reply is not None and exchanges[1].reply.attempts == 3
 
 
+def test_a_random_change_is_small_repeatable_and_within_the_ranges() -> None:
+    space = lag_problem(parameters=[START]).space
+    best = space.decode([1.0, -1.0, 0.0, 0.5, 0.25])
+    changes = []
+    for seed in range(30):
+        found = random_change(space, best, seed=(seed,))
+        assert found == random_change(space, best, seed=(seed,))
+        assert np.all(np.abs(space.encode(found)) <= 1)
+        changes.append((space.encode(found) != space.encode(best)).sum())
+    assert min(changes) == 1 and max(changes) < 5
+    assert len({random_change(space, None, seed=(seed,)).key for seed in range(5)}) == 5
+
+
 def test_an_llm_that_never_answers_validly_is_given_up() -> None:
     problem = lag_problem()
-    engine = make_llm_engine(problem, ScriptedChat(lambda _: "nothing"))
+    engine = LLMEngine(problem, ScriptedChat(lambda _: "nothing"))
     changed = [*engine.ask(), *engine.ask()]
     assert len({c.key for c in changed}) == 2
     assert changed[0].rationale.startswith("a random sample")
@@ -146,7 +160,7 @@ def test_a_violation_that_does_not_count_is_told_with_the_reason() -> None:
     for anonymous in (False, True):
         name = '"u1"' if anonymous else '"u"'
         chat = ScriptedChat([reply(v).replace('"u"', name) for v in ([1, 1, 1, 1], [0, 1, 1, 1])])
-        engine = make_llm_engine(problem, chat, anonymous=anonymous)
+        engine = LLMEngine(problem, chat, anonymous=anonymous)
         engine.begin(20)
         (found,) = engine.ask()
         evaluation = evaluate(problem, found)
@@ -179,7 +193,7 @@ def test_several_candidates_at_a_time() -> None:
         }
     )
     chat = ScriptedChat([both, reply([0.3] * 4)])
-    engine = make_llm_engine(problem, chat, variant="MP4")
+    engine = LLMEngine(problem, chat, variant="MP4")
     candidates = engine.ask(3)
     assert [c.signals["u"].values[0] for c in candidates] == [0.1, 0.2, 0.3]
     assert "Proposed and not simulated" in chat.requests[1].messages[-1].content
@@ -197,7 +211,7 @@ def test_neutral_names_go_out_and_real_ones_come_back() -> None:
     problem = lag_problem()
     hidden = json.dumps({"rationale": "raise u1", "signals": [{"name": "u1", "values": [1] * 4}]})
     chat = ScriptedChat([hidden])
-    engine = make_llm_engine(problem, chat, variant="MP5", anonymous=True)
+    engine = LLMEngine(problem, chat, variant="MP5", anonymous=True)
     (candidate,) = engine.ask()
     assert candidate.signals["u"].values == (1, 1, 1, 1)
     assert candidate.rationale == "raise u"
@@ -212,7 +226,7 @@ def test_hands_over_for_good_when_allowed() -> None:
     fallback = make_engine("corners", problem, seed=0)
     exchanges: list[Exchange] = []
     chat = ScriptedChat([reply([0.1] * 4), ChatError("out of reach"), "never asked"])
-    engine = make_llm_engine(problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append)
+    engine = LLMEngine(problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append)
     asked = []
     for _ in range(4):
         asked += engine.ask()
@@ -222,7 +236,7 @@ def test_hands_over_for_good_when_allowed() -> None:
     assert engine.remarks(simulated) == ("3 of 4 samples from the engine 'corners', because out of reach",)
     assert [e.reply is None for e in exchanges] == [False, True]
     assert exchanges[1].problem == "out of reach"
-    again = make_llm_engine(
+    again = LLMEngine(
         problem,
         RecordedChat(exchanges, ScriptedChat(["never asked"])),
         variant="MP4",
@@ -288,7 +302,7 @@ def test_killed_and_resumed_without_asking_twice(tmp_path: Path, last: int) -> N
 
 def recorded_run(problem: Problem, chat: Chat, directory: Path) -> Result:
     """Run, or resume where the directory holds a run already."""
-    engine = make_llm_engine(problem, chat, variant="MP5")
+    engine = LLMEngine(problem, chat, variant="MP5")
     if holds_run(directory):
         return resume(directory, problems=[problem], engine=engine)[0]
     return falsify(problem, engine, budget=20, directory=directory)
@@ -312,7 +326,7 @@ def test_a_cache_answers_the_same_question_of_another_run(tmp_path: Path) -> Non
     problem = lag_problem()
 
     def first_candidate(chat: Chat, sample: int) -> Any:
-        return make_llm_engine(problem, chat, variant="MP4", sample=sample).ask()[0].key
+        return LLMEngine(problem, chat, variant="MP4", sample=sample).ask()[0].key
 
     with serving(Step("bad"), Step(reply([0.1] * 4)), Step("bad"), Step(reply([0.2] * 4))) as server:
         chat = connect("openai/m", api_base=server.url, cache=tmp_path)
@@ -329,7 +343,7 @@ def test_runs_share_one_client() -> None:
         found: list[Evaluation] = []
 
         def run() -> None:
-            engine = make_llm_engine(problem, chat, variant="MP4")
+            engine = LLMEngine(problem, chat, variant="MP4")
             for _ in range(3):
                 found.append(evaluate(problem, *engine.ask()))
                 engine.tell(found[-1:])
@@ -350,9 +364,7 @@ def test_money_limit_with_unknown_price_is_an_error() -> None:
     with serving(Step(reply([0.1] * 4)), Step(reply([0.2] * 4))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url)
         with pytest.raises(SpecError, match="price of this language model is unknown"):
-            falsify(
-                problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(simulations=5, cost=1.0)
-            )
+            falsify(problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(simulations=5, cost=1.0))
 
 
 def test_token_budget_ends_a_run() -> None:
@@ -360,7 +372,7 @@ def test_token_budget_ends_a_run() -> None:
     with serving(*(Step(reply([0.01 * i] * 4)) for i in range(9))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url)
         result = falsify(
-            problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(simulations=50, tokens=300)
+            problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(simulations=50, tokens=300)
         )
     assert result.status == "not falsified"
     assert "300 tokens" in result.reason
@@ -371,11 +383,11 @@ def test_free_parameterizations_come_from_mp5_only() -> None:
     problem = lag_problem(free=Freedom(100, 0.1))
     signal = {"name": "u", "interpolation": "constant", "times": [0, 2], "values": [0, 1]}
     text = json.dumps({"rationale": "", "signals": [signal]})
-    (candidate,) = make_llm_engine(problem, ScriptedChat([text]), variant="MP5").ask()
+    (candidate,) = LLMEngine(problem, ScriptedChat([text]), variant="MP5").ask()
     assert candidate.signals["u"].times == (0, 2)
     said: list[Exchange] = []
     chat = ScriptedChat([text] * 3)
-    make_llm_engine(problem, chat, variant="MP4", on_exchange=said.append).ask()
+    LLMEngine(problem, chat, variant="MP4", on_exchange=said.append).ask()
     assert all("expected 4 evenly spaced" in (e.problem or "") for e in said) and len(said) == 3
 
 
@@ -411,7 +423,7 @@ class TestContract(EngineContract):
     """It keeps what every engine keeps, with a scripted model."""
 
     def make(self, problem: Problem, seed: int) -> Engine:
-        return make_llm_engine(problem, ScriptedChat(counting_script(seed)))
+        return LLMEngine(problem, ScriptedChat(counting_script(seed)))
 
 
 def test_lessons_and_the_reason_are_told_back() -> None:
@@ -422,7 +434,7 @@ def test_lessons_and_the_reason_are_told_back() -> None:
         return json.dumps({"lessons": lessons, "rationale": f"try {level}", "signals": [signal]})
 
     chat = ScriptedChat([answer(0.1, "x follows u"), answer(0.2, ""), answer(0.3, "")])
-    engine = make_llm_engine(problem, chat)
+    engine = LLMEngine(problem, chat)
     for _ in range(3):
         engine.tell([evaluate(problem, *engine.ask())])
     first, second, third = (r.messages[1].content for r in chat.requests)
@@ -446,7 +458,7 @@ def test_an_llm_insists_by_number_or_by_repeating_a_candidate_that_was_predicted
         (candidates(0.5, keep=[1, 9]), [0]),
     ):
         chat = ScriptedChat([candidates(0.1, 0.2), insisting])
-        engine = make_llm_engine(problem, chat)
+        engine = LLMEngine(problem, chat)
         first = engine.propose(3).candidates
         advice = engine.propose(3, ["they are poor"], predicted=first)
         assert [c.key for c in advice.kept] == [first[k].key for k in kept]
@@ -455,7 +467,7 @@ def test_an_llm_insists_by_number_or_by_repeating_a_candidate_that_was_predicted
         assert "Proposed and not simulated" not in asked.messages[1].content
         assert asked.reply_schema is not None and "keep" in asked.reply_schema["properties"]
     chat = ScriptedChat([candidates(0.1, 0.2), candidates(0.1), candidates(0.3)])
-    engine = make_llm_engine(problem, chat)
+    engine = LLMEngine(problem, chat)
     engine.propose(3)
     engine.propose(3)
     assert len(chat.requests) == 3, "without predictions, a repetition is rejected"

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.engines.briefing import preview_tool
 from falsifier.engines.hybrid import Hybrid, Settings
-from falsifier.engines.llm import make_llm_engine
-from falsifier.engines.preview import preview_tool
+from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
@@ -63,7 +63,7 @@ def hybrid(
     settings: Settings = EAGER,
     on_exchange: OnExchange = lambda _: None,
 ) -> Hybrid:
-    adviser = make_llm_engine(wide_problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
+    adviser = LLMEngine(wide_problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
     return Hybrid(wide_problem(), seed=0, adviser=adviser, settings=settings, surrogate_settings=SETTINGS)
 
 
@@ -239,9 +239,9 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
 def test_candidates_are_described_as_the_model_knows_them() -> None:
     made = wide_problem().space.decode([0.5, 1.0, -1.0, 2.0])
     told = {
-        (variant, anonymous): make_llm_engine(
+        (variant, anonymous): LLMEngine(
             wide_problem(), ScriptedChat([]), variant=variant, anonymous=anonymous
-        ).describe(made)
+        ).briefing.describe(made)
         for variant in ("MP1", "MP5")
         for anonymous in (False, True)
     }

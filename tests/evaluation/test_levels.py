@@ -11,7 +11,7 @@ from falsifier import coverage, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.preview import preview
+from falsifier.engines.briefing import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.usage import count_tokens

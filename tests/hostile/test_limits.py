@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.llm import LLMEngine
 from falsifier.errors import SpecError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError, classify
@@ -82,7 +82,7 @@ def run(behaviour: Behaviour, **budget: Any) -> tuple[Result, int]:
     problem = lag_problem()
     with misbehaving(behaviour) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, price=Price(1000.0, 1000.0))
-        result = falsify(problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(**budget))
+        result = falsify(problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(**budget))
         return result, len(server.requests)
 
 

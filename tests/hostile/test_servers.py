@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
@@ -86,7 +86,7 @@ def test_a_request_ends_in_time_and_is_cut(behaviour: str) -> None:
 def run(url: str, **budget: Any) -> Result:
     problem = lag_problem()
     chat = connect("openai/m", api_base=url)
-    return falsify(problem, make_llm_engine(problem, chat, variant="MP4"), budget=Budget(**budget))
+    return falsify(problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(**budget))
 
 
 @pytest.mark.parametrize("behaviour", ENDLESS)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier import falsify, resume
-from falsifier.engines.preview import preview
+from falsifier.engines.briefing import preview
 from falsifier.errors import JournalError, SpecError
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_source

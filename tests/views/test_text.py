@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.engines import make_engine
-from falsifier.engines.llm import make_llm_engine
+from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError
 from falsifier.llm.replay import ScriptedChat
 from falsifier.record.run import falsify, resume
@@ -168,14 +168,14 @@ def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
 def test_samples_of_a_fallback_are_told_with_the_reason(tmp_path: Path) -> None:
     chat = ScriptedChat([ChatError("the server is gone")])
     fallback = make_engine("uniform", impossible(), seed=0)
-    engine = make_llm_engine(impossible(), chat, fallback=fallback)
+    engine = LLMEngine(impossible(), chat, fallback=fallback)
     result = falsify(impossible(), engine, budget=3, directory=tmp_path / "run")
     remark = "3 of 3 samples from the engine 'uniform', because the server is gone"
     assert f"  fallback       {remark}" in result_text(result).splitlines()
     assert remark in results_text([result])
     assert result_json(result)["remarks"] == [remark]
     # A resumed run counts what is recorded too.
-    again = make_llm_engine(impossible(), chat, fallback=make_engine("uniform", impossible(), seed=0))
+    again = LLMEngine(impossible(), chat, fallback=make_engine("uniform", impossible(), seed=0))
     (resumed,) = resume(tmp_path / "run", problems=[impossible()], engine=again, budget=5)
     assert resumed.remarks == (remark.replace("3 of 3", "5 of 5"),)
 

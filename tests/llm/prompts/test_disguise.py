@@ -13,8 +13,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.llm import make_llm_engine
-from falsifier.engines.preview import preview
+from falsifier.engines.briefing import preview
+from falsifier.engines.llm import LLMEngine
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate, start_values
 from falsifier.llm.messages import ChatRequest
@@ -42,7 +42,7 @@ def asked(name: str, variant: str, replies: Sequence[str]) -> tuple[str, Problem
     """What is sent in a run of two samples, the second after a rejected reply."""
     problem = load_problem(name)
     chat = ScriptedChat(list(replies))
-    engine = make_llm_engine(problem, chat, variant=variant, anonymous=True)
+    engine = LLMEngine(problem, chat, variant=variant, anonymous=True)
     done = []
     for _ in range(2):
         (candidate,) = engine.ask()
@@ -81,7 +81,7 @@ def test_no_name_is_told_that_the_variant_hides(name: str, variant: str, *, anon
     sent = []
     for bad in bad_replies(problem):
         chat = ScriptedChat([first, bad, bad, bad])
-        engine = make_llm_engine(problem, chat, variant=variant, anonymous=anonymous)
+        engine = LLMEngine(problem, chat, variant=variant, anonymous=anonymous)
         engine.tell([evaluate(problem, *engine.ask())])
         engine.ask()
         sent += chat.requests
@@ -236,7 +236,7 @@ def test_doubts_and_start_values_are_scaled() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9)", parameters=[START])
     violation = evaluate(problem, problem.space.decode([1, 1, 1, 1, 0]))
     chat = ScriptedChat(['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
-    engine = make_llm_engine(problem, chat, anonymous=True)
+    engine = LLMEngine(problem, chat, anonymous=True)
     engine.tell([violation])
     engine.doubt(
         Confirmation(
@@ -267,7 +267,7 @@ def test_every_form_of_formula_is_renamed() -> None:
 def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_back() -> None:
     problem = lag_problem(parameters=[START])
     chat = ScriptedChat(["nothing"] * 3 + ['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
-    engine = make_llm_engine(problem, chat, anonymous=True)
+    engine = LLMEngine(problem, chat, anonymous=True)
     (changed,) = engine.ask()
     engine.tell([evaluate(problem, changed)])
     engine.ask()

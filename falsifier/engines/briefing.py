@@ -1,0 +1,337 @@
+"""What a language model is told of a search, and the form of its answers; ``preview`` shows it unasked."""
+
+import re
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from falsifier.context.values import NOTHING
+from falsifier.core.candidate import Candidate
+from falsifier.core.words import in_one_line
+from falsifier.errors import SpecError
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation, start_values
+from falsifier.llm import CONTEXT_VARIANT, ReplyKind
+from falsifier.llm.messages import Message, Tool
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, Variant, View, variant_named
+from falsifier.llm.prompts.disguise import Disguise
+from falsifier.llm.prompts.published import as_point
+from falsifier.llm.replies import ReplyForm
+from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted, what_if_tool
+from falsifier.problem.context import with_context
+from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
+from falsifier.stl.margins import signed
+
+# Number of latest and best evaluations whose trajectories are kept in memory; prompts show few older samples.
+_KEPT_RECENT = 40
+_KEPT_BEST = 10
+_WORD = re.compile(r"[^\W\d]\w*")
+
+
+class Briefing:
+    """What a language model (LLM) knows of a search. It never gets the model.
+
+    Candidates and samples are kept as they are told: with neutral names and scales if it is anonymous.
+
+    For the arguments see ``LLMEngine``.
+
+    Attributes:
+        simulations: maximum number of simulations of the run, which prompts state; None: no limit.
+        lessons: what the LLM wrote down for its next question.
+        numbers: numbers of the samples, by the keys of their candidates.
+        best: candidate of the sample with the smallest robustness.
+        pending: candidates that were proposed and have no evaluation yet.
+        rationales: the LLM's reasons, by the keys of its candidates.
+
+    Raises:
+        SpecError: if the variant is unknown, or context cannot be read or is to be sent anonymously.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        *,
+        variant: str | None = None,
+        reply: ReplyKind = "json",
+        prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+        anonymous: bool = False,
+        llm: str = "",
+    ) -> None:
+        problem, self.variant = told_context(problem, variant, anonymous=anonymous)
+        view = View.of(problem)
+        if reply == "points":  # numbers in a list have the control points of the spec
+            view = replace(view, space=view.space.fixed)
+        self._view = view
+        self._disguise = Disguise.of(view) if anonymous else None
+        self._reply, self._tokens, self._llm = reply, prompt_tokens, llm
+        self._start = partial(start_values, problem)
+        self._questions: Questions | None = None
+        self._untold: list[Evaluation] = []
+        self._doubts: dict[Hashable, str] = {}
+        self._smallest = float("inf")
+        self.simulations: int | None = None
+        self.lessons = ""
+        self.numbers: dict[Hashable, int] = {}
+        self.best: Candidate | None = None
+        self.pending: list[Candidate] = []
+        self.rationales: dict[Hashable, str] = {}
+        self.told = 0
+
+    @property
+    def view(self) -> View:
+        """The problem as it is told."""
+        return self._disguise.view if self._disguise else self._view
+
+    def hidden(self, candidate: Candidate) -> Candidate:
+        """Return a candidate as it is told."""
+        return self._disguise.hidden_candidate(candidate) if self._disguise else candidate
+
+    def revealed(self, candidate: Candidate) -> Candidate:
+        """Return a candidate as it can be simulated, from how it is told."""
+        return self._disguise.revealed(candidate) if self._disguise else candidate
+
+    def canonical(self, candidate: Candidate) -> Candidate:
+        """Return a candidate as it will be told once it was simulated, from how it was proposed."""
+        return self._disguise.canonical(candidate) if self._disguise else candidate
+
+    def describe(self, candidate: Candidate) -> str:
+        """Return a candidate in one line; as a point if the prompt variant shows no names."""
+        told = self.hidden(candidate)
+        if not self.variant.has("names") or (self.variant.is_published and self._reply == "points"):
+            return "; ".join(as_point(self.view, told))
+        return in_one_line(told)
+
+    def reason(self, text: str) -> str:
+        """Return a reason as the LLM may read it; empty if it has a name that the variant does not show."""
+        if self.variant.has("names") and not self._disguise:
+            return text
+        hidden = self._disguise or Disguise.of(self._view)
+        words = set(_WORD.findall(text))
+        return "" if any(words.intersection(_WORD.findall(name)) for name in hidden.names) else text
+
+    def foretold(self, verdict: Verdict) -> str:
+        """Return a predicted verdict in words, limited to what the variant shows of samples."""
+        return predicted(self.variant, self._hidden_verdict(verdict))
+
+    def form(self, count: int, *, reasoned: bool = True, keepable: int = 0) -> ReplyForm:
+        """Return the form of replies with up to ``count`` candidates.
+
+        Args:
+            count: maximum number of candidates.
+            reasoned: whether the LLM says why, and what it learnt; predictions need neither.
+            keepable: number of earlier candidates on which it may insist.
+        """
+        return ReplyForm(
+            self.view.space,
+            named=self.variant.has("names") and self._reply == "json",
+            points=self._reply == "points",
+            free=self.variant.has("freedom"),
+            count=count,
+            reasoned=reasoned,
+            lessons=reasoned and self._reply == "json" and self.variant.has("lessons"),
+            keepable=keepable,
+        )
+
+    def tool(self, what_if: WhatIf) -> PredictionTool:
+        """Return the tool with which the LLM requests predictions."""
+        form = self.form(MOST_CANDIDATES, reasoned=False)
+        return PredictionTool(what_if, form, self.variant, reveal=self.revealed, hide=self._hidden_verdict)
+
+    def doubt(self, confirmation: Confirmation) -> None:
+        """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
+        verdict, disguise = confirmation.evaluation.verdict, self._disguise
+
+        def shown(robustness: float) -> float:
+            return disguise.hidden_robustness(verdict, robustness) if disguise and verdict else robustness
+
+        self._doubts[self.hidden(confirmation.candidate).key] = in_doubt(confirmation, shown)
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Add samples, whoever proposed their candidates."""
+        told = list(evaluations)
+        if self._disguise:
+            self._begin()  # first: values at time 0 determine scales before trajectories do
+            self._disguise = disguise = self._disguise.fitted(evaluations)
+            told = [disguise.hidden(e) for e in evaluations]
+        for evaluation in told:
+            self.told += 1
+            self.numbers[evaluation.candidate.key] = self.told
+            if evaluation.robustness is not None and evaluation.robustness < self._smallest:
+                self._smallest, self.best = evaluation.robustness, evaluation.candidate
+        self.pending = [c for c in self.pending if c.key not in self.numbers]
+        # What is told of a sample takes longer than some simulations; it is made when a question needs it.
+        self._untold = _thinned([*self._untold, *told])
+
+    def question(
+        self, count: int, notes: Sequence[str] = (), *, foreseen: Sequence[Hashable] = ()
+    ) -> tuple[Message, ...]:
+        """Return the messages of the next question.
+
+        Args:
+            count: maximum number of candidates.
+            notes: lines to add to the question, after problem and history.
+            foreseen: keys of pending candidates of which the notes say what is known.
+        """
+        questions = self._caught_up()
+        return questions.ask(
+            count,
+            simulations=self.simulations,
+            pending=[c for c in self.pending if c.key not in foreseen],
+            notes=notes,
+            lessons=self.lessons,
+        )
+
+    def _caught_up(self) -> Questions:
+        """Return the questions, with all samples so far."""
+        questions = self._begin()
+        questions.view = self.view
+        for evaluation in self._untold:
+            key = evaluation.candidate.key
+            questions.tell(evaluation, doubt=self._doubts.get(key, ""), why=self.rationales.get(key, ""))
+        self._untold.clear()
+        return questions
+
+    def _begin(self) -> Questions:
+        """Return the questions; made once, because the outputs at time 0 are simulated for them."""
+        if self._questions is None:
+            start = self._start() if self._disguise or self.variant.has("circumstances") else {}
+            if self._disguise:
+                self._disguise = Disguise.of(self._view, start)
+                start = self._disguise.hidden_values(start)
+            self._questions = Questions(
+                self.view, self.variant, reply=self._reply, start=start, tokens=self._tokens, llm=self._llm
+            )
+        return self._questions
+
+    def _hidden_verdict(self, verdict: Verdict) -> Verdict:
+        return self._disguise.hidden_verdict(verdict) if self._disguise else verdict
+
+
+def told_context(
+    problem: Problem, variant: str | None, *, anonymous: bool = False
+) -> tuple[Problem, Variant]:
+    """Return the problem with the context that is told, if any, and the prompt variant.
+
+    Files are read only here, and only if the variant tells them.
+
+    Raises:
+        SpecError: if the variant is unknown, context cannot be read, would be sent anonymously, or was asked
+            for although the variant does not tell it.
+    """
+    named = problem.named_context
+    told = variant_named(variant, has_context=bool(named))
+    if not named:
+        return problem, told
+    if not told.has("context"):
+        if problem.source is not None and set(problem.source.context) - {NOTHING}:
+            raise SpecError(
+                f"--context: the prompt variant {told.name} does not tell it; use {CONTEXT_VARIANT}, or drop "
+                "--variant"
+            )
+        return problem, told
+    if anonymous:
+        raise SpecError(
+            "--anonymous hides what the system is, and context would tell it: drop --anonymous, or leave the "
+            f"files out with --context {NOTHING}"
+        )
+    return with_context(problem), told
+
+
+def preview(
+    problem: Problem,
+    *,
+    variant: str | None = None,
+    evaluations: Sequence[Evaluation] = (),
+    count: int = 1,
+    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
+    anonymous: bool = False,
+    reply: ReplyKind = "json",
+    simulations: int | None = None,
+    doubtful: Sequence[Confirmation] = (),
+    lessons: str = "",
+) -> tuple[Message, ...]:
+    """Return the messages that would be sent next, without sending them.
+
+    Args:
+        problem: the problem to search.
+        variant: name of the prompt variant; None: the default one.
+        evaluations: what was simulated so far, in order.
+        count: number of candidates to ask for.
+        prompt_tokens: maximum number of tokens of a prompt.
+        anonymous: whether the LLM gets neutral names instead of real ones.
+        reply: what a reply is to consist of.
+        simulations: maximum number of simulations of the run; None: no limit.
+        doubtful: violations among the evaluations that do not count.
+        lessons: what the LLM wrote down in its last reply.
+    """
+    briefing = Briefing(
+        problem, variant=variant, reply=reply, prompt_tokens=prompt_tokens, anonymous=anonymous
+    )
+    briefing.simulations, briefing.lessons = simulations, lessons
+    doubts = {c.candidate.key: c for c in doubtful}
+    for evaluation in evaluations:
+        candidate = evaluation.candidate
+        if candidate.key in doubts:
+            briefing.doubt(doubts[candidate.key])
+        # A reason with neutral names is not recorded.
+        if candidate.origin.endswith(f" {briefing.variant.name}") and not anonymous:
+            briefing.rationales[candidate.key] = candidate.rationale
+        briefing.tell([evaluation])
+        briefing._caught_up()
+    return briefing.question(count)
+
+
+def preview_tool(
+    problem: Problem,
+    *,
+    calls: int,
+    variant: str | None = None,
+    anonymous: bool = False,
+    reply: ReplyKind = "json",
+) -> Tool:
+    """Return the tool that a question with permission to request predictions would offer; sends nothing."""
+    form = Briefing(problem, variant=variant, reply=reply, anonymous=anonymous).form(
+        MOST_CANDIDATES, reasoned=False
+    )
+    return what_if_tool(form.schema(), calls=calls)
+
+
+def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float) -> str:
+    """Why a violation does not count, without any name, and what would count.
+
+    Args:
+        confirmation: how the violation was repeated.
+        shown: turns a robustness into the number that is told.
+    """
+    found, robustness = confirmation.evaluation.robustness, confirmation.robustness
+    halved, reference = confirmation.halved, confirmation.reference
+    again: float | None = None
+    if robustness is None:
+        why = "a second simulation of it failed"
+    elif robustness >= 0:
+        again, why = robustness, f"a second simulation gave robustness {signed(shown(robustness), 3)}"
+    elif halved is not None and halved >= 0:
+        again, why = halved, f"at half the simulation step its robustness is {signed(shown(halved), 3)}"
+    else:
+        why = "a second monitor does not confirm it"
+        if reference is not None:
+            why += f", {signed(shown(reference), 3)} instead of {signed(shown(robustness), 3)}"
+    text = f"this does not count as a violation, it is {confirmation.outcome}: {why}"
+    if again is None:
+        return text
+    assert found is not None, "a violation has a robustness"
+    error = f"{shown(again) - shown(found):.2g}"
+    return f"{text}. Find one that is clearer: below 0 by more than {error}, the error of the simulation"
+
+
+def _thinned(evaluations: list[Evaluation]) -> list[Evaluation]:
+    """Return the same evaluations without the trajectories that no prompt will show."""
+    if len(evaluations) <= _KEPT_RECENT:
+        return evaluations
+    judged = sorted((e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None)
+    kept = {i for _, i in judged[:_KEPT_BEST]} | set(range(len(evaluations) - _KEPT_RECENT, len(evaluations)))
+    return [
+        e if i in kept or e.trajectory is None else replace(e, trajectory=None)
+        for i, e in enumerate(evaluations)
+    ]
