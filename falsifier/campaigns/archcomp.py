@@ -13,12 +13,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.campaigns.analysis import Run, load
 from falsifier.campaigns.published import PROTOCOL_SIMULATIONS, bundled_target
+from falsifier.campaigns.runs import Run, load
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
@@ -29,6 +30,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import read_journal, recorded_candidates
 
+_T = TypeVar("_T")
 Matrix = NDArray[np.float64]
 Finder = Callable[[str, str, float | None], Problem]
 
@@ -71,6 +73,7 @@ _TOLERANCES = (
 # An input with at least this step in s is piecewise constant; all others are exported with the dense step.
 _COARSE = 1.0
 _DENSE_STEP = 0.05
+_LONGEST_SHOWN = 60
 # Share of a range by which a value may lie outside it because of rounding when it was printed.
 _ROUNDING = 1e-6
 
@@ -219,39 +222,41 @@ def _matrix_text(matrix: Matrix) -> str:
     return f"[{'; '.join(' '.join(f'{v:.12g}' for v in row) for row in matrix)}]"
 
 
-def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
-    def cell(name: str) -> str:
-        return (cells.get(name) or "").strip()
-
-    def number_in(name: str) -> float:
-        try:
-            return float(cell(name))
-        except ValueError:
-            raise ValueError(f"column {name}: expected a number, got {cell(name)!r}") from None
-
-    def matrix_in(name: str) -> Matrix:
-        try:
-            return _matrix(cell(name))
-        except ValueError as error:
-            raise ValueError(f"column {name}: expected a matrix such as [0 50; 10 20]: {error}") from None
-
+def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
+    stated = {name: text.strip() for name, text in cells.items() if text and text.strip()}
+    instance = stated.get("instance", "1")
     try:
-        instance = cell("instance") or "1"
         if instance not in _PROFILES:
             raise ValueError(f"instance {instance!r}: expected 1 or 2")
         return Row(
             number,
-            _our_name(cell("property")),
+            _our_name(stated.get("property", "")),
             instance,
-            matrix_in("input"),
-            tuple(matrix_in("parameters").ravel().tolist()),
-            cell("falsified").lower() in ("yes", "true", "1"),
-            int(number_in("simulations")),
-            number_in("robustness") if cell("robustness") else None,
-            number_in("stop time") if cell("stop time") else None,
+            _cell(stated, "input", _matrix, "a matrix such as [0 50; 10 20]"),
+            tuple(_cell(stated, "parameters", _matrix, "a vector such as [1 2]").ravel().tolist()),
+            stated.get("falsified", "").lower() in ("yes", "true", "1"),
+            _cell(stated, "simulations", _count, "a number of simulations"),
+            _cell(stated, "robustness", float, "a number") if "robustness" in stated else None,
+            _cell(stated, "stop time", float, "a number") if "stop time" in stated else None,
         )
     except ValueError as error:
         raise SpecError(f"row {number}: {error}", file=str(path)) from None
+
+
+def _cell(stated: Mapping[str, str], name: str, read: Callable[[str], _T], expected: str) -> _T:
+    text = stated.get(name, "")
+    try:
+        return read(text)
+    except ValueError:
+        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+        raise ValueError(f"column {name}: expected {expected}, got {shown!r}") from None
+
+
+def _count(text: str) -> int:
+    number = float(text)
+    if number < 0 or not number.is_integer():  # inf and nan are no integers
+        raise ValueError(text)
+    return int(number)
 
 
 def _our_name(property_: str) -> str:
@@ -271,31 +276,25 @@ def _matrix(text: str) -> Matrix:
 
 
 def _checked(row: Row, budget: int, find: Finder) -> Revalidated:
+    def result(reason: str, robustness: float | None = None, *, holds: bool = False) -> Revalidated:
+        return Revalidated(row, holds, robustness, reason)
+
     if row.simulations > budget:
-        return Revalidated(
-            row,
-            holds=False,
-            robustness=None,
-            reason=f"used {row.simulations} simulations, more than the limit of {budget}",
-        )
+        return result(f"used {row.simulations} simulations, more than the limit of {budget}")
     try:
         problem = find(row.requirement, row.instance, row.stop_time)
         candidate = _candidate(row, problem)
     except (FalsifierError, ValueError) as error:
-        return Revalidated(row, holds=False, robustness=None, reason=str(error))
+        return result(str(error))
     evaluation = evaluate(problem, candidate)
-    robustness = evaluation.robustness
+    robustness, allowed = evaluation.robustness, tolerance(row.requirement)
     if robustness is None:
-        return Revalidated(
-            row, holds=False, robustness=None, reason=f"simulation failed: {evaluation.reason}"
-        )
+        return result(f"simulation failed: {evaluation.reason}")
     if robustness < 0:
-        return Revalidated(row, holds=True, robustness=robustness, reason="reproduced")
-    allowed = tolerance(row.requirement)
+        return result("reproduced", robustness, holds=True)
     if robustness < allowed:
-        reason = f"accepted, within the tolerance of {allowed:g}"
-        return Revalidated(row, holds=True, robustness=robustness, reason=reason)
-    return Revalidated(row, holds=False, robustness=robustness, reason="not reproduced")
+        return result(f"accepted, within the tolerance of {allowed:g}", robustness, holds=True)
+    return result("not reproduced", robustness)
 
 
 def _candidate(row: Row, problem: Problem) -> Candidate:

@@ -1,14 +1,19 @@
-"""What a campaign runs, as values: methods, requests and run names."""
+"""What a campaign runs and what that may cost: methods, requests, run names."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from math import inf
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
+from falsifier.llm.conversation import MAX_REASKS
+from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget
@@ -187,3 +192,61 @@ def _llm_settings(method: Method, asking: LLMSettings | None) -> LLMSettings | N
         "fallback": method.fallback or None,
     }
     return LLMSettings.model_validate((asking.model_dump() if asking else {}) | decided)
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """What is asked of language models if nothing is found early.
+
+    Attributes:
+        questions: number of questions if each simulation takes one, and each of these is asked again as often
+            as after replies that are not valid; calls of tools come on top.
+        cost: US dollars for sending these with prompts at their longest; None if a price is unknown.
+        limit: US dollars to which the campaign's own limits hold the cost of everything; inf without any.
+    """
+
+    questions: int
+    cost: float | None
+    limit: float
+
+    @property
+    def text(self) -> str:
+        """The estimate in a sentence."""
+        asked = f"up to {counted(self.questions, 'question')} to language models"
+        if self.limit < inf:
+            return f"{asked}; the cost is limited to {self.limit:.4g} US dollars"
+        if self.cost is None:
+            return (
+                f"{asked}; the price is unknown (--llm-option price=SENT:RECEIVED), so the cost is too: "
+                "--total tokens=N limits it"
+            )
+        if not self.cost:
+            return f"{asked}, free of charge"
+        return (
+            f"{asked}, which cost about {self.cost:.4g} US dollars to send with the longest prompts; replies "
+            "cost extra, and --total cost=N limits all of it"
+        )
+
+
+def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:
+    """Estimate what a campaign asks; None if it asks no language model.
+
+    Runs without a limit on simulations are not counted.
+
+    Args:
+        request: the campaign.
+        price_of: returns the price of a language model, None if it is unknown.
+    """
+    asking = [(run.llm, run.budget) for run in request.runs if run.llm is not None]
+    if not asking:
+        return None
+    prices = {key: price_of(llm) for key, llm in {repr(llm): llm for llm, _ in asking}.items()}
+    total = request.limits.cost if request.limits is not None else None
+    questions, cost, limit = 0, 0.0, 0.0
+    for llm, budget in asking:
+        own = (budget.simulations or 0) * (1 + MAX_REASKS)
+        price = prices[repr(llm)]
+        questions += own
+        cost += inf if price is None else price.cost(own * DEFAULT_PROMPT_TOKENS, 0)
+        limit += inf if budget.cost is None else budget.cost
+    return Ceiling(questions, None if cost == inf else cost, min(limit, inf if total is None else total))

@@ -24,12 +24,11 @@ from falsifier.campaigns import (
 )
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
-from falsifier.campaigns.analysis.tables import TABLES, statistics_json
-from falsifier.campaigns.ceiling import ceiling
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
-from falsifier.campaigns.request import as_searched
+from falsifier.campaigns.request import as_searched, ceiling
 from falsifier.campaigns.runner import check_request
+from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     asking,

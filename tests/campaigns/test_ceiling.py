@@ -2,8 +2,7 @@ from math import inf
 
 import pytest
 
-from falsifier.campaigns.ceiling import Ceiling, ceiling
-from falsifier.campaigns.request import CampaignRequest, Method, cross
+from falsifier.campaigns.request import CampaignRequest, Ceiling, Method, ceiling, cross
 from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource

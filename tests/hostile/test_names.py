@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from falsifier.campaigns.analysis import load, read_published
-from falsifier.campaigns.analysis.tables import TABLES
 from falsifier.campaigns.archcomp import export as arch_comp
 from falsifier.campaigns.request import run_name
+from falsifier.campaigns.tables import TABLES
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.literals import one_line

@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import pytest
 
 from falsifier.campaigns.analysis import Run, load, load_run, main_table, read_published
-from falsifier.campaigns.analysis.tables import comparable
+from falsifier.campaigns.tables import comparable
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations

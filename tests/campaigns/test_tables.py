@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, llms_table, load, main_table
-from falsifier.campaigns.analysis.tables import Table, statistics_json
+from falsifier.campaigns.tables import Table, statistics_json
 
 PUBLISHED = Published(
     {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.campaigns.analysis import group, load, statistics
-from falsifier.campaigns.analysis.statistics import bootstrap, wilson
+from falsifier.campaigns.statistics import bootstrap, wilson
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,10 @@ from dataclasses import asdict, dataclass, replace
 from io import StringIO
 from typing import Any
 
-from falsifier.campaigns.analysis.runs import Run
-from falsifier.campaigns.analysis.statistics import Interval, Statistics, group, statistics
 from falsifier.campaigns.published import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.request import Method
+from falsifier.campaigns.runs import Run
+from falsifier.campaigns.statistics import Interval, Statistics, group, statistics
 from falsifier.core.literals import csv_cell, markdown_text, one_line
 from falsifier.stl.margins import shown
 

@@ -8,9 +8,9 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.campaigns.analysis.runs import Run
 from falsifier.campaigns.progress import total
 from falsifier.campaigns.request import Method
+from falsifier.campaigns.runs import Run
 
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000

@@ -8,10 +8,10 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.analysis.runs import Run, columns, frame, load, load_run, run_of
-from falsifier.campaigns.analysis.statistics import Statistics, group, statistics
-from falsifier.campaigns.analysis.tables import Table, ablation_table, llms_table, main_table
 from falsifier.campaigns.published import COLUMNS, Published, Score, read_published
+from falsifier.campaigns.runs import Run, columns, frame, load, load_run, run_of
+from falsifier.campaigns.statistics import Statistics, group, statistics
+from falsifier.campaigns.tables import Table, ablation_table, llms_table, main_table
 
 __all__ = [
     "COLUMNS",
