@@ -231,12 +231,14 @@ def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | N
 
 def _distribution_text(space: SearchSpace) -> str:
     """Describe what the engine ``uniform`` draws from: each control point and parameter on its own."""
-    parts = [_input_text(r, space) for r in space.inputs]
-    parts += [f"{p.name} uniform in {_range_text(p)}" for p in space.parameters]
-    text = f"{'; '.join(parts)}; all numbers independent of each other"
+    parts = [
+        *(_input_text(r, space) for r in space.inputs),
+        *(f"{p.name} uniform in {_range_text(p)}" for p in space.parameters),
+        "all numbers independent of each other",
+    ]
     if any(r.free is not None for r in space.inputs):
-        text += "; signals with other control points, which a search may try, are not drawn"
-    return text
+        parts.append("signals with other control points, which a search may try, are not drawn")
+    return "; ".join(parts)
 
 
 def _input_text(r: InputRange, space: SearchSpace) -> str:

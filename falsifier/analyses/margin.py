@@ -48,22 +48,18 @@ class Margin:
     @property
     def text(self) -> str:
         """The result in one sentence."""
-        count = len(self.searches)
-        effort = (
-            f"{counted(self.simulations, 'simulation')}, {count} {'search' if count == 1 else 'searches'}"
-        )
-        if self.unfalsified is None:
-            found = f"falsified in the whole range, even at {self.falsified:.6g}"
-        elif self.falsified is None:
-            found = f"not falsified in the whole range, not even at {self.unfalsified:.6g}"
-        else:
-            found = f"falsified at {self.falsified:.6g}, not falsified at {self.unfalsified:.6g}"
+        searches = f"{len(self.searches)} {'search' if len(self.searches) == 1 else 'searches'}"
+        effort = f"({counted(self.simulations, 'simulation')}, {searches})"
+        ends = [] if self.falsified is None else [f"falsified at {self.falsified:.6g}"]
+        ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.6g}"]
         if self.interrupted:
-            ends = [] if self.falsified is None else [f"falsified at {self.falsified:.6g}"]
-            ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.6g}"]
-            return f"{', '.join(ends) or 'nothing is known yet'} ({effort}); stopped by the user"
+            return f"{', '.join(ends) or 'nothing is known yet'} {effort}; stopped by the user"
+        if self.unfalsified is None:
+            ends = [f"falsified in the whole range, even at {self.falsified:.6g}"]
+        elif self.falsified is None:
+            ends = [f"not falsified in the whole range, not even at {self.unfalsified:.6g}"]
         more = "" if self.complete else "; a larger budget narrows it"
-        return f"{found} ({effort}){more}"
+        return f"{', '.join(ends)} {effort}{more}"
 
 
 def margin(
@@ -144,11 +140,13 @@ class _Bisection:
 
     def run(self, easy: float, hard: float) -> Margin:
         """Search at both ends, then between the hardest falsified threshold and the easiest other one."""
+        complete = interrupted = False
         try:
             complete = self._bisected(easy, hard)
         except KeyboardInterrupt:
-            return replace(self._ended(complete=False), interrupted=True)
-        return self._ended(complete=complete)
+            interrupted = True
+        searches, count = tuple(self.searches), len(self.history)
+        return Margin(self.falsified, self.unfalsified, count, searches, complete, interrupted)
 
     def _bisected(self, easy: float, hard: float) -> bool:
         """Narrow what is known, as far as the budget goes; return whether it is close enough."""
@@ -207,24 +205,19 @@ class _Bisection:
 
     def _confirmed(self, easy: float, hard: float) -> float | None:
         """Return the hardest threshold that something simulated already violates, if that is confirmed."""
-        found: tuple[float, Evaluation] | None = None
-        for step in range(_JUDGED_STEPS + 1):
-            threshold = easy if step == 0 else (easy + hard) / 2
+        found, threshold = None, easy
+        for _ in range(_JUDGED_STEPS + 1):
             violating = [e for e in self._judged(threshold) if e.violated]
             if violating:
-                easy, found = threshold, (threshold, min(violating, key=_robustness))
-            elif step == 0:
+                easy, found = threshold, min(violating, key=_robustness)
+            elif found is None:
                 return None
             else:
                 hard = threshold
-        if found is None:
-            return None
-        problem = at_threshold(self.problem, self.vary, found[0])
-        return found[0] if confirm(problem, found[1]).outcome == "confirmed" else None
-
-    def _ended(self, *, complete: bool) -> Margin:
-        found = self.falsified, self.unfalsified
-        return Margin(*found, len(self.history), tuple(self.searches), complete)
+            threshold = (easy + hard) / 2
+        assert found is not None, "there is at least one step"
+        confirmation = confirm(at_threshold(self.problem, self.vary, easy), found)
+        return easy if confirmation.outcome == "confirmed" else None
 
 
 def _robustness(evaluation: Evaluation) -> float:

@@ -75,16 +75,16 @@ class _Opinion:
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
     fresh = _repeat(problem, evaluation.candidate)
+    found = Confirmation(
+        problem=problem,
+        evaluation=evaluation,
+        outcome="refuted",
+        robustness=fresh.robustness,
+        reference=fresh.reference,
+        reason=f"the second simulation {fresh.doubt}",
+    )
     if fresh.doubt:
-        reason = f"the second simulation {fresh.doubt}"
-        return Confirmation(
-            problem=problem,
-            evaluation=evaluation,
-            outcome="refuted",
-            robustness=fresh.robustness,
-            reference=fresh.reference,
-            reason=reason,
-        )
+        return found
     reason = (
         f"a fresh simulation gives {signed(fresh.robustness)}, the second monitor (rtamt) "
         f"{signed(fresh.reference)}"
@@ -104,15 +104,7 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
         reason += "; its outputs do not depend on the communication step"
     else:
         reason += f"; {steps} gives {signed(halved.robustness)}"
-    return Confirmation(
-        problem=problem,
-        evaluation=evaluation,
-        outcome=outcome,
-        robustness=fresh.robustness,
-        reference=fresh.reference,
-        reason=reason,
-        halved=halved.robustness,
-    )
+    return replace(found, outcome=outcome, reason=reason, halved=halved.robustness)
 
 
 def half_step(problem: Problem) -> Problem:
@@ -141,6 +133,8 @@ def other_interface(problem: Problem) -> Problem:
 
 def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = None) -> _Opinion:
     """Simulate on a fresh instance; if the outputs equal those of a known opinion, return that opinion."""
+    from falsifier.stl import second_monitor
+
     # The next simulation then loads the model again, so nothing left over from the search can influence it.
     problem.model.close()
     again = evaluate(problem, candidate)
@@ -148,21 +142,16 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
         return _Opinion(None, None, None, f"failed: {again.reason}")
     if known is not None and _same(known.trajectory, again.trajectory):
         return known
-    reference, doubt = _second_monitor(problem, again.trajectory)
+    reference, doubt = None, ""
+    try:
+        reference = second_monitor.robustness(problem.requirement.formula, again.trajectory)
+    except FalsifierError as error:
+        doubt = f"could not be evaluated by rtamt: {error}"
     if not again.violated:
         doubt = f"does not violate: robustness {signed(again.robustness)}"
     elif reference is not None and reference >= 0:
         doubt = f"has robustness {signed(again.robustness)}, but rtamt computes {signed(reference)}"
     return _Opinion(again.trajectory, again.robustness, reference, doubt)
-
-
-def _second_monitor(problem: Problem, trajectory: Trajectory) -> tuple[float | None, str]:
-    from falsifier.stl import second_monitor
-
-    try:
-        return second_monitor.robustness(problem.requirement.formula, trajectory), ""
-    except FalsifierError as error:
-        return None, f"could not be evaluated by rtamt: {error}"
 
 
 def _same(one: Trajectory | None, other: Trajectory | None) -> bool:
@@ -196,10 +185,7 @@ class Movement:
 
 
 def step_convergence(
-    model: Model,
-    experiment: Experiment,
-    signals: Mapping[str, Signal],
-    parameters: Mapping[str, float] | None = None,
+    model: Model, experiment: Experiment, signals: Mapping[str, Signal]
 ) -> dict[str, Movement]:
     """Simulate with the step and with half of it, and compare the outputs on the same grid.
 
@@ -207,7 +193,6 @@ def step_convergence(
         model: the model to simulate.
         experiment: times, outputs and the step to check.
         signals: inputs by name.
-        parameters: parameter values by name.
 
     Returns:
         How much each output changes, by name.
@@ -216,8 +201,8 @@ def step_convergence(
         SimulationError: if one of the simulations fails.
     """
     step = experiment.step_size or experiment.output_interval
-    coarse = model.simulate(signals, parameters or {}, experiment)
-    fine = model.simulate(signals, parameters or {}, replace(experiment, step_size=step / 2))
+    coarse = model.simulate(signals, {}, experiment)
+    fine = model.simulate(signals, {}, replace(experiment, step_size=step / 2))
     moved = {}
     for name in coarse.names:
         distance = np.abs(fine[name] - coarse[name])

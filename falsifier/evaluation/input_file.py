@@ -10,7 +10,7 @@ from pathlib import Path
 from falsifier.core.literals import csv_cell
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, in_section
 
 # Signals have one value per time. A step between two slopes becomes a ramp this long in s, which ends at the
 # time of the step: shorter than any communication step, so that no simulation sees it.
@@ -52,32 +52,36 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "expected a CSV file in UTF-8"
         raise SpecError(f"cannot be read: {reason}", file=str(path)) from None
+    with in_section(file=str(path)):
+        return _read(rows, info)
+
+
+def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
+    """Read the rows of a file, given with their numbers from 1."""
     if len(rows) < 2:
-        raise SpecError("expected a row of names and one or more rows of numbers", file=str(path))
+        raise SpecError("expected a row of names and one or more rows of numbers")
     header = [cell.strip() for cell in rows[0][1]]
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
-        raise SpecError(
-            f"expected commas between the columns, got {other!r}: export it with commas", file=str(path)
-        )
-    columns = [_inputs_of(name, info, path) for name in header[1:]]
+        raise SpecError(f"expected commas between the columns, got {other!r}: export it with commas")
+    columns = [_inputs_of(name, info) for name in header[1:]]
     times: list[float] = []
     values: dict[str, list[float]] = {v.name: [] for column in columns for v in column}
     for line, row in rows[1:]:
         if len(row) != len(header):
-            raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)}", file=str(path))
-        times.append(_time(row[0], times, line, path))
+            raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)}")
+        times.append(_time(row[0], times, line))
         for name, cell, column in zip(header[1:], row[1:], columns, strict=True):
             if column:
-                _append(values, column, cell, f"row {line}, column {name}", path)
+                _append(values, column, cell, f"row {line}, column {name}")
     if not values:
         known = did_you_mean("", (v.name for v in info.inputs))
-        raise SpecError(f"no column is an input of the model; {known}", file=str(path))
+        raise SpecError(f"no column is an input of the model; {known}")
     signals = {name: _signal(times, column, info[name]) for name, column in values.items()}
     unused = tuple(name for name, column in zip(header[1:], columns, strict=True) if not column)
     return InputFile(signals, unused, times[-1])
 
 
-def _inputs_of(column: str, info: ModelInfo, path: Path) -> list[Variable]:
+def _inputs_of(column: str, info: ModelInfo) -> list[Variable]:
     """Return the inputs that a column stands for: one, the elements of an array, or none."""
     # A spreadsheet-safe file has an apostrophe before some names.
     exact = [v for v in info.inputs if column in (v.name, csv_cell(v.name))]
@@ -85,37 +89,33 @@ def _inputs_of(column: str, info: ModelInfo, path: Path) -> list[Variable]:
     if found or column in info:
         return found
     near = did_you_mean(column, (v.name for v in info.inputs))
-    raise SpecError(f"column {column!r}: the model has no such input; {near}", file=str(path))
+    raise SpecError(f"column {column!r}: the model has no such input; {near}")
 
 
-def _time(cell: str, before: Sequence[float], line: int, path: Path) -> float:
-    time = _number(cell, f"row {line}: time", path)
+def _time(cell: str, before: Sequence[float], line: int) -> float:
+    time = _number(cell, f"row {line}: time")
     if not before and time != 0.0:
-        raise SpecError(f"row {line}: the first time must be 0 s, got {time:g} s: shift it", file=str(path))
+        raise SpecError(f"row {line}: the first time must be 0 s, got {time:g} s: shift it")
     if before and time < before[-1]:
-        raise SpecError(
-            f"row {line}: time {time:g} s is before {before[-1]:g} s: sort the rows by time", file=str(path)
-        )
+        raise SpecError(f"row {line}: time {time:g} s is before {before[-1]:g} s: sort the rows by time")
     return time
 
 
-def _append(
-    values: Mapping[str, list[float]], column: Sequence[Variable], cell: str, what: str, path: Path
-) -> None:
+def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell: str, what: str) -> None:
     parts = cell.split()
     if len(parts) != len(column):
-        raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}", file=str(path))
+        raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}")
     for variable, part in zip(column, parts, strict=True):
-        values[variable.name].append(_number(part, what, path))
+        values[variable.name].append(_number(part, what))
 
 
-def _number(text: str, what: str, path: Path) -> float:
+def _number(text: str, what: str) -> float:
     try:
         number = float(text)
     except ValueError:
         number = float("nan")
     if not isfinite(number):
-        raise SpecError(f"{what}: expected a number, got {text!r}", file=str(path))
+        raise SpecError(f"{what}: expected a number, got {text!r}")
     return number
 
 

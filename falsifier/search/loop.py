@@ -4,9 +4,9 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 from falsifier.engines.known_first import KNOWN
 from falsifier.engines.protocol import RANDOM_CHANGE, AsksLLM, Engine, FollowsRun, HasRemarks
@@ -79,8 +79,13 @@ def search(
     """
     check_names(problems)
     check_limits(problems[0])
-    for problem in problems[1:]:
-        _check_alike(problems[0], problem)
+    one, *others = problems
+    for other in others:
+        if replace(other, requirement=one.requirement, source=one.source) != one:
+            raise SpecError(
+                f"{one.name} and {other.name} differ in what is varied or in how it is simulated, so they "
+                "cannot share a search: falsify them one after the other"
+            )
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     levels = tuple(levels) or (RefineLevel(0, problems[0].space),)
     steps = steps or Steps()
@@ -114,6 +119,7 @@ class RequirementState:
         evaluations: all so far, without trajectories.
         doubtful: violations that were not confirmed.
         best: evaluation with the smallest robustness, with its trajectory.
+        smallest: its robustness.
         counterexample: the confirmed violation.
         spent: what the run had spent by then.
         untold: evaluations that the engine has not been told.
@@ -124,6 +130,7 @@ class RequirementState:
     evaluations: list[Evaluation] = field(default_factory=list)
     doubtful: list[Confirmation] = field(default_factory=list)
     best: Evaluation | None = None
+    smallest: float = inf
     counterexample: Confirmation | None = None
     spent: Spent | None = None
     untold: list[Evaluation] = field(default_factory=list)
@@ -135,9 +142,9 @@ class RequirementState:
     def note(self, evaluation: Evaluation) -> bool:
         """Add an evaluation; return whether it is the best so far."""
         self.vacuity.see(evaluation, len(self.evaluations))
-        improved = _smaller(evaluation, self.best)
-        if improved:
-            self.best = evaluation
+        improved = evaluation.robustness is not None and evaluation.robustness < self.smallest
+        if evaluation.robustness is not None and improved:
+            self.best, self.smallest = evaluation, evaluation.robustness
         self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
         return improved
 
@@ -154,17 +161,8 @@ class RequirementState:
         return self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else ()
 
 
-def _smaller(evaluation: Evaluation, best: Evaluation | None) -> bool:
-    if evaluation.robustness is None:
-        return False
-    return best is None or best.robustness is None or evaluation.robustness < best.robustness
-
-
-class _Started(NamedTuple):
-    """A candidate that is being simulated, or will be when its evaluation is waited for."""
-
-    state: RequirementState
-    wait: Callable[[], Evaluation]
+# A candidate that is being simulated, or will be when it is waited for, and whose engine suggested it.
+_Started = tuple[RequirementState, Callable[[], Evaluation]]
 
 
 @dataclass(slots=True)
@@ -214,7 +212,7 @@ class _Loop:
         while standing := [state for state in self.states if state.counterexample is None]:
             wanted = self.wanted(jobs, in_batches=in_batches)
             if not wanted:
-                self.settle(self.waiting.popleft(), standing)
+                self.settle(*self.waiting.popleft(), standing)
                 continue
             self.tell(standing)
             limit = self.limit_reached()
@@ -293,22 +291,24 @@ class _Loop:
             )
         )
         started = self.steps.start(state.problem, candidates)
-        self.waiting.extend(_Started(state, wait) for wait in started)
+        self.waiting.extend((state, wait) for wait in started)
 
-    def settle(self, started: _Started, standing: Sequence[RequirementState]) -> None:
+    def settle(
+        self,
+        asked: RequirementState,
+        wait: Callable[[], Evaluation],
+        standing: Sequence[RequirementState],
+    ) -> None:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
 
         Simulations end in the order in which they were asked for, so that a run does not depend on which one
         is faster. Those that are still under way when the search ends are not counted.
         """
-        evaluation = started.wait()
+        evaluation = wait()
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.
-        judges = standing if started.state in standing else [started.state, *standing]
-        judged = [
-            (state, evaluation if state is started.state else judge(state.problem, evaluation))
-            for state in judges
-        ]
-        self.note(started, evaluation, judged)
+        judges = standing if asked in standing else [asked, *standing]
+        judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
+        self.note(asked, evaluation, judged)
         for state, seen in judged:
             state.untold.append(seen)
             self.consider(state, seen)
@@ -325,7 +325,10 @@ class _Loop:
         self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def note(
-        self, started: _Started, evaluation: Evaluation, judged: Sequence[tuple[RequirementState, Evaluation]]
+        self,
+        asked: RequirementState,
+        evaluation: Evaluation,
+        judged: Sequence[tuple[RequirementState, Evaluation]],
     ) -> None:
         """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [state.note(seen) for state, seen in judged]
@@ -340,11 +343,11 @@ class _Loop:
         self.emit(
             Evaluated(
                 index=self.count,
-                problem=started.state.problem,
+                problem=asked.problem,
                 evaluation=evaluation,
                 judged={state.problem.name: seen for state, seen in judged},
                 improved=any(improved),
-                best=started.state.best,
+                best=asked.best,
                 spent=self.spent,
                 replayed=self.count < self.steps.replayed,
             )
@@ -408,7 +411,6 @@ class _Loop:
 
     def result(self, state: RequirementState, status: ResultStatus, reason: str) -> Result:
         found = state.counterexample
-        begun = reached(self.levels, len(state.evaluations))
         return Result(
             problem=state.problem,
             status=status if found is None else "falsified",
@@ -419,18 +421,9 @@ class _Loop:
             refuted=tuple(c for c in state.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in state.doubtful if c.outcome == "fragile"),
             spent=state.spent or self.clock(),
-            searched=begun[-1].space,
+            searched=reached(self.levels, len(state.evaluations))[-1].space,
             levels=self.levels if len(self.levels) > 1 else (),
             findings=() if found is not None else state.findings(self.levels),
             directory=self.directory,
             remarks=state.remarks,
-        )
-
-
-def _check_alike(one: Problem, other: Problem) -> None:
-    alike = replace(other, requirement=one.requirement, source=one.source)
-    if alike != one:
-        raise SpecError(
-            f"{one.name} and {other.name} differ in what is varied or in how it is simulated, so they cannot "
-            "share a search: falsify them one after the other"
         )

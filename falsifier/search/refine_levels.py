@@ -114,10 +114,9 @@ def level_results(
     found = []
     for number, (first, end) in enumerate(zip(starts, (*starts[1:], len(robustness)), strict=True), start=1):
         own = robustness[first:end]
-        judged = [value for value in own if value is not None and not isnan(value)]
+        smallest = min((value for value in own if value is not None and not isnan(value)), default=None)
         is_last = bool(len(own)) and first + len(own) == len(robustness)
-        name = level_name(number, len(starts))
-        found.append(LevelResult(name, len(own), min(judged, default=None), falsified and is_last))
+        found.append(LevelResult(level_name(number, len(starts)), len(own), smallest, falsified and is_last))
     return tuple(found)
 
 

@@ -74,12 +74,12 @@ class Vacuity:
             if not np.array_equal(first, trajectory[name]):
                 self._moved.add(name)
         found = self._monitor.extremes(trajectory)
-        for i in np.flatnonzero(found.lows < self._lows):
-            time = float(found.lowest[i])
-            self._lowest[i] = _Moment(simulation, time, trajectory.at(time))
-        for i in np.flatnonzero(found.highs > self._highs):
-            time = float(found.highest[i])
-            self._highest[i] = _Moment(simulation, time, trajectory.at(time))
+        for moments, times, is_new in (
+            (self._lowest, found.lowest, found.lows < self._lows),
+            (self._highest, found.highest, found.highs > self._highs),
+        ):
+            for i in np.flatnonzero(is_new):
+                moments[i] = _Moment(simulation, float(times[i]), trajectory.at(float(times[i])))
         self._lows = np.minimum(self._lows, found.lows)
         self._highs = np.maximum(self._highs, found.highs)
 
@@ -88,20 +88,16 @@ class Vacuity:
         if not self._count:
             return ()
         constant = tuple(self._constant())
-        conditions = [self._condition(i) for i in self._of(Implies) if self._never(i)]
-        disjuncts = [self._disjunct(i) for i in self._of(Or) if self._always(i)]
-        said = {
-            predicate
-            for i in self._of(Implies)
-            if self._never(i)
-            for predicate in self._parts[i].part.formula.predicates
-        }
+        never = [i for i in self._of(Implies) if max(self._highs[self._alike(i)]) < 0]
+        always = [i for i in self._of(Or) if min(self._lows[self._alike(i)]) > 0]
+        said = {predicate for i in never for predicate in self._parts[i].part.formula.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
-        far = [] if constant else [self._far(i) for i in self._of(Predicate) if self._is_far(i, said)]
-        unique = {(finding.kind, finding.part): finding for finding in (*conditions, *disjuncts, *far)}
+        far = [] if constant else [i for i in self._of(Predicate) if self._is_far(i, said)]
+        found = (*map(self._condition, never), *map(self._disjunct, always), *map(self._far, far))
+        unique = {(finding.kind, finding.part): finding for finding in found}
         # If nothing moves the requirement's signals, that has been said of everything that was searched.
         idle = self._effects.findings() if self._moved else ()
-        return (*constant, *self._hidden(), *unique.values(), *idle)
+        return (*constant, *_hidden(self._problem), *unique.values(), *idle)
 
     def _of(self, kind: type[Formula]) -> list[int]:
         """Return the watched parts that belong to formulas of this kind."""
@@ -116,18 +112,13 @@ class Vacuity:
             if (other.formula, other.part.formula) == (one.formula, one.part.formula)
         ]
 
-    def _never(self, i: int) -> bool:
-        return bool(max(self._highs[self._alike(i)]) < 0)
-
-    def _always(self, i: int) -> bool:
-        return bool(min(self._lows[self._alike(i)]) > 0)
-
     def _is_far(self, i: int, said: set[Predicate]) -> bool:
         alike, formula = self._alike(i), self._parts[i].formula
         low, high = min(self._lows[alike]), max(self._highs[alike])
         margin = max(low, -high)
         return formula not in said and not is_on_limit(margin) and bool(margin > _FAR * (high - low))
 
+    @property
     def _in_all(self) -> str:
         return f"in {counted(self._count, 'simulation')}" if self._count > 1 else "in the only simulation"
 
@@ -139,13 +130,13 @@ class Vacuity:
         value = next(iter(self._robustness))
         if not self._moved:
             text = (
-                f"Nothing that was searched had an effect on {listed(signals)}: the same {self._in_all()}, "
+                f"Nothing that was searched had an effect on {listed(signals)}: the same {self._in_all}, "
                 f"with robustness {signed(value)}. Search longer, or search inputs and "
                 f"parameters on which {'it depends' if len(signals) == 1 else 'they depend'}."
             )
         elif all(name in info and info[name].kind == "real" for name in signals):
             text = (
-                f"The robustness was {signed(value)} {self._in_all()}, although "
+                f"The robustness was {signed(value)} {self._in_all}, although "
                 f"{listed(sorted(self._moved))} changed: what decides the requirement was never reached by "
                 "what was searched."
             )
@@ -153,17 +144,12 @@ class Vacuity:
             return
         yield Finding(kind="constant", text=text, part=str(self._problem.requirement.formula), margin=value)
 
-    def _hidden(self) -> Iterator[Finding]:
-        if hidden := hidden_margin(self._problem):
-            what, advice = hidden
-            yield Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}.")
-
     def _condition(self, i: int) -> Finding:
         watched = self._parts[i]
         return self._untested(
-            "condition",
             i,
-            f"The condition {watched.part.formula} never held {self._in_all()}, so {watched.formula} was not "
+            "condition",
+            f"The condition {watched.part.formula} never held {self._in_all}, so {watched.formula} was not "
             "tested. It must hold at some time",
             "it was false",
         )
@@ -171,9 +157,9 @@ class Vacuity:
     def _disjunct(self, i: int) -> Finding:
         watched = self._parts[i]
         return self._untested(
-            "disjunct",
             i,
-            f"{watched.part.formula} always held {self._in_all()}, so the other side of {watched.formula} "
+            "disjunct",
+            f"{watched.part.formula} always held {self._in_all}, so the other side of {watched.formula} "
             "was not tested. It must fail at some time",
             "it held",
             held=True,
@@ -183,9 +169,9 @@ class Vacuity:
         held = bool(self._lows[i] > 0)
         margin = self._lows[i] if held else -self._highs[i]
         return self._untested(
-            "threshold",
             i,
-            f"{self._parts[i].formula} was never near its threshold {self._in_all()}: it moved by "
+            "threshold",
+            f"{self._parts[i].formula} was never near its threshold {self._in_all}: it moved by "
             f"{self._highs[i] - self._lows[i]:.6g} and stayed {margin:.6g} away",
             "it was off",
             held=held,
@@ -193,8 +179,8 @@ class Vacuity:
 
     def _untested(
         self,
-        kind: FindingKind,
         i: int,
+        kind: FindingKind,
         what: str,
         off: str,
         *,
@@ -203,8 +189,8 @@ class Vacuity:
         """Return the finding about a part: what was not tested, and how close the part came to changing.
 
         Args:
-            kind: what it is about.
             i: index of the part.
+            kind: what it is about.
             what: what was not tested, in words.
             off: how its margin is said if its values are not telling.
             held: whether it was always true; otherwise it never was.
@@ -240,21 +226,27 @@ def _when(moment: _Moment) -> str:
     return f"(simulation {moment.simulation + 1}, {moment.time:.6g} s)"
 
 
+def _hidden(problem: Problem) -> Iterator[Finding]:
+    if hidden := hidden_margin(problem):
+        what, advice = hidden
+        yield Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}.")
+
+
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:
     """Return why Booleans leave a requirement's robustness without a margin, and what to do; None if not."""
     formula, info = problem.requirement.formula, problem.info
-    if found := _truth_margins(formula, info):
-        names = listed(formula.signals)
-        values = " or ".join(f"{value:g}" for value in sorted({shown(value) for value in found}))
-        are = "is" if len(formula.signals) == 1 else "are"
-        numbers = [v.name for v in info.observables if v.kind == "real"][:_MOST_NAMED]
-        known = f"the model has {listed(numbers)}" if numbers else "make them outputs of the model"
-        return (
-            f"the robustness can only be {values}, because {names} {are} Boolean: no value says how near a "
-            "violation is",
-            f"compare the numbers of which {names} {are} made instead ({known})",
-        )
-    return None
+    found = _truth_margins(formula, info)
+    if not found:
+        return None
+    values = " or ".join(f"{value:g}" for value in sorted({shown(value) for value in found}))
+    names_are = f"{listed(formula.signals)} {'is' if len(formula.signals) == 1 else 'are'}"
+    numbers = [v.name for v in info.observables if v.kind == "real"][:_MOST_NAMED]
+    known = f"the model has {listed(numbers)}" if numbers else "make them outputs of the model"
+    return (
+        f"the robustness can only be {values}, because {names_are} Boolean: no value says how near a "
+        "violation is",
+        f"compare the numbers of which {names_are} made instead ({known})",
+    )
 
 
 def _truth_margins(formula: Formula, info: ModelInfo) -> set[float]:
