@@ -31,13 +31,13 @@ from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
-    asking,
     asking_options,
     check_context,
     context_option,
     llm_option,
+    llm_settings,
     name_and_effort,
-    refuse_limits_without_llm,
+    read_budget,
     variant_option,
 )
 from falsifier.cli.options import (
@@ -132,10 +132,6 @@ def bench(
     context: tuple[str, ...],
     runs: int,
     seed: int,
-    budget: int | None,
-    seconds: float | None,
-    max_tokens: int | None,
-    max_cost: float | None,
     totals: Budget | None,
     jobs: int,
     executor: str | None,
@@ -154,19 +150,21 @@ def bench(
     problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
     rights = policy_changes(options)
-    problems = [source.model_copy(update={"changes": rights}) for source in _with_context(problems, context)]
-    if not llms:
-        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
+    problems = [
+        source.model_copy(update={"changes": rights, "context": (*source.context, *context)})
+        for source in problems
+    ]
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
-    how = LLMSettings(name="", **asking(options, named=bool(llms)))
+    budget = read_budget(options, asks=bool(llms), usual=usual)
+    how = llm_settings({"llm": next(iter(llms), None), **options}) or LLMSettings(name="")
     methods = _methods(engines, llms, variants, kinds, profile or "", how)
     request = CampaignRequest(
         runs=cross(
             problems,
             methods,
             seeds=range(seed, seed + runs),
-            budget=Budget(usual if budget is None else budget, seconds, max_tokens, max_cost),
+            budget=budget,
             asking=how,
         ),
         limits=totals,
@@ -267,10 +265,6 @@ def _agree(request: CampaignRequest, *, yes: bool) -> None:
     warn(most.text)
     if not yes and most.cost != 0 and sys.stdin.isatty():
         click.confirm("Start?", abort=True, err=True)
-
-
-def _with_context(problems: Sequence[ProblemSource], context: tuple[str, ...]) -> list[ProblemSource]:
-    return [source.model_copy(update={"context": (*source.context, *context)}) for source in problems]
 
 
 def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:

@@ -11,10 +11,9 @@ from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     anonymous_option,
     connection_options,
-    connection_settings,
     context_option,
     llm_option_option,
-    read_llm_options,
+    llm_settings,
     variant_option,
 )
 from falsifier.cli.options import (
@@ -84,7 +83,8 @@ def prompt(
     if at is not None and directory is None:
         say(_sent(Path(options["target"]), at, as_json=as_json))
         return
-    reply = read_llm_options(llm_options).get("reply", "json")
+    asked = llm_settings({"llm": "", "llm_options": llm_options})
+    assert asked is not None
     problem = load_source(problem_source(options))
     if directory:
         _check_same(directory, problem)
@@ -100,7 +100,7 @@ def prompt(
         evaluations=told,
         count=count,
         anonymous=anonymous,
-        reply=reply,
+        reply=asked.reply,
         simulations=limit,
         doubtful=doubtful_confirmations(problem, records, evaluations),
         lessons=_lessons(records) if at is None else "",
@@ -108,7 +108,7 @@ def prompt(
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
         tool = preview_tool(
-            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=reply
+            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=asked.reply
         )
         tools = (tool,)
     say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
@@ -217,7 +217,7 @@ def check(*, name: str, **options: Any) -> None:
     from falsifier.llm.check import check_llm
     from falsifier.llm.usage import Price
 
-    settings = connection_settings({"llm": name, **options})
+    settings = llm_settings({"llm": name, **options})
     assert settings is not None
     found = check_llm(
         settings.name,

@@ -1,6 +1,6 @@
 """Options of the command line about language models: which one, how to ask it, and what they make."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -15,13 +15,22 @@ from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.errors import did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT, Effort, ReplyKind
+from falsifier.search import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
+    from falsifier.search.budget import Budget
     from falsifier.search.request import LLMSettings
 
-# What a price is, in errors; as providers state prices.
-_PRICE = "expected SENT:RECEIVED in US dollars per million tokens sent and received, for example 0.25:2"
-
+# Options that a command may have about a language model, and limits of a run, as it receives them.
+_ASKED = ("variant", "api_base", "fallback", "anonymous")
+_LIMITS = ("budget", "seconds", "max_tokens", "max_cost")
+# Names of --llm-option that the provider does not see, fields of LLMSettings, and what they expect.
+_EXPECTED = {
+    "price": "expected SENT:RECEIVED, in US dollars per million tokens sent and received, for example 0.25:2",
+    "timeout": "expected a number of seconds above 0",
+    "cache": "expected yes, or no to ignore stored replies",
+    "reply": f"expected {' or '.join(get_args(ReplyKind))}",
+}
 # Words after an @ that are versions of a model, as Vertex AI has them.
 _VERSIONS = ("default", "latest")
 
@@ -118,68 +127,55 @@ def name_and_effort(text: str) -> tuple[str, str | None]:
     return text, None
 
 
-def connection_settings(options: dict[str, Any]) -> "LLMSettings | None":
-    """Take the values of llm and connection_options out of a command's keyword arguments."""
-    options.update({"variant": None, "fallback": None, "anonymous": False})
-    return llm_settings(options)
-
-
 def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
-    """Take the values of llm_options out of a command's keyword arguments; None if no model is named.
+    """Take the values of llm_options, as far as a command has them, out of its keyword arguments.
+
+    Returns:
+        Which language model to ask, and how; None if none is named.
 
     Raises:
         click.UsageError: if a value is invalid, or one is given although no language model is named.
     """
-    given, variant = options.pop("llm"), options.pop("variant")
-    asked = asking(options, named=given is not None)
-    if given is None:
-        _refuse_without_llm({"variant": variant})
+    llm = options.pop("llm")
+    pairs = options.pop("llm_options")
+    asked = {name: options.pop(name) for name in _ASKED if name in options}
+    if llm is None:
+        refuse_without_llm(**asked, llm_option=pairs)
         return None
+    from pydantic import ValidationError
+
     from falsifier.search.request import LLMSettings
 
-    name, effort = name_and_effort(given)
-    return LLMSettings(name=name, effort=effort, variant=variant, **asked)
+    name, effort = name_and_effort(llm)
+    given = dict(map(_name_and_value, pairs))
+    passed = {name: _passed(name, value) for name, value in given.items() if name not in _EXPECTED}
+    fields: dict[str, Any] = {name: value for name, value in given.items() if name in _EXPECTED}
+    if "price" in fields:
+        fields["price"] = fields["price"].split(":")
+    try:
+        return LLMSettings(name=name, effort=effort, options=passed, **asked, **fields)
+    except ValidationError as error:
+        wrong = str(error.errors()[0]["loc"][0])
+        raise click.UsageError(f"--llm-option {wrong}={given[wrong]}: {_EXPECTED[wrong]}") from None
 
 
-def asking(options: dict[str, Any], *, named: bool) -> dict[str, Any]:
-    """Take the values of asking_options out of a command's keyword arguments, as fields of LLMSettings.
+def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIMULATIONS) -> "Budget":
+    """Take the values of budget_option and limit_options out of a command's keyword arguments.
 
-    Raises:
-        click.UsageError: if a value is invalid, or one is given although no language model is named.
-    """
-    given = {key: options.pop(key) for key in ("api_base", "fallback", "anonymous")}
-    pairs = options.pop("llm_options")
-    if not named:
-        _refuse_without_llm(given | {"llm_option": pairs})
-    return given | read_llm_options(pairs)
-
-
-def read_llm_options(pairs: Sequence[str]) -> dict[str, Any]:
-    """Return the values of ``--llm-option`` as fields of LLMSettings.
-
-    Raises:
-        click.UsageError: if one is invalid.
-    """
-    fields: dict[str, Any] = {}
-    passed: dict[str, str | float] = {}
-    for text in pairs:
-        name, equals, value = text.partition("=")
-        if not equals or not name:
-            raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
-        if name in _FIELDS:
-            fields[name] = _FIELDS[name](text, value)
-        else:
-            passed[name] = _passed(name, value)
-    return fields | {"options": passed}
-
-
-def refuse_limits_without_llm(*, max_tokens: int | None, max_cost: float | None) -> None:
-    """Refuse limits of a language model although none is named.
+    Args:
+        options: the arguments.
+        asks: whether a language model is named.
+        usual: maximum number of simulations if none is given.
 
     Raises:
-        click.UsageError: naming the options.
+        click.UsageError: if a language model is limited that is not named.
     """
-    _refuse_without_llm({"max_tokens": max_tokens, "max_cost": max_cost})
+    from falsifier.search.budget import Budget
+
+    simulations, seconds, tokens, cost = (options.pop(name) for name in _LIMITS)
+    if not asks:
+        refuse_without_llm(max_tokens=tokens, max_cost=cost)
+    return Budget(usual if simulations is None else simulations, seconds, tokens, cost)
 
 
 def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
@@ -200,7 +196,12 @@ def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
         )
 
 
-def _refuse_without_llm(given: dict[str, Any]) -> None:
+def refuse_without_llm(**given: Any) -> None:
+    """Refuse options of a language model although none is named.
+
+    Raises:
+        click.UsageError: naming the options.
+    """
     stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value]
     if stray:
         raise click.UsageError(
@@ -209,46 +210,11 @@ def _refuse_without_llm(given: dict[str, Any]) -> None:
         )
 
 
-def _price(text: str, value: str) -> tuple[float, float]:
-    try:
-        sent, received = (float(part) for part in value.split(":"))
-    except ValueError:
-        raise click.UsageError(f"--llm-option {text}: {_PRICE}") from None
-    if not all(isfinite(price) and price >= 0 for price in (sent, received)):
-        raise click.UsageError(f"--llm-option {text}: prices must be finite and not negative; {_PRICE}")
-    return sent, received
-
-
-def _timeout(text: str, value: str) -> float:
-    try:
-        seconds = float(value)
-    except ValueError:
-        seconds = 0.0
-    if not isfinite(seconds) or seconds <= 0:
-        raise click.UsageError(f"--llm-option {text}: expected a number of seconds above 0")
-    return seconds
-
-
-def _cache(text: str, value: str) -> bool:
-    if value not in ("yes", "no"):
-        raise click.UsageError(f"--llm-option {text}: expected yes, or no to ignore stored replies")
-    return value == "yes"
-
-
-def _reply(text: str, value: str) -> str:
-    if value not in get_args(ReplyKind):
-        kinds = did_you_mean(value, get_args(ReplyKind))
-        raise click.UsageError(f"--llm-option {text}: unknown kind of reply; {kinds}")
-    return value
-
-
-# Names of --llm-option that the provider does not see: fields of LLMSettings.
-_FIELDS: dict[str, Callable[[str, str], Any]] = {
-    "price": _price,
-    "timeout": _timeout,
-    "cache": _cache,
-    "reply": _reply,
-}
+def _name_and_value(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise click.UsageError(f"--llm-option {text}: expected NAME=VALUE, for example max_tokens=4000")
+    return name, value
 
 
 def _passed(name: str, value: str) -> str | float:

@@ -6,8 +6,9 @@ or add a remark, a function makes the option.
 
 import logging
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
-from math import isfinite
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from falsifier.problem.sections import ModelChanges
     from falsifier.problem.source import Parameterization, ProblemSource
     from falsifier.search.budget import Budget
+
+PATH = click.Path(path_type=Path)
 
 # What a search does unless it is told otherwise: the same for one run and for each run of a campaign.
 DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
@@ -46,7 +49,7 @@ def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PA
         "parameterizations" if multiple else "parameterized",
         multiple=multiple,
         metavar="[PROFILE,]free[:SECONDS]|fixed",
-        callback=_parameterized,
+        type=parameterized,
         default=None if multiple else default,
         show_default=default if multiple else True,
         help=repeatable(
@@ -55,12 +58,6 @@ def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PA
             multiple=multiple,
         ),
     )
-
-
-def _parameterized(
-    _context: click.Context, _option: click.Parameter, given: str | tuple[str, ...]
-) -> Parameterized | tuple[Parameterized, ...]:
-    return parameterized(given) if isinstance(given, str) else tuple(map(parameterized, given))
 
 
 def parameterized(text: str) -> Parameterized:
@@ -74,30 +71,25 @@ def parameterized(text: str) -> Parameterized:
     """
     found = Parameterized()
     for word in text.split(","):
-        said = word.removeprefix("free:")
-        is_kind = said != word or word in ("free", "fixed")
-        if not word or (found.kind if is_kind else found.profile):
+        kind, colon, seconds = word.partition(":")
+        if kind == "free" and colon:
+            said: dict[str, Any] = {"kind": kind, "shortest_piece": _seconds(text, seconds)}
+        else:
+            said = {"kind" if word in ("free", "fixed") else "profile": word}
+        if not word or any(getattr(found, name) for name in said):
             raise click.UsageError(
                 f"--parameterization {text}: expected free, free:SECONDS or fixed, after the name of a "
                 "profile and a comma if the spec has profiles, for example instance2,fixed"
             )
-        if said != word:
-            found = found._replace(kind="free", shortest_piece=_seconds(text, said))
-        elif is_kind:
-            found = found._replace(kind="free" if word == "free" else "fixed")
-        else:
-            found = found._replace(profile=word)
+        found = found._replace(**said)
     return found
 
 
 def _seconds(text: str, seconds: str) -> float:
-    try:
-        value = float(seconds)
-    except ValueError:
-        value = float("nan")
-    if not isfinite(value) or value <= 0:
-        raise click.UsageError(f"--parameterization {text}: expected a time in s, for example free:0.5")
-    return value
+    with suppress(ValueError):
+        if 0 < (value := float(seconds)) < inf:
+            return value
+    raise click.UsageError(f"--parameterization {text}: expected a time in s, for example free:0.5")
 
 
 def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
@@ -213,6 +205,36 @@ def requirement_options(command: Function) -> Function:
     return add(command, stl_option(), template_option, problem_options)
 
 
+def source_of(target: str, chosen: Parameterized, **more: Any) -> "ProblemSource":
+    """Return where a problem comes from.
+
+    Args:
+        target: as on the command line.
+        chosen: value of ``--parameterization``.
+        more: other fields of ProblemSource.
+
+    Raises:
+        click.UsageError: if a profile is chosen from an FMU.
+    """
+    from falsifier.problem.source import ProblemSource
+
+    source = ProblemSource(
+        target=target,
+        profile=chosen.profile,
+        parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
+        shortest_piece=chosen.shortest_piece,
+        **more,
+    )
+    if chosen.profile is not None and source.parts.kind == "fmu":
+        raise click.UsageError(
+            f"--parameterization {chosen.profile}: only specs have profiles; expected free or fixed"
+        )
+    return source
+
+
+_CHANGES = ("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "allow", "deny")
+
+
 def problem_source(options: dict[str, Any]) -> "ProblemSource":
     """Take the values of requirement_options out of a command's keyword arguments.
 
@@ -220,28 +242,11 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
         click.UsageError: if two options state the requirement, or a profile is chosen from an FMU.
     """
     from falsifier.problem.shorthand import changes_from_options
-    from falsifier.problem.source import ProblemSource
 
-    varied = (
-        *("values", "ranges", "stop_time", "output_interval", "time_limit", "interface"),
-        *("allow", "deny"),
-    )
-    changes = changes_from_options(**{name: options.pop(name) for name in varied})
-    chosen: Parameterized = options.pop("parameterized")
-    source = ProblemSource(
-        target=options.pop("target"),
-        stl=options.pop("stl"),
-        profile=chosen.profile,
-        parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
-        shortest_piece=chosen.shortest_piece,
-        changes=changes,
-        context=options.pop("context", ()),
-    )
-    if chosen.profile is not None and source.parts.kind == "fmu":
-        raise click.UsageError(
-            f"--parameterization {chosen.profile}: only specs have profiles; expected free or fixed"
-        )
-    template = options.pop("template")
+    changes = changes_from_options(**{name: options.pop(name) for name in _CHANGES})
+    taken = {name: options.pop(name) for name in ("target", "stl")}
+    chosen, template = options.pop("parameterized"), options.pop("template")
+    source = source_of(chosen=chosen, changes=changes, context=options.pop("context", ()), **taken)
     if template is not None and source.stl is not None:
         raise click.UsageError("--stl and --template both state the requirement; drop one of them")
     return with_template(source, template)
@@ -309,32 +314,33 @@ _TOTALS: dict[str, Callable[[str], float]] = {
 }
 
 
+def _total(text: str) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    try:
+        return name, _TOTALS[name](number)
+    except (KeyError, ValueError):
+        expected = ", ".join(f"{name}=N" for name in _TOTALS)
+        raise click.UsageError(f"--total {text}: expected {expected}, for example cost=5") from None
+
+
+def _totals(
+    _context: click.Context, _option: click.Parameter, given: Iterable[tuple[str, Any]]
+) -> "Budget | None":
+    from falsifier.search.budget import Budget
+
+    return Budget(**{"simulations": None, **dict(given)}) if given else None
+
+
 total_option = click.option(
     "--total",
     "totals",
     multiple=True,
     metavar="|".join(f"{name}=N" for name in _TOTALS),
-    callback=lambda _context, _option, given: _total(given),
+    type=_total,
+    callback=_totals,
     help="Limit of all runs of a campaign together: simulations, seconds from this start, tokens, US "
     "dollars. Repeatable.",
 )
-
-
-def _total(given: Iterable[str]) -> "Budget | None":
-    limits: dict[str, float] = {}
-    for text in given:
-        name, _, number = text.partition("=")
-        try:
-            limits[name] = _TOTALS[name](number)
-        except (KeyError, ValueError):
-            raise click.UsageError(
-                f"--total {text}: expected {', '.join(f'{name}=N' for name in _TOTALS)}, for example cost=5"
-            ) from None
-    if not limits:
-        return None
-    from falsifier.search.budget import Budget
-
-    return Budget(**limits)  # type: ignore[arg-type]
 
 
 def seed_option(text: str = "Random seed.") -> Decorator:
@@ -363,7 +369,7 @@ def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
     return click.option(
         "--inputs",
         "known",
-        type=click.Path(path_type=Path),
+        type=PATH,
         multiple=multiple,
         metavar="u.csv|counterexample.json|RUN",
         help=repeatable(
@@ -374,10 +380,10 @@ def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
     )
 
 
-run_argument = click.argument("run", metavar="RUN", type=click.Path(path_type=Path))
+run_argument = click.argument("run", metavar="RUN", type=PATH)
 
 
-directory_argument = click.argument("directory", type=click.Path(path_type=Path))
+directory_argument = click.argument("directory", type=PATH)
 
 
 requirement_option = click.option(
@@ -386,7 +392,7 @@ requirement_option = click.option(
 
 
 def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
-    return click.option("-o", "--out", type=click.Path(path_type=Path), metavar=metavar, help=text)
+    return click.option("-o", "--out", type=PATH, metavar=metavar, help=text)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")

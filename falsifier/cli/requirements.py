@@ -12,16 +12,16 @@ from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import (
     connection_options,
-    connection_settings,
     llm_option,
+    llm_settings,
 )
 from falsifier.cli.options import (
-    DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
     json_option,
     out_option,
     parameterization_option,
+    source_of,
     target_argument,
     template_option,
     with_template,
@@ -33,7 +33,6 @@ from falsifier.core.words import counted, parameterization_text
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
-from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # writing specs takes a package that check does not need
@@ -63,7 +62,7 @@ def check(
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = with_template(_source(target, parameterized), template)
+    source = with_template(source_of(target, parameterized), template)
     if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
         raise SpecError(
             f"{target}: no requirement to check; add --template 'NAME KEY=VALUE ...', or give a spec "
@@ -93,15 +92,6 @@ def _problem_line(problem: Problem) -> str:
     searched = [f"{r.name} [{r.low:g}, {r.high:g}] {parameterization_text(r)}" for r in space.inputs]
     searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
-
-
-def _source(target: str, chosen: Parameterized) -> ProblemSource:
-    return ProblemSource(
-        target=target,
-        profile=chosen.profile,
-        parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
-        shortest_piece=chosen.shortest_piece,
-    )
 
 
 def _lines(finding: LintFinding) -> list[str]:
@@ -140,7 +130,7 @@ def formalize(
     from falsifier.problem.writing import subject_of, with_requirement
     from falsifier.views.analyses_text import advice_json, advice_text, formalized_json, formalized_text
 
-    settings = connection_settings(options)
+    settings = llm_settings(options)
     if settings is None:
         if choose is not None:
             raise click.UsageError("--choose requires --llm NAME, which proposes the readings")

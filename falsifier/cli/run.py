@@ -14,7 +14,7 @@ from falsifier.cli.llm_options import (
     context_option,
     llm_options,
     llm_settings,
-    refuse_limits_without_llm,
+    read_budget,
 )
 from falsifier.cli.options import (
     budget_option,
@@ -92,10 +92,6 @@ class _OneTarget(Command):
 def run(
     *,
     engine: str | None,
-    budget: int,
-    seconds: float | None,
-    max_tokens: int | None,
-    max_cost: float | None,
     seed: int,
     jobs: int,
     known: tuple[Path, ...],
@@ -117,17 +113,15 @@ def run(
     from falsifier.problem.loading import load_source
     from falsifier.problem.refinement import widened
     from falsifier.record.run import falsify
-    from falsifier.search.budget import Budget
     from falsifier.views.progress import FmuLog, make_display
 
     source, llm = problem_source(options), llm_settings(options)
     check_context(source.context, [engine] if llm is None else [])
+    budget = read_budget(options, asks=llm is not None)
     logs = [FmuLog(fmu_log)] if fmu_log else []
     if fmu_log:
         changes = source.changes.model_copy(update={"logging": True})
         source = source.model_copy(update={"changes": changes})
-    if llm is None:
-        refuse_limits_without_llm(max_tokens=max_tokens, max_cost=max_cost)
     sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources
     start_from = []
@@ -141,7 +135,7 @@ def run(
             engine,
             llm=llm,
             seed=seed,
-            budget=Budget(budget, seconds, max_tokens, max_cost),
+            budget=budget,
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=start_from,
@@ -242,17 +236,13 @@ def _write_counterexamples(result: "Result", directory: Path) -> None:
     from falsifier.cli.files import write_counterexample
     from falsifier.views.text import counterexample_name
 
-    try:
-        name = counterexample_name(result)
-    except FalsifierError as error:
-        warn(f"falsifier: {error}")
-        return
-    found = [(name, result.counterexample)] if result.counterexample is not None else []
-    found += [
-        (f"fragile-{i}{name.removeprefix('counterexample')}", fragile)
+    name = counterexample_name(result)
+    found = {} if result.counterexample is None else {name: result.counterexample}
+    found |= {
+        f"fragile-{i}{name.removeprefix('counterexample')}": fragile
         for i, fragile in enumerate(result.fragile, start=1)
-    ]
-    for file, confirmation in found:
+    }
+    for file, confirmation in found.items():
         try:
             write_counterexample(confirmation, directory, name=file)
         except (OSError, FalsifierError) as error:
