@@ -1,16 +1,16 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
 import json
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.options import (
-    DEFAULT_PARAMETERIZATION,
-    Parameterized,
     budget_option,
     json_option,
     out_option,
@@ -22,7 +22,7 @@ from falsifier.cli.options import (
     seed_option,
     stl_option,
 )
-from falsifier.cli.output import INTERRUPTED, conclude
+from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.core.arguments import finite
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
@@ -78,25 +78,16 @@ def assess(
             warn(f"simulation {count} of at most {budget}")
 
     problem, searched = _loaded(options, requirement)
-    try:
-        found = assess_problem(
-            problem,
-            budget=budget,
-            seed=seed,
-            searched=searched,
-            progress=said,
-        )
-    finally:
-        problem.model.close()
-    content = json.dumps(assurance_json(found) | {"budget": budget, "seed": seed}, indent=2)
-    file = write_whole(out / "assurance.json", content) if out else None
-    lines = [
-        f"{problem.name}: {problem.requirement.formula}",
-        *(f"  {line}" for line in found.text.splitlines()),
-    ]
-    lines += [f"  file: {file}"] if file else []
+    with closing(problem.model):
+        found = assess_problem(problem, budget=budget, seed=seed, searched=searched, progress=said)
+    content = assurance_json(found) | {"budget": budget, "seed": seed}
+    lines = [f"{problem.name}: {problem.requirement.formula}"]
+    lines += [f"  {line}" for line in found.text.splitlines()]
+    if out:
+        file = write_whole(out / "assurance.json", json.dumps(content, indent=2))
+        lines.append(f"  file: {file}")
     code = INTERRUPTED if found.interrupted else 1 if found.violations else 0
-    conclude(content if as_json else "\n".join(map(one_line, lines)), code)
+    conclude(as_shown("\n".join(map(one_line, lines)), content, as_json=as_json), code)
 
 
 @command()
@@ -143,12 +134,10 @@ def margin(
             warn(f"{threshold:.6g}: {found} ({count} of at most {budget} simulations used)")
 
     problem = load_source(problem_source(options | requirement))
-    try:
+    with closing(problem.model):
         found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
-    finally:
-        problem.model.close()
     content = {"stl": stl, "between": [low, high], **asdict(found)}
-    text = json.dumps(content, indent=2) if as_json else one_line(f"{stl}: {found.text}")
+    text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
@@ -163,8 +152,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     """
     place = Path(options["target"])
     if not (place.is_dir() and holds_run(place)):
-        if requirement is not None:
-            raise click.UsageError("--requirement applies to run directories only; TARGET is not one")
+        refuse("applies to run directories only; TARGET is not one", requirement=requirement)
         try:
             return load_source(problem_source(options)), []
         except SpecError:
@@ -174,14 +162,17 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
                 f"{place}: not a run directory: it contains no {MANIFEST}; expected a run, a spec, an "
                 "FMU or a bundled name"
             ) from None
-    unset = {"target": None, "parameterized": Parameterized(kind=DEFAULT_PARAMETERIZATION)}
+    context = click.get_current_context()
     changed = [
-        name for name, value in options.items() if name != "target" and value and value != unset.get(name)
+        parameter.opts[0]
+        for parameter in context.command.params
+        if parameter.name in options.keys() - {"target"}
+        and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT
     ]
     if changed:
-        stated = {p.name: p.opts[0] for p in click.get_current_context().command.params}
-        what = ", ".join(stated.get(name, name) for name in changed)
-        raise click.UsageError(f"{place}: the search space of a run cannot be changed; drop {what}")
+        raise click.UsageError(
+            f"{place}: the search space of a run cannot be changed; drop {', '.join(changed)}"
+        )
     described = read_manifest(place)
     if requirement is None and described.shared:
         raise click.UsageError(

@@ -13,15 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns import (
-    CampaignEnd,
-    CampaignRequest,
-    Follower,
-    Method,
-    cross,
-    run_campaign,
-    suite,
-)
+from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, Method, cross, run_campaign, suite
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.directory import is_campaign
@@ -29,7 +21,7 @@ from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SI
 from falsifier.campaigns.request import as_searched, ceiling
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.llm_options import (
     asking_options,
     check_context,
@@ -195,12 +187,10 @@ def watch(*, directory: Path, once: bool, page: bool, allow_stop: bool) -> None:
     can also be opened after the run has ended.
     """
     if page:
-        if once:
-            raise click.UsageError("--once and --page cannot be combined")
+        refuse("cannot be combined with --page", once=once)
         _serve(directory, allow_stop=allow_stop)
         return
-    if allow_stop:
-        raise click.UsageError("--allow-stop requires --page")
+    refuse("applies to --page only", allow_stop=allow_stop)
     follower = Follower(directory)
     working = follower.is_worked_on
     if not once:
@@ -300,8 +290,8 @@ def _methods(
     how: LLMSettings,
 ) -> list[Method]:
     """Engines alone, or engines x LLMs x variants if an LLM is named; each with all parameterizations."""
-    if not llms and variants:
-        raise click.UsageError("--variant requires --llm NAME")
+    if not llms:
+        refuse("requires --llm NAME", variant=variants)
     named = [name_and_effort(llm) for llm in llms] or [("", None)]
     methods = [
         Method(

@@ -77,3 +77,22 @@ def add(command: Function, *decorators: Decorator) -> Function:
     for decorate in reversed(decorators):
         command = decorate(command)
     return command
+
+
+def refuse(reason: str, **given: object) -> None:
+    """Refuse options that are given although they do not apply.
+
+    Args:
+        reason: why, and what to do.
+        given: their values by name; None, False and an empty tuple: the option is not given.
+
+    Raises:
+        click.UsageError: naming the options.
+    """
+    stray = [
+        f"--{name.replace('_', '-')}"
+        for name, value in given.items()
+        if value is not None and value is not False and value != ()
+    ]
+    if stray:
+        raise click.UsageError(f"{', '.join(stray)}: {reason}")

@@ -1,8 +1,7 @@
 """``falsifier explain``, ``replay``, ``export``: on a counterexample, or the nearest miss of a run."""
 
-import json
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
 from math import ceil, isqrt
 from pathlib import Path
@@ -10,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
 from falsifier.cli.llm_options import api_base_option, llm_option, name_and_effort
 from falsifier.cli.options import (
+    PATH,
     budget_option,
     interface_option,
     json_option,
@@ -22,13 +22,13 @@ from falsifier.cli.options import (
     requirement_option,
     run_argument,
 )
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.regression import Database
-from falsifier.counterexamples.store import EXPLANATION, Replayed
+from falsifier.counterexamples.store import EXPLANATION
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface
@@ -41,7 +41,6 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
-    from falsifier.counterexamples.shrink import Shrunk
 
 # Shrinking usually reaches a local minimum with fewer simulations.
 _SHRINK_BUDGET = 500
@@ -99,24 +98,23 @@ def explain(
     miss it also draws nearest-miss.png. With --llm, a language model describes it in its own words, too.
     Except with --shrink, the shrunk counterexample of a run is used if there is one.
     """
-    _check_parts(
-        shrunk=shrunk,
-        mapped=mapped,
-        other={"--budget": budget, "--out": out},
-        simpler={"--at-most": at_most},
-        words={"--llm": llm, "--api-base": api_base},
-    )
-    if llm is None and api_base is not None:
-        raise click.UsageError("--api-base requires --llm NAME")
-    case = case_of(run, requirement, shrunk=not shrunk)
-    if budget is None:
-        budget = _SHRINK_BUDGET if shrunk else _MAP_BUDGET
-    if shrunk:
-        _shrink(case, budget=budget, at_most=at_most, out=out, as_json=as_json, **rights)
-    elif mapped:
-        _map(case, run, budget=budget, out=out, as_json=as_json, **rights)
+    if shrunk and mapped:
+        raise click.UsageError("--shrink and --map cannot be combined; run one after the other")
+    if not shrunk:
+        refuse("applies to --shrink only", at_most=at_most)
+    if shrunk or mapped:
+        refuse("leave out --shrink and --map", llm=llm, api_base=api_base)
     else:
-        _explain(case, run, llm=llm, api_base=api_base, as_json=as_json, **rights)
+        refuse("add --shrink or --map", budget=budget, out=out)
+    if llm is None:
+        refuse("requires --llm NAME", api_base=api_base)
+    case = case_of(run, requirement, shrunk=not shrunk)
+    if shrunk:
+        _shrink(case, rights, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
+    elif mapped:
+        _map(case, run, rights, budget=budget or _MAP_BUDGET, out=out, as_json=as_json)
+    else:
+        _explain(case, run, rights, llm=llm, api_base=api_base, as_json=as_json)
 
 
 @command()
@@ -141,7 +139,12 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
         judged.model.close()
     if replayed.status == "does not fit":
         raise CandidateError(replayed.text)
-    text = json.dumps(_replayed_json(replayed), indent=2) if as_json else replayed.text
+    content = {
+        "status": replayed.status,
+        "robustness": replayed.evaluation and replayed.evaluation.robustness,
+        "text": replayed.text,
+    }
+    text = as_shown(replayed.text, content, as_json=as_json)
     conclude(text, 1 if replayed.status == "violates" else 0)
 
 
@@ -150,7 +153,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
 @out_option("Directory to write; default: export in RUN's directory.", metavar="DIR")
 @click.option(
     "--store",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="DIR",
     help="Only store the counterexample in this folder, for pytest --falsifier.",
 )
@@ -174,28 +177,14 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
                 say(str(path))
 
 
-def _check_parts(*, shrunk: bool, mapped: bool, **groups: Mapping[str, object]) -> None:
-    """Refuse options of another part of ``explain``.
-
-    Raises:
-        click.UsageError: naming those that were given.
-    """
-    if shrunk and mapped:
-        raise click.UsageError("--shrink and --map cannot be combined; run one after the other")
-    applies = {"other": shrunk or mapped, "simpler": shrunk, "words": not (shrunk or mapped)}
-    reasons = {
-        "other": "add --shrink or --map",
-        "simpler": "applies to --shrink only",
-        "words": "leave out --shrink and --map",
-    }
-    for group, options in groups.items():
-        given = [name for name, value in options.items() if value is not None]
-        if given and not applies[group]:
-            raise click.UsageError(f"{', '.join(given)}: {reasons[group]}")
-
-
 def _shrink(
-    case: Case, *, budget: int, at_most: float | None, out: Path | None, as_json: bool, **rights: Any
+    case: Case,
+    rights: Mapping[str, Any],
+    *,
+    budget: int,
+    at_most: float | None,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
     from falsifier.counterexamples.shrink import shrink
@@ -225,15 +214,21 @@ def _shrink(
             if found.trajectory is not None:  # for reports, which simulate nothing
                 found.trajectory.save(file.with_suffix(".npz"))
         case.beside(EXPLANATION).unlink(missing_ok=True)  # it was about another input
-    if as_json:
-        content: dict[str, Any] = {"violated": found.violated}
-        content |= {"outcome": confirmation and confirmation.outcome}
-        content |= {"reason": confirmation and confirmation.reason}
-        content |= {**evaluation_json(found), "minimal": shrunk.minimal, "simulations": shrunk.simulations}
-        say(json.dumps(content | {"at_most": shrunk.at_most, "files": list(map(str, files))}, indent=2))
-        return
+    content = {
+        "violated": found.violated,
+        "outcome": confirmation and confirmation.outcome,
+        "reason": confirmation and confirmation.reason,
+        **evaluation_json(found),
+        "minimal": shrunk.minimal,
+        "simulations": shrunk.simulations,
+        "at_most": shrunk.at_most,
+        "files": list(map(str, files)),
+    }
     lines = [case.text] if case.is_miss else []
-    lines.append(_shrunk_line(problem, shrunk, budget))
+    end = f"the budget of {counted(budget, 'simulation')} is used up"
+    if shrunk.minimal:
+        end = "no simpler one found nearby"
+    lines.append(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
     if confirmation is not None:
         simpler = "this simpler input violates the requirement: " if case.is_miss else ""
         lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")
@@ -245,7 +240,7 @@ def _shrink(
     )
     lines += [f"  {line}" for line in candidate_lines(found.candidate, problem.space)]
     lines.append(f"  files          {', '.join(map(str, files))}")
-    say("\n".join(map(one_line, lines)))
+    say(as_shown("\n".join(map(one_line, lines)), content, as_json=as_json))
 
 
 def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
@@ -256,16 +251,14 @@ def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> lis
     return files if picture is None else [*files, picture]
 
 
-def _shrunk_line(problem: Problem, shrunk: "Shrunk", budget: int) -> str:
-    """Say how shrinking ended."""
-    end = "no simpler one found nearby"
-    if not shrunk.minimal:
-        end = f"the budget of {counted(budget, 'simulation')} is used up"
-    return f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}"
-
-
 def _explain(
-    case: Case, run: Path, *, llm: str | None, api_base: str | None, as_json: bool, **rights: Any
+    case: Case,
+    run: Path,
+    rights: Mapping[str, Any],
+    *,
+    llm: str | None,
+    api_base: str | None,
+    as_json: bool,
 ) -> None:
     """Print what broke, and what resetting each input alone comes to."""
     from falsifier.counterexamples.explain import explain, narrate
@@ -285,22 +278,25 @@ def _explain(
     with suppress(OSError):  # it is printed anyway
         write_whole(case.beside(EXPLANATION), f"{explanation.text}\n")
     words = narrate(explanation, chat) if chat else None
-    if as_json:
-        told = {"llm": llm, "words": words} if words else None
-        content: dict[str, Any] = {"violated": explanation.violated, "text": explanation.text}
-        content |= {"effects": [asdict(e) for e in explanation.effects], "about": str(case.place)}
-        content |= {"told_by": told, "picture": picture and str(picture)}
-        say(json.dumps(content, indent=2))
-        return
-    _say_about(case, problem, run)
-    say(explanation.text)
+    content = {
+        "violated": explanation.violated,
+        "text": explanation.text,
+        "effects": [asdict(effect) for effect in explanation.effects],
+        "about": str(case.place),
+        "told_by": {"llm": llm, "words": words} if words else None,
+        "picture": picture and str(picture),
+    }
+    lines = [*_about(case, problem, run), explanation.text]
     if words is not None:
-        say(f"\nIn the words of {llm}, which may be wrong:\n{words}")
+        lines.append(f"\nIn the words of {llm}, which may be wrong:\n{words}")
     if picture is not None:
-        say(f"picture: {picture}")
+        lines.append(f"picture: {picture}")
+    say(as_shown("\n".join(lines), content, as_json=as_json))
 
 
-def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool, **rights: Any) -> None:
+def _map(
+    case: Case, run: Path, rights: Mapping[str, Any], *, budget: int, out: Path | None, as_json: bool
+) -> None:
     """Draw the robustness around it."""
     from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
@@ -311,37 +307,31 @@ def _map(case: Case, run: Path, *, budget: int, out: Path | None, as_json: bool,
         )
     picture = case.beside("robustness-map.png") if out is None else checked_picture(out)
     points = isqrt(budget * _MAP_POINTS // _MAP_BUDGET)
+    samples = budget - points * points
     with _loaded(case, rights) as problem:
-        found = robustness_map(
-            problem, case.simulated(problem), samples=budget - points * points, points=points
-        )
+        found = robustness_map(problem, case.simulated(problem), samples=samples, points=points)
     save_figure(plot_robustness_map(found, problem.name), picture)
-    if as_json:
-        content = {
-            "original": found.original,
-            "smallest": found.smallest,
-            "persistence": [{"size": size, "share": share} for size, share in found.persistence],
-            "rank_correlations": {
-                c.label: r for c, r in zip(found.coordinates, found.influences, strict=True)
-            },
-            "about": str(case.place),
-            "picture": str(picture),
-        }
-        say(json.dumps(content, indent=2))
-        return
-    _say_about(case, problem, run)
-    say(f"{problem.name}: {found.text}")
-    say(f"  picture        {picture}")
+    labels = (coordinate.label for coordinate in found.coordinates)
+    content = {
+        "original": found.original,
+        "smallest": found.smallest,
+        "persistence": [{"size": size, "share": share} for size, share in found.persistence],
+        "rank_correlations": dict(zip(labels, found.influences, strict=True)),
+        "about": str(case.place),
+        "picture": str(picture),
+    }
+    lines = [*_about(case, problem, run), f"{problem.name}: {found.text}", f"  picture        {picture}"]
+    say(as_shown("\n".join(lines), content, as_json=as_json))
 
 
-def _say_about(case: Case, problem: Problem, named: Path) -> None:
+def _about(case: Case, problem: Problem, named: Path) -> list[str]:
     """Say what a text is about if that is not what was named."""
     if case.is_miss:
-        say(one_line(case.text))
-    elif case.place != named and case.is_shrunk:
-        say(f"This is about {case.place}, the shrunk counterexample:")
-        for line in candidate_lines(case.candidate, problem.space):
-            say(f"  {line}")
+        return [one_line(case.text)]
+    if case.place == named or not case.is_shrunk:
+        return []
+    lines = candidate_lines(case.candidate, problem.space)
+    return [f"This is about {case.place}, the shrunk counterexample:", *(f"  {line}" for line in lines)]
 
 
 @contextmanager
@@ -352,19 +342,9 @@ def _loaded(case: Case, rights: Mapping[str, Any]) -> Iterator[Problem]:
         warn(note)
     if withheld:
         warn(f"not allowed, as when this was recorded: {', '.join(withheld)}; --allow grants it")
-    try:
+    with closing(problem.model):
         yield problem
-    finally:
-        problem.model.close()
 
 
 def _inputs_line(evaluation: Evaluation) -> str:
     return f"{in_one_line(evaluation.candidate)}; robustness {signed(evaluation.robustness)}"
-
-
-def _replayed_json(replayed: Replayed) -> dict[str, Any]:
-    return {
-        "status": replayed.status,
-        "robustness": replayed.evaluation and replayed.evaluation.robustness,
-        "text": replayed.text,
-    }

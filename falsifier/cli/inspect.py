@@ -9,14 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.files import checked_picture, in_existing_folder
-from falsifier.cli.options import (
-    json_option,
-    out_option,
-    policy_changes,
-    policy_options,
-)
+from falsifier.cli.options import PATH, json_option, out_option, policy_changes, policy_options
 from falsifier.cli.output import say
 from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
@@ -40,7 +35,7 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
 
 
 @command()
-@click.argument("fmu", metavar="FILE", type=click.Path(path_type=Path))
+@click.argument("fmu", metavar="FILE", type=PATH)
 @click.option("--all", "everything", is_flag=True, help="Show all variables, including internal ones.")
 @click.option(
     "--check",
@@ -77,12 +72,10 @@ def info(
     from falsifier.fmu import read_info
 
     if fmu.suffix.lower() in SIMULINK:
-        if everything or checked:
-            raise click.UsageError("--all and --check apply to FMUs only")
+        refuse("applies to FMUs only", all=everything, check=checked, diagram=drawn)
         say(_simulink(fmu, names=names, as_json=as_json))
         return
-    if names:
-        raise click.UsageError("--names applies to Simulink files only")
+    refuse("applies to Simulink files only", names=names)
     source, changes = _named(fmu), policy_changes(options)
     if drawn or out:
         _check_diagram(fmu, drawn=drawn, alone=not (as_json or checked or everything), out=out)
@@ -134,7 +127,7 @@ def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
 
 
 @command()
-@click.argument("fmus", metavar="FMU...", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.argument("fmus", metavar="FMU...", type=PATH, nargs=-1, required=True)
 @out_option("Spec file to write; default: NAME.toml in the FMU's directory, or system.toml for several.")
 def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     """Write a starter spec, in which you fill in ranges and the requirement.

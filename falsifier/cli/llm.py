@@ -16,11 +16,7 @@ from falsifier.cli.llm_options import (
     llm_settings,
     variant_option,
 )
-from falsifier.cli.options import (
-    json_option,
-    problem_source,
-    requirement_options,
-)
+from falsifier.cli.options import PATH, json_option, problem_source, requirement_options
 from falsifier.cli.output import conclude, say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
@@ -41,7 +37,7 @@ if TYPE_CHECKING:
 @click.option(
     "--after",
     "directory",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="RUN",
     help="Run whose samples the prompt contains, whatever its engine; default: none.",
 )

@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from falsifier.cli.command import Decorator, Function, add
-from falsifier.cli.options import (
-    repeatable,
-)
+from falsifier.cli.command import Decorator, Function, add, refuse
+from falsifier.cli.options import repeatable
 from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
@@ -31,6 +29,7 @@ _EXPECTED = {
     "cache": "expected yes, or no to ignore stored replies",
     "reply": f"expected {' or '.join(get_args(ReplyKind))}",
 }
+_WITHOUT_LLM = "applies to language models only; add --llm NAME, or leave it out"
 # Words after an @ that are versions of a model, as Vertex AI has them.
 _VERSIONS = ("default", "latest")
 
@@ -140,7 +139,7 @@ def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
     pairs = options.pop("llm_options")
     asked = {name: options.pop(name) for name in _ASKED if name in options}
     if llm is None:
-        refuse_without_llm(**asked, llm_option=pairs)
+        refuse(_WITHOUT_LLM, **asked, llm_option=pairs)
         return None
     from pydantic import ValidationError
 
@@ -174,7 +173,7 @@ def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIM
 
     simulations, seconds, tokens, cost = (options.pop(name) for name in _LIMITS)
     if not asks:
-        refuse_without_llm(max_tokens=tokens, max_cost=cost)
+        refuse(_WITHOUT_LLM, max_tokens=tokens, max_cost=cost)
     return Budget(usual if simulations is None else simulations, seconds, tokens, cost)
 
 
@@ -193,20 +192,6 @@ def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
     if set(named) - {NOTHING} and used and not any(used):
         raise click.UsageError(
             "--context: applies to language models and to the engine surrogate; add --llm NAME, or drop it"
-        )
-
-
-def refuse_without_llm(**given: Any) -> None:
-    """Refuse options of a language model although none is named.
-
-    Raises:
-        click.UsageError: naming the options.
-    """
-    stray = [f"--{key.replace('_', '-')}" for key, value in given.items() if value]
-    if stray:
-        raise click.UsageError(
-            f"{', '.join(stray)}: applies to language models only; add --llm NAME, or drop "
-            f"{'it' if len(stray) == 1 else 'them'}"
         )
 
 

@@ -3,6 +3,7 @@
 Results go to stdout; messages for people go to stderr through ``views.terminal``.
 """
 
+import json
 import os
 import signal
 import sys
@@ -27,6 +28,11 @@ def say(text: str, *, nl: bool = True) -> None:
         OSError: if stdout cannot be written to.
     """
     click.echo(plain(text), nl=nl)
+
+
+def as_shown(text: str, content: object, *, as_json: bool) -> str:
+    """Return a result as text, or its content as JSON."""
+    return json.dumps(content, indent=2) if as_json else text
 
 
 def conclude(text: str, code: int, *, nl: bool = True) -> NoReturn:

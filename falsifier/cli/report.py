@@ -1,46 +1,42 @@
 """``falsifier report`` and ``falsifier coverage``: what a run or campaign has recorded."""
 
-import json
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from falsifier.analyses.coverage import coverage as coverage_of_run
+from falsifier.campaigns.analysis import load
 from falsifier.campaigns.archcomp import export
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.files import check_out, checked_picture, draw
-from falsifier.cli.options import (
-    directory_argument,
-    json_option,
-    out_option,
-)
-from falsifier.cli.output import say
+from falsifier.cli.options import PATH, directory_argument, json_option, out_option
+from falsifier.cli.output import as_shown, say
+from falsifier.core.literals import csv_text
+from falsifier.errors import SpecError
 from falsifier.record import manifest
+from falsifier.search.result import Columns, frame
 from falsifier.views.analyses_text import coverage_json, coverage_text
-from falsifier.views.report import html_report, junit_report, markdown_report, write_evaluations
+from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
 
 
 @command()
-@click.argument(
-    "directories", metavar="DIRECTORY...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
+@click.argument("directories", metavar="DIRECTORY...", nargs=-1, required=True, type=PATH)
 @out_option("Report to write; default: report.html in the first DIRECTORY.")
 @click.option("--markdown", is_flag=True, help="Markdown instead of HTML; printed on stdout without --out.")
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE", help="Also write JUnit XML.")
+@click.option("--junit", type=PATH, metavar="FILE", help="Also write JUnit XML.")
 @click.option(
     "--csv",
     "csv_file",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Also write every evaluation: inputs, robustness, critical time, status.",
 )
-@click.option(
-    "--parquet", type=click.Path(path_type=Path), metavar="FILE", help="The same as --csv in a Parquet file."
-)
+@click.option("--parquet", type=PATH, metavar="FILE", help="The same as --csv in a Parquet file.")
 @click.option(
     "--arch-comp",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Also write a CSV file in the ARCH-COMP validation format.",
 )
@@ -59,13 +55,14 @@ def report(
     Several directories are compared side by side: for example before and after a change, or two engines.
     """
     first, *others = directories
-    if others and (junit is not None or arch_comp is not None):
-        raise click.UsageError("--junit and --arch-comp take one DIRECTORY")
+    if others:
+        refuse("takes one DIRECTORY", junit=junit, arch_comp=arch_comp)
     if junit is not None:
         junit.write_text(junit_report(first), encoding="utf-8")
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
-    write_evaluations(directories, csv_file=csv_file, parquet=parquet)
+    if csv_file is not None or parquet is not None:
+        _write_evaluations(directories, csv_file, parquet)
     for written in filter(None, (junit, arch_comp, csv_file, parquet)):
         warn(f"{written} written")
     if markdown and out is None:
@@ -94,10 +91,28 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     picture = directory / "coverage.png" if out is None else checked_picture(out)
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
     drawn = draw(lambda: plot_coverage(found, name), picture)
-    if as_json:
-        content = {"requirements": name, **coverage_json(found), "picture": drawn and str(drawn)}
-        say(json.dumps(content, indent=2))
-        return
-    say(coverage_text(found, name))
-    if drawn is not None:
-        say(f"picture: {drawn}")
+    text = coverage_text(found, name) + (f"\npicture: {drawn}" if drawn else "")
+    content = {"requirements": name, **coverage_json(found), "picture": drawn and str(drawn)}
+    say(as_shown(text, content, as_json=as_json))
+
+
+def _write_evaluations(directories: Iterable[Path], csv_file: Path | None, parquet: Path | None) -> None:
+    """Write a row per evaluation: requirement, method and seed of its run, then what Run.columns gives.
+
+    What a run did not search has no value in its rows.
+    """
+    runs = [(run, run.columns()) for directory in directories for run in load(directory)]
+    names = dict.fromkeys(name for _, columns in runs for name in columns)
+    table: Columns = {name: [] for name in ("requirement", "method", "seed", *names)}
+    for run, columns in runs:
+        count = len(columns["simulation"])
+        about = {"requirement": run.requirement, "method": run.method.label, "seed": run.seed}
+        for name, values in table.items():
+            values += [about[name]] * count if name in about else columns.get(name, [None] * count)
+    if csv_file is not None:
+        csv_file.write_text(csv_text([table, *zip(*table.values(), strict=True)]), encoding="utf-8")
+    if parquet is not None:
+        try:
+            frame(table).to_parquet(parquet)
+        except ImportError:
+            raise SpecError("a Parquet file needs pyarrow: pip install 'falsifier[frames]'") from None

@@ -9,12 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.analyses.lint import LintFinding, lint
-from falsifier.cli.command import command
-from falsifier.cli.llm_options import (
-    connection_options,
-    llm_option,
-    llm_settings,
-)
+from falsifier.cli.command import command, refuse
+from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.options import (
     Parameterized,
     budget_option,
@@ -132,8 +128,7 @@ def formalize(
 
     settings = llm_settings(options)
     if settings is None:
-        if choose is not None:
-            raise click.UsageError("--choose requires --llm NAME, which proposes the readings")
+        refuse("requires --llm NAME, which proposes the readings", choose=choose)
         from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
         from falsifier.problem.unit_check import defined_units
 

@@ -8,15 +8,10 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
-from falsifier.cli.command import Command, command
-from falsifier.cli.llm_options import (
-    check_context,
-    context_option,
-    llm_options,
-    llm_settings,
-    read_budget,
-)
+from falsifier.cli.command import Command, command, refuse
+from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
 from falsifier.cli.options import (
+    PATH,
     budget_option,
     directory_argument,
     engine_option,
@@ -84,7 +79,7 @@ class _OneTarget(Command):
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
     "--fmu-log",
-    type=click.Path(path_type=Path),
+    type=PATH,
     metavar="FILE",
     help="Ask the FMU for messages in every simulation, and write them to this file.",
 )
@@ -177,18 +172,19 @@ def resume(
     from falsifier.views.progress import make_display
 
     if is_campaign(directory):
-        if budget is not None:
-            raise click.UsageError(
-                "--budget: the runs of a campaign keep their limit; --total simulations=N limits all of them"
-            )
+        refuse(
+            "the runs of a campaign keep their limit; --total simulations=N limits all of them", budget=budget
+        )
         resume_campaign(directory, jobs=jobs, executor=executor, limits=totals, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
-    if totals is not None or executor is not None or jobs > 1:
-        raise click.UsageError(
-            f"{directory}: --jobs, --executor and --total apply to campaigns only; a run keeps its number of "
-            "jobs and its limits, except --budget"
-        )
+    refuse(
+        f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
+        "--budget",
+        jobs=jobs > 1,
+        executor=executor,
+        total=totals,
+    )
     results: list[Result] = []
     with make_display(quiet=quiet) as display:
         for place in places:

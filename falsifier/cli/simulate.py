@@ -1,30 +1,20 @@
 """``falsifier simulate``: the user's own inputs, judged and drawn."""
 
-import csv
-import json
+from contextlib import closing
 from dataclasses import replace
-from io import StringIO
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
 from falsifier.cli.command import command
 from falsifier.cli.files import draw_evaluation
-from falsifier.cli.options import (
-    inputs_option,
-    json_option,
-    out_option,
-    problem_source,
-    requirement_options,
-)
-from falsifier.cli.output import conclude
+from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
+from falsifier.cli.output import as_shown, conclude
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
-from falsifier.core.literals import csv_cell, one_line
-from falsifier.core.model import Variable
+from falsifier.core.literals import csv_text, one_line
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
-from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation
@@ -33,9 +23,8 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
-from falsifier.views.text import evaluation_json, evaluation_lines
+from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, outcome_text
 
 
 @command()
@@ -53,30 +42,40 @@ def simulate(*, known: Path | None, out: Path | None, as_json: bool, **options: 
     """
     given = _numbers(options)
     source = problem_source(options)
-    file, stored = _split(known, source)
+    is_table = known is not None and known.suffix.lower() == ".csv"
+    stored = Candidate({}) if known is None or is_table else recorded_inputs(known, source.name)
     problem = load_source(source, searches=False)
     for note in rights_notes(problem.model):
         warn(note)
-    try:
-        driven = [v.name for v in problem.info.inputs]
-        signals = {name: _constant(value) for name, value in given.items() if name in driven}
-        parameters = {name: value for name, value in given.items() if name not in driven}
+    with closing(problem.model):
+        inputs = {v.name for v in problem.info.inputs}
+        read = _read(known, problem) if known is not None and is_table else {}
+        constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         evaluation = simulate_inputs(
             problem,
-            {**_read(file, problem), **stored.signals, **signals},
-            {**stored.parameters, **parameters},
+            {**read, **stored.signals, **constant},
+            {**stored.parameters, **{n: value for n, value in given.items() if n not in inputs}},
         )
-    finally:
-        problem.model.close()
-    if evaluation.trajectory is None or evaluation.verdict is None:
-        raise SimulationError(f"{problem.name}: the simulation {_ended(evaluation)}")
-    files = _written(problem, evaluation, evaluation.trajectory, out) if out else []
-    conclude(
-        json.dumps(_as_json(problem, evaluation, files), indent=2)
-        if as_json
-        else _as_text(problem, evaluation, files),
-        1 if evaluation.violated else 0,
-    )
+    if evaluation.verdict is None:
+        raise SimulationError(f"{problem.name}: the simulation {outcome_text(evaluation)}")
+    drawn = _with_own_ranges(problem, evaluation.candidate)
+    files = _written(problem, drawn, evaluation, out) if out else []
+    verdict = "violated" if evaluation.violated else "not violated"
+    lines = [
+        f"{problem.name}: {verdict} by these inputs ({evaluation.seconds:.2f} s)",
+        f"  requirement    {problem.requirement.formula}",
+        *fact_lines(evaluation_facts(drawn, evaluation)),
+        *([f"  files          {', '.join(map(str, files))}"] if files else []),
+    ]
+    content = {
+        "requirement": problem.name,
+        "formula": str(problem.requirement.formula),
+        "violated": evaluation.violated,
+        **evaluation_json(evaluation),
+        "files": list(map(str, files)),
+    }
+    text = "\n".join(map(one_line, lines))
+    conclude(as_shown(text, content, as_json=as_json), 1 if evaluation.violated else 0)
 
 
 def _numbers(options: dict[str, Any]) -> dict[str, float]:
@@ -96,21 +95,8 @@ def _numbers(options: dict[str, Any]) -> dict[str, float]:
     return numbers
 
 
-def _split(known: Path | None, source: ProblemSource) -> tuple[Path | None, Candidate]:
-    """Return the file of inputs, or what a counterexample or run holds; of the other, nothing."""
-    if known is None or known.suffix.lower() == ".csv":
-        return known, Candidate({})
-    return None, recorded_inputs(known, source.name)
-
-
-def _constant(value: float) -> Signal:
-    return Signal((0.0,), (value,), "constant")
-
-
-def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
+def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     """Read the file of inputs; say on stderr what of it is not used."""
-    if file is None:
-        return {}
     found = read_inputs(file, problem.info)
     stop_time = problem.experiment.stop_time
     if found.unused:
@@ -122,72 +108,32 @@ def _read(file: Path | None, problem: Problem) -> dict[str, Signal]:
     return dict(found.signals)
 
 
-def _range(variable: Variable, signal: Signal) -> tuple[float, float]:
-    """Return a range around a signal: the model's own, otherwise the signal's, wider if it is constant."""
-    lowest, highest = min(signal.values), max(signal.values)
-    wider = 1.0 if lowest == highest else 0.0
-    low, high = variable.limits
-    return lowest - wider if low is None else low, highest + wider if high is None else high
+def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
+    """Return the problem with the given inputs instead of the searched ones, for text and picture.
+
+    Ranges are those of the search or else of the model, as far as they are known, and hold all values.
+    """
+    searched = {r.name: r for r in problem.space.inputs}
+    inputs = []
+    for name, signal in candidate.signals.items():
+        own, variable = searched.get(name), problem.info[name]
+        limits = variable.limits if own is None else (own.low, own.high)
+        values = [*signal.values, *(limit for limit in limits if limit is not None)]
+        room = 1.0 if min(values) == max(values) else 0.0
+        low, high = min(values) - room, max(values) + room
+        if own is None:
+            own = InputRange(name, low, high, unit=variable.unit)
+        inputs.append(replace(own, low=low, high=high))
+    return replace(problem, space=SearchSpace(tuple(inputs), (), problem.space.stop_time))
 
 
-def _ended(evaluation: Evaluation) -> str:
-    how = "timed out" if evaluation.status == "timeout" else evaluation.status
-    return f"{how}: {evaluation.reason}"
-
-
-def _written(problem: Problem, evaluation: Evaluation, trajectory: Trajectory, out: Path) -> list[Path]:
+def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path) -> list[Path]:
     from falsifier.counterexamples.export.tables import input_table, write_csv
 
-    files = [write_whole(out / "trajectory.csv", _table(trajectory))]
+    trajectory = evaluation.trajectory
+    assert trajectory is not None, "what was judged has a trajectory"
+    rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
+    files = [write_whole(out / "trajectory.csv", csv_text([["time", *trajectory.names], *rows]))]
     files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))
-    picture = draw_evaluation(_drawn(problem, evaluation), evaluation, out / "trajectory.png")
+    picture = draw_evaluation(drawn, evaluation, out / "trajectory.png")
     return files if picture is None else [*files, picture]
-
-
-def _table(trajectory: Trajectory) -> str:
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["time", *map(csv_cell, trajectory.names)])
-    columns = [trajectory.times, *trajectory.columns.values()]
-    writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
-    return text.getvalue()
-
-
-def _drawn(problem: Problem, evaluation: Evaluation) -> Problem:
-    """Return the problem with the given inputs instead of the searched ones, for the picture."""
-    searched = {r.name: r for r in problem.space.inputs}
-    inputs = tuple(
-        _covering(searched[name], signal) if name in searched else _input_range(problem.info[name], signal)
-        for name, signal in evaluation.candidate.signals.items()
-    )
-    return replace(problem, space=SearchSpace(inputs, (), problem.space.stop_time))
-
-
-def _input_range(variable: Variable, signal: Signal) -> InputRange:
-    return InputRange(variable.name, *_range(variable, signal), unit=variable.unit)
-
-
-def _covering(searched: InputRange, signal: Signal) -> InputRange:
-    low, high = min(searched.low, *signal.values), max(searched.high, *signal.values)
-    return replace(searched, low=low, high=high)
-
-
-def _as_text(problem: Problem, evaluation: Evaluation, files: list[Path]) -> str:
-    shown = _drawn(problem, evaluation)
-    verdict = "violated" if evaluation.violated else "not violated"
-    lines = [f"{problem.name}: {verdict} by these inputs ({evaluation.seconds:.2f} s)"]
-    lines.append(f"  requirement    {problem.requirement.formula}")
-    lines += evaluation_lines(shown, evaluation)
-    if files:
-        lines.append(f"  files          {', '.join(map(str, files))}")
-    return "\n".join(map(one_line, lines))
-
-
-def _as_json(problem: Problem, evaluation: Evaluation, files: list[Path]) -> dict[str, Any]:
-    return {
-        "requirement": problem.name,
-        "formula": str(problem.requirement.formula),
-        "violated": evaluation.violated,
-        **evaluation_json(evaluation),
-        "files": list(map(str, files)),
-    }

@@ -13,12 +13,7 @@ from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_camp
 from falsifier.campaigns.published import PROTOCOL_SIMULATIONS
 from falsifier.cli.command import command
 from falsifier.cli.inspect import one_fmu
-from falsifier.cli.options import (
-    budget_option,
-    directory_argument,
-    json_option,
-    out_option,
-)
+from falsifier.cli.options import PATH, budget_option, directory_argument, json_option, out_option
 from falsifier.cli.output import conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
@@ -74,7 +69,7 @@ def _repair_run(directory: Path) -> list[str]:
 
 
 @command()
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu", type=PATH)
 @out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""

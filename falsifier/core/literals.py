@@ -5,8 +5,11 @@ code in a script, a formula in a spreadsheet, or markup in a report. ``repr``, `
 libraries do the rest.
 """
 
+import csv
 import json
 import re
+from collections.abc import Iterable
+from io import StringIO
 
 # What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
 # the direction of what follows.
@@ -111,6 +114,18 @@ def csv_cell(text: str) -> str:
     """
     cell = plain(text)
     return f"'{cell}" if cell.startswith(_FORMULA_STARTS) and not _NUMBER.fullmatch(cell) else cell
+
+
+def csv_text(rows: Iterable[Iterable[object]]) -> str:
+    r"""Return a table as comma-separated values; cells that are None are empty.
+
+    >>> csv_text([["time", "a,b"], [0.5, None]])
+    'time,"a,b"\\n0.5,\\n'
+    """
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerows(["" if cell is None else csv_cell(str(cell)) for cell in row] for row in rows)
+    return text.getvalue()
 
 
 def markdown_text(text: str) -> str:

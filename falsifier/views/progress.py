@@ -26,6 +26,7 @@ from falsifier.search.refine_levels import level_name, parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
+from falsifier.views.text import outcome_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -194,8 +195,7 @@ class News:
         """Tell a cause of failures once."""
         evaluation = event.evaluation
         if evaluation.status != "ok":
-            how = "timed out" if evaluation.status == "timeout" else evaluation.status
-            text = f"simulation {event.index + 1} {how}: {evaluation.reason}"
+            text = f"simulation {event.index + 1} {outcome_text(evaluation)}"
             yield from self._once(f"failed: {cause_of(evaluation.reason)}", text)
 
     def _once(self, key: str, text: str) -> Iterator[str]:

@@ -175,11 +175,6 @@ def _levels_json(result: Result) -> list[dict[str, Any]]:
     ]
 
 
-def evaluation_lines(problem: Problem, evaluation: Evaluation) -> list[str]:
-    """Say what decided an evaluation, and what was simulated, in the order of reports."""
-    return fact_lines(evaluation_facts(problem, evaluation))
-
-
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
     """Return what broke, the inputs, and what decided an evaluation."""
     candidate, verdict = evaluation.candidate, evaluation.verdict
@@ -232,6 +227,12 @@ def fact_lines(facts: Iterable[Fact]) -> list[str]:
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
     """Say what broke, and what made it necessary; nothing of what is not violated."""
     return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
+
+
+def outcome_text(evaluation: Evaluation) -> str:
+    """Say how a simulation that failed ended, and why."""
+    how = "timed out" if evaluation.status == "timeout" else evaluation.status
+    return f"{how}: {evaluation.reason}"
 
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:

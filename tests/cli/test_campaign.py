@@ -150,7 +150,7 @@ def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
         (["bench"], "expected either TARGETS (requirements or specs)"),
         (["bench", HARD, "--suite", "arch-comp"], "expected either TARGETS (requirements or specs)"),
         (["bench", HARD, "--parameterization", "free:1"], "applies to single runs only"),
-        (["bench", HARD, "--variant", "MP1"], "--variant requires --llm"),
+        (["bench", HARD, "--variant", "MP1"], "--variant: requires --llm"),
         (["bench", HARD, "--anonymous"], "--anonymous: applies to language models only"),
     ],
 )

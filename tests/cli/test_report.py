@@ -46,7 +46,7 @@ def test_directories_are_compared_in_one_page(command: Any, tmp_path: Path) -> N
     assert command("report", *runs[:2], "-o", "both.html").exit_code == 0
     assert "What differs" in (tmp_path / "both.html").read_text()
     refused = command("report", *runs[:2], "--junit", "j.xml")
-    assert refused.exit_code == 2 and "one DIRECTORY" in refused.output
+    assert refused.exit_code == 2 and "takes one DIRECTORY" in refused.output
 
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:

@@ -200,7 +200,7 @@ def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
     for option in (("--total", "simulations=8"), ("--jobs", "2")):
         refused = falsifier("resume", "run", *option, cwd=tmp_path)
         assert refused.code == 2
-        assert "apply to campaigns only" in refused.err
+        assert "applies to campaigns only" in refused.err
 
 
 def test_parameters_alone_cannot_be_refined(tmp_path: Path) -> None:

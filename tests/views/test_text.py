@@ -15,12 +15,7 @@ from falsifier.search.findings import Finding
 from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
-from falsifier.views.text import (
-    counterexample_name,
-    result_json,
-    result_text,
-    results_text,
-)
+from falsifier.views.text import counterexample_name, result_json, result_text, results_text
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 
 

@@ -1,13 +1,12 @@
-"""Reports on runs and campaigns: a self-contained HTML page, Markdown, JUnit XML, tables of evaluations.
+"""Reports on runs and campaigns: a self-contained HTML page, Markdown and JUnit XML.
 
 ::
 
     Path("report.html").write_text(html_report(Path("runs/nightly")), encoding="utf-8")
 """
 
-from falsifier.views.report.evaluations import write_evaluations
 from falsifier.views.report.junit import junit_report
 from falsifier.views.report.markdown import markdown_report
 from falsifier.views.report.page import html_report
 
-__all__ = ["html_report", "junit_report", "markdown_report", "write_evaluations"]
+__all__ = ["html_report", "junit_report", "markdown_report"]
