@@ -212,12 +212,10 @@ def _report_refusal(error: OSError) -> int:
     where = "" if error.filename is None else f"{error.filename}: "
     if error.errno in _EXHAUSTED:
         warn(f"falsifier: {where}{error.strerror}; {_EXHAUSTED[error.errno]}")
-        return _FAILED
-    if error.filename is None:
+    elif not where:
         warn(f"falsifier: {error}")
-        return _FAILED
-    warn(
-        f"falsifier: {where}{error.strerror}; choose a readable and writable location, for example with "
-        "--out DIR"
-    )
-    return 2
+    else:
+        cure = "choose a readable and writable location, for example with --out DIR"
+        warn(f"falsifier: {where}{error.strerror}; {cure}")
+        return 2
+    return _FAILED

@@ -139,7 +139,12 @@ def bench(
     )
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
-    problems = suite(suite_name, profile=profile) if suite_name else _problems(targets, profile)
+    # A spec without a requirement's name stands for all its requirements.
+    problems = (
+        suite(suite_name, profile=profile)
+        if suite_name
+        else [s for target in targets for s in sources_of(ProblemSource(target=target, profile=profile))]
+    )
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
     rights = policy_changes(options)
     problems = [
@@ -230,8 +235,8 @@ def resume_campaign(
 def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
     runs, published = load(directory), read_published()
-    for name, make in TABLES.items():
-        made = make(runs, published)
+    tables = {name: make(runs, published) for name, make in TABLES.items()}
+    for name, made in tables.items():
         if made.rows:
             write_whole(directory / f"table-{name}.md", made.markdown())
             write_whole(directory / f"table-{name}.csv", made.csv())
@@ -243,8 +248,7 @@ def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) 
     failed = outcome.progress.counts["failed"]
     if failed:
         warn(f"{counted(failed, 'run')} failed; to retry: {again}")
-    text = data if as_json else TABLES[table](runs, published).text()
-    conclude(text, 3 if failed or outcome.reason else 0, nl=not as_json)
+    conclude(data if as_json else tables[table].text(), 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _agree(request: CampaignRequest, *, yes: bool) -> None:
@@ -255,13 +259,6 @@ def _agree(request: CampaignRequest, *, yes: bool) -> None:
     warn(most.text)
     if not yes and most.cost != 0 and sys.stdin.isatty():
         click.confirm("Start?", abort=True, err=True)
-
-
-def _problems(targets: tuple[str, ...], profile: str | None) -> list[ProblemSource]:
-    """One source per requirement; a spec without a requirement's name stands for all its requirements."""
-    return [
-        source for target in targets for source in sources_of(ProblemSource(target=target, profile=profile))
-    ]
 
 
 def _kinds(

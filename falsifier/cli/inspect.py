@@ -2,7 +2,8 @@
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
+from contextlib import closing
+from dataclasses import asdict, replace
 from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ import click
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import checked_picture, in_existing_folder
 from falsifier.cli.options import PATH, json_option, out_option, policy_changes, policy_options
-from falsifier.cli.output import say
+from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo
@@ -23,7 +24,7 @@ from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.spec import read_spec
-from falsifier.views.model_text import NO_INTERFACE, info_json, info_text
+from falsifier.views.model_text import NO_INTERFACE, info_text, model_json
 
 if TYPE_CHECKING:
     from falsifier.fmu import System
@@ -77,8 +78,10 @@ def info(
         return
     refuse("applies to Simulink files only", names=names)
     source, changes = _named(fmu), policy_changes(options)
-    if drawn or out:
-        _check_diagram(fmu, drawn=drawn, alone=not (as_json or checked or everything), out=out)
+    if not drawn:
+        refuse("names the picture of --diagram; add --diagram", out=out)
+    else:
+        refuse("leave it out: --diagram shows connections only", json=as_json, check=checked, all=everything)
         if isinstance(source, Path):
             raise SpecError(f"{fmu} is a single FMU, which has no connections; --diagram draws systems")
         _draw_diagram(source, out)
@@ -86,21 +89,9 @@ def info(
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
     found = replace(found, notes=(*found.notes, _rights_note(*rights)))
-    if as_json:
-        say(info_json(found))
-        return
-    say(info_text(found, everything=everything))
-    if checked:
+    say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
+    if checked and not as_json:
         _print_convergence(source, found, *rights)
-
-
-def _check_diagram(fmu: Path, *, drawn: bool, alone: bool, out: Path | None) -> None:
-    if not drawn:
-        raise SpecError("--out names the picture of --diagram; add --diagram")
-    if not alone:
-        raise SpecError("--diagram shows connections only; leave out --json, --check and --all")
-    if out is not None and checked_picture(out).absolute() == fmu.absolute():
-        raise SpecError(f"{out} is the original, which is kept: choose another --out")
 
 
 def _draw_diagram(system: "System", out: Path | None) -> None:
@@ -112,18 +103,18 @@ def _draw_diagram(system: "System", out: Path | None) -> None:
         return
     from falsifier.views.plotting import plot_diagram, save_figure
 
-    save_figure(plot_diagram(found), out)
+    save_figure(plot_diagram(found), checked_picture(out))
     say(f"picture: {out}")
 
 
 def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
     from falsifier.context.simulink import names_text, read_diagram
-    from falsifier.views.model_text import simulink_json, simulink_text
+    from falsifier.views.model_text import simulink_text
 
     diagram = read_diagram(file)
-    if as_json:
-        return simulink_json(diagram)
-    return names_text(diagram) if names else simulink_text(diagram)
+    return as_shown(
+        names_text(diagram) if names else simulink_text(diagram), asdict(diagram), as_json=as_json
+    )
 
 
 @command()
@@ -196,11 +187,9 @@ def _print_convergence(
         model = FmuModel(source, interface=interface, allow=allow, deny=deny)
     else:
         model = replace(source, allow=allow, deny=deny)
-    try:
+    with closing(model):
         movements = step_convergence(model, experiment, signals)
         advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
-    finally:
-        model.close()
     say(
         f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s "
         f"({grid.reason}):"
@@ -208,11 +197,9 @@ def _print_convergence(
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
-        unit = f" {found[name].unit}" if found[name].unit else ""
-        say(
-            f"  {name} changes by at most {moved.largest:.3g}{unit}, at {moved.time:.4g} s "
-            f"({100 * moved.relative:.2f} % of its range)"
-        )
+        most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
+        share = f"{100 * moved.relative:.2f} % of its range"
+        say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({share})")
     if advice:
         say(f"  {advice}")
 

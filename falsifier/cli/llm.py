@@ -17,14 +17,16 @@ from falsifier.cli.llm_options import (
     variant_option,
 )
 from falsifier.cli.options import PATH, json_option, problem_source, requirement_options
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_source
+from falsifier.search import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
     from falsifier.llm.messages import Message, Tool
     from falsifier.problem.problem import Problem
+    from falsifier.record.manifest import Manifest
     from falsifier.record.records import Record
 
 
@@ -82,12 +84,13 @@ def prompt(
     asked = llm_settings({"llm": "", "llm_options": llm_options})
     assert asked is not None
     problem = load_source(problem_source(options))
+    records, evaluations = [], {}
+    simulations: int | None = DEFAULT_SIMULATIONS
     if directory:
-        _check_same(directory, problem)
-    records = read_journal(directory) if directory else []
-    evaluations = recorded_evaluations(directory, records) if directory else {}
+        simulations = _told_by(directory, problem).request.budget.simulations
+        records = read_journal(directory)
+        evaluations = recorded_evaluations(directory, records)
     told = list(evaluations.values())[: None if at is None else at - 1]
-    limit = _limit(directory)
     settings = HybridSettings()
     count = 1 if engine == "llm" else settings.count if told else 1
     messages = preview(
@@ -97,17 +100,18 @@ def prompt(
         count=count,
         anonymous=anonymous,
         reply=asked.reply,
-        simulations=limit,
+        simulations=simulations,
         doubtful=doubtful_confirmations(problem, records, evaluations),
         lessons=_lessons(records) if at is None else "",
     )
     tools: tuple[Tool, ...] = ()
     if engine == "hybrid" and told:
-        tool = preview_tool(
-            problem, calls=settings.what_if_calls, variant=variant, anonymous=anonymous, reply=asked.reply
-        )
-        tools = (tool,)
-    say(_as_json(messages, tools) if as_json else _as_text(messages, tools))
+        calls = settings.what_if_calls
+        tools = (preview_tool(problem, calls=calls, variant=variant, anonymous=anonymous, reply=asked.reply),)
+    sent: Any = [{"role": message.role, "content": message.content} for message in messages]
+    if tools:
+        sent = {"messages": sent, "tools": [tool.model_dump() for tool in tools]}
+    say(as_shown(_as_text(messages, tools), sent, as_json=as_json))
 
 
 def _lessons(records: Sequence["Record"]) -> str:
@@ -121,24 +125,21 @@ def _lessons(records: Sequence["Record"]) -> str:
     return next((lessons for lessons in told if lessons), "")
 
 
-def _limit(directory: Path | None) -> int | None:
-    """Maximum number of simulations of a run, or of one with the usual budget."""
-    from falsifier.record import manifest
-    from falsifier.search import DEFAULT_SIMULATIONS
+def _told_by(directory: Path, problem: "Problem") -> "Manifest":
+    """Return what a run was, whose samples are those of the problem's model and requirement.
 
-    return manifest.read(directory).request.budget.simulations if directory else DEFAULT_SIMULATIONS
-
-
-def _check_same(directory: Path, problem: "Problem") -> None:
-    """Check that a run's samples are those of the problem's model and requirement."""
+    Raises:
+        SpecError: if they are others.
+    """
     from falsifier.record import manifest
 
     described = manifest.read(directory)
-    if (described.model, True) != (problem.info.name, problem.name in described.names):
-        raise SpecError(
-            f"{directory} is a run of {', '.join(described.names)} on the model {described.model}, not of "
-            f"{problem.name} on {problem.info.name}"
-        )
+    if described.model == problem.info.name and problem.name in described.names:
+        return described
+    raise SpecError(
+        f"{directory} is a run of {', '.join(described.names)} on the model {described.model}, not of "
+        f"{problem.name} on {problem.info.name}"
+    )
 
 
 def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
@@ -167,14 +168,10 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     return "\n\n".join(parts)
 
 
-def _as_json(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
-    sent = [{"role": message.role, "content": message.content} for message in messages]
-    return json.dumps(
-        {"messages": sent, "tools": [t.model_dump() for t in tools]} if tools else sent, indent=2
-    )
-
-
 def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
+    """The messages, the tools, and how many tokens they have."""
+    from falsifier.llm.usage import count_tokens
+
     parts = [f"--- {message.role} ---\n{message.content}" for message in messages]
     if tools:
         parts.append(
@@ -185,20 +182,14 @@ def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
         f"arguments: {json.dumps(tool.parameters)}"
         for tool in tools
     ]
-    parts.append(f"--- size ---\n{_size(messages)}")
-    return "\n\n".join(parts)
-
-
-def _size(messages: Sequence["Message"]) -> str:
-    """Tokens, and how many of them a provider can keep from question to question."""
-    from falsifier.llm.usage import count_tokens
-
+    # What a provider can keep from question to question.
     constant, changing = (sum(count_tokens(m.content) for m in part) for part in (messages[:1], messages[1:]))
     total = constant + changing
-    return (
-        f"{counted(total, 'token')}; the first {constant} of them ({constant / total:.0%}) are the same in "
-        "every question of a run"
+    parts.append(
+        f"--- size ---\n{counted(total, 'token')}; the first {constant} of them ({constant / total:.0%}) are "
+        "the same in every question of a run"
     )
+    return "\n\n".join(parts)
 
 
 @command()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import click
 
 from falsifier.cli.command import Decorator, Function, add, refuse
-from falsifier.cli.options import repeatable
+from falsifier.cli.options import option
 from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
@@ -35,16 +35,13 @@ _VERSIONS = ("default", "latest")
 
 
 def llm_option(*, multiple: bool = False) -> Decorator:
-    return click.option(
+    return option(
         "--llm",
-        "llms" if multiple else "llm",
+        "llm",
+        "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b, or a model file (.gguf); @EFFORT "
+        f"is how much it reasons: {', '.join(get_args(Effort))}.",
         multiple=multiple,
         metavar="NAME[@EFFORT]",
-        help=repeatable(
-            "Language model, e.g. openai/gpt-5-mini or ollama_chat/gpt-oss:20b, or a model file (.gguf); "
-            f"@EFFORT is how much it reasons: {', '.join(get_args(Effort))}.",
-            multiple=multiple,
-        ),
     )
 
 
@@ -60,15 +57,12 @@ context_option = click.option(
 
 
 def variant_option(*, multiple: bool = False) -> Decorator:
-    return click.option(
+    return option(
         "--variant",
-        "variants" if multiple else "variant",
+        "variant",
+        f"Prompt variant; default: {DEFAULT_VARIANT}, or {CONTEXT_VARIANT} with context files.",
         multiple=multiple,
         metavar="MP1..MP6",
-        help=repeatable(
-            f"Prompt variant; default: {DEFAULT_VARIANT}, or {CONTEXT_VARIANT} with context files.",
-            multiple=multiple,
-        ),
     )
 
 

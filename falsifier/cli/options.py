@@ -43,20 +43,24 @@ class Parameterized(NamedTuple):
     shortest_piece: float | None = None
 
 
+def option(flag: str, name: str, text: str, *, multiple: bool, **more: Any) -> Decorator:
+    """Option that some commands take once, and others repeatedly under a name in the plural."""
+    if multiple:
+        name, text = f"{name}s", f"{text} Repeatable."
+    return click.option(flag, name, multiple=multiple, help=text, **more)
+
+
 def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PARAMETERIZATION) -> Decorator:
-    return click.option(
+    return option(
         "--parameterization",
-        "parameterizations" if multiple else "parameterized",
+        "parameterization",
+        "free: engines may choose control points within the spec's limits; with SECONDS, those of every "
+        "input, in pieces at least this long; fixed: the spec's own. PROFILE: a profile of the spec.",
         multiple=multiple,
         metavar="[PROFILE,]free[:SECONDS]|fixed",
         type=parameterized,
         default=None if multiple else default,
         show_default=default if multiple else True,
-        help=repeatable(
-            "free: engines may choose control points within the spec's limits; with SECONDS, those of every "
-            "input, in pieces at least this long; fixed: the spec's own. PROFILE: a profile of the spec.",
-            multiple=multiple,
-        ),
     )
 
 
@@ -245,7 +249,7 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
 
     changes = changes_from_options(**{name: options.pop(name) for name in _CHANGES})
     taken = {name: options.pop(name) for name in ("target", "stl")}
-    chosen, template = options.pop("parameterized"), options.pop("template")
+    chosen, template = options.pop("parameterization"), options.pop("template")
     source = source_of(chosen=chosen, changes=changes, context=options.pop("context", ()), **taken)
     if template is not None and source.stl is not None:
         raise click.UsageError("--stl and --template both state the requirement; drop one of them")
@@ -262,16 +266,13 @@ def with_template(source: "ProblemSource", template: str | None) -> "ProblemSour
 
 
 def engine_option(*, multiple: bool = False) -> Decorator:
-    return click.option(
+    return option(
         "--engine",
-        "engines" if multiple else "engine",
+        "engine",
+        f"Search engine: {', '.join(ENGINES)}. Default: {DEFAULT_ENGINE}, or the language model if --llm is "
+        "given.",
         multiple=multiple,
         metavar="NAME",
-        help=repeatable(
-            f"Search engine: {', '.join(ENGINES)}. Default: {DEFAULT_ENGINE}, or the language model if "
-            "--llm is given.",
-            multiple=multiple,
-        ),
     )
 
 
@@ -366,17 +367,14 @@ executor_option = click.option(
 
 
 def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
-    return click.option(
+    return option(
         "--inputs",
-        "known",
-        type=PATH,
+        "place",
+        f"{text}: a CSV file (time in s, then a column for each input), a counterexample, or the best sample "
+        "of a run.",
         multiple=multiple,
+        type=PATH,
         metavar="u.csv|counterexample.json|RUN",
-        help=repeatable(
-            f"{text}: a CSV file (time in s, then a column for each input), a counterexample, or the best "
-            "sample of a run.",
-            multiple=multiple,
-        ),
     )
 
 
@@ -398,15 +396,7 @@ def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
 
 
-quiet_option = click.option(
-    "--quiet",
-    is_flag=True,
-    callback=lambda context, _option, quiet: _silence(context, quiet=quiet),
-    help="Do not show progress.",
-)
-
-
-def _silence(context: click.Context, *, quiet: bool) -> bool:
+def _silence(context: click.Context, _option: click.Parameter, quiet: bool) -> bool:  # noqa: FBT001
     """Suppress notes of the simulating processes, such as that code is compiled, until the command ends."""
     if quiet:
         logger = logging.getLogger("falsifier.fmu")
@@ -415,6 +405,4 @@ def _silence(context: click.Context, *, quiet: bool) -> bool:
     return quiet
 
 
-def repeatable(text: str, *, multiple: bool) -> str:
-    """Return the help of an option, which says if it may be given several times."""
-    return f"{text} Repeatable." if multiple else text
+quiet_option = click.option("--quiet", is_flag=True, callback=_silence, help="Do not show progress.")

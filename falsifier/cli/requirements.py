@@ -1,6 +1,5 @@
 """``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -22,7 +21,7 @@ from falsifier.cli.options import (
     template_option,
     with_template,
 )
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, parameterization_text
@@ -47,7 +46,7 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 )
 @json_option
 def check(
-    *, target: str, parameterized: Parameterized, template: str | None, budget: int, as_json: bool
+    *, target: str, parameterization: Parameterized, template: str | None, budget: int, as_json: bool
 ) -> None:
     """Check a spec file, and find requirements that say nothing.
 
@@ -58,7 +57,7 @@ def check(
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = with_template(source_of(target, parameterized), template)
+    source = with_template(source_of(target, parameterization), template)
     if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
         raise SpecError(
             f"{target}: no requirement to check; add --template 'NAME KEY=VALUE ...', or give a spec "
@@ -68,7 +67,7 @@ def check(
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0
     if as_json:
-        conclude(json.dumps([finding.as_json() for finding in findings], indent=2), code)
+        conclude(as_shown("", [finding.as_json() for finding in findings], as_json=True), code)
     sources = [source] if source.stl is not None else sources_of(source)
     problems = [load_source(each) for each in sources if each.name not in invalid]
     for finding in findings:
@@ -124,25 +123,12 @@ def formalize(
     Without --llm, templates that fit an English sentence are shown, and nothing is written.
     """
     from falsifier.problem.writing import subject_of, with_requirement
-    from falsifier.views.analyses_text import advice_json, advice_text, formalized_json, formalized_text
+    from falsifier.views.analyses_text import formalized_json, formalized_text
 
     settings = llm_settings(options)
     if settings is None:
         refuse("requires --llm NAME, which proposes the readings", choose=choose)
-        from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
-        from falsifier.problem.unit_check import defined_units
-
-        problem = subject_of(target).problem
-        advice = advised_templates(sentence, problem.info, defined_units(problem.model))
-        if as_json:
-            say(json.dumps(advice_json(sentence, advice), indent=2))
-        elif advice:
-            say(advice_text(sentence, advice))
-        if not advice:
-            raise SpecError(
-                f"no template fits all words and numbers of this sentence; {ENGLISH_ONLY}"
-                + (f"\nnote: {note}" if (note := hint(sentence)) else "")
-            )
+        _advise(target, sentence, as_json=as_json)
         return
     if choose is not None or name is not None or out is not None:  # before anything is paid for
         subject = subject_of(target)
@@ -150,10 +136,9 @@ def formalize(
     from falsifier.analyses.formalize import formalize as ask
 
     found = ask(target, sentence, settings)
-    written = None
     if as_json:
         written = None if choose is None else _write(found, choose, name, out)
-        say(json.dumps(formalized_json(found) | {"written": written and list(written)}, indent=2))
+        say(as_shown("", formalized_json(found) | {"written": written}, as_json=True))
         return
     say(formalized_text(found))
     if choose is None and _may_ask() and _can_write(found.subject, out):
@@ -163,6 +148,29 @@ def formalize(
     else:
         file, given = _write(found, choose, name, out)
         say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
+
+
+def _advise(target: str, sentence: str, *, as_json: bool) -> None:
+    """Print the templates that fit a sentence.
+
+    Raises:
+        SpecError: if none does.
+    """
+    from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
+    from falsifier.problem.unit_check import defined_units
+    from falsifier.problem.writing import subject_of
+    from falsifier.views.analyses_text import advice_json, advice_text
+
+    problem = subject_of(target).problem
+    advice = advised_templates(sentence, problem.info, defined_units(problem.model))
+    if advice or as_json:
+        say(as_shown(advice_text(sentence, advice), advice_json(sentence, advice), as_json=as_json))
+    if not advice:
+        note = hint(sentence)
+        raise SpecError(
+            f"no template fits all words and numbers of this sentence; {ENGLISH_ONLY}"
+            + (f"\nnote: {note}" if note else "")
+        )
 
 
 def _may_ask() -> bool:
@@ -185,7 +193,7 @@ def _write(found: "Formalized", number: int, name: str | None, out: Path | None)
     from falsifier.problem.writing import with_requirement
 
     if number > len(found.readings):
-        raise SpecError(f"--choose {number}: there {_are(len(found.readings))} only")
+        raise SpecError(f"--choose {number}: expected 1 to {len(found.readings)}, the number of a reading")
     file = _file(found.subject, out)
     text, given = with_requirement(
         found.subject,
@@ -219,7 +227,3 @@ def _can_write(subject: "Subject", out: Path | None) -> bool:
     except SpecError:
         return False
     return True
-
-
-def _are(count: int) -> str:
-    return f"{'is' if count == 1 else 'are'} {counted(count, 'reading')}"

@@ -1,6 +1,5 @@
 """``falsifier run`` and ``falsifier resume``."""
 
-import json
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
@@ -27,7 +26,7 @@ from falsifier.cli.options import (
     seed_option,
     total_option,
 )
-from falsifier.cli.output import conclude
+from falsifier.cli.output import as_shown, conclude
 from falsifier.core.files import file_name
 from falsifier.errors import FalsifierError, JournalError
 from falsifier.views.terminal import warn
@@ -89,7 +88,7 @@ def run(
     engine: str | None,
     seed: int,
     jobs: int,
-    known: tuple[Path, ...],
+    places: tuple[Path, ...],
     refine: bool,
     quiet: bool,
     out: Path | None,
@@ -120,10 +119,10 @@ def run(
     sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources
     start_from = []
-    if known:
+    if places:
         searched = loaded = [load_source(each) for each in sources]
         (fitting,) = widened(loaded[:1]) if refine else loaded[:1]
-        start_from = [_known(place, fitting) for place in known]
+        start_from = [_known(place, fitting) for place in places]
     with make_display(quiet=quiet) as display:
         results = falsify(
             searched,
@@ -218,13 +217,11 @@ def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
             _write_counterexamples(result, result.directory)
     for reason in {result.unrecorded for result in results} - {""}:
         warn(f"falsifier: the end of the run could not be recorded: {reason}")
-    if as_json:
-        shown = [result_json(result) for result in results]
-        text = json.dumps(shown[0] if len(shown) == 1 else shown, indent=2)
-    else:
-        text = result_text(results[0]) if len(results) == 1 else results_text(results)
+    text = result_text(results[0]) if len(results) == 1 else results_text(results)
+    shown = [result_json(result) for result in results]
     statuses = {result.status for result in results}
-    conclude(text, next(code for status, code in _EXIT_CODES.items() if status in statuses))
+    code = next(code for status, code in _EXIT_CODES.items() if status in statuses)
+    conclude(as_shown(text, shown[0] if len(shown) == 1 else shown, as_json=as_json), code)
 
 
 def _write_counterexamples(result: "Result", directory: Path) -> None:

@@ -32,7 +32,7 @@ from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, 
 @inputs_option("Inputs to simulate")
 @out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
 @json_option
-def simulate(*, known: Path | None, out: Path | None, as_json: bool, **options: Any) -> None:
+def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: Any) -> None:
     """Simulate your own inputs and judge the requirement; ranges of the search do not apply.
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), or an FMU with --stl. Inputs that
@@ -42,14 +42,14 @@ def simulate(*, known: Path | None, out: Path | None, as_json: bool, **options: 
     """
     given = _numbers(options)
     source = problem_source(options)
-    is_table = known is not None and known.suffix.lower() == ".csv"
-    stored = Candidate({}) if known is None or is_table else recorded_inputs(known, source.name)
+    is_table = place is not None and place.suffix.lower() == ".csv"
+    stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
     for note in rights_notes(problem.model):
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}
-        read = _read(known, problem) if known is not None and is_table else {}
+        read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         evaluation = simulate_inputs(
             problem,

@@ -14,7 +14,7 @@ from falsifier.campaigns.published import PROTOCOL_SIMULATIONS
 from falsifier.cli.command import command
 from falsifier.cli.inspect import one_fmu
 from falsifier.cli.options import PATH, budget_option, directory_argument, json_option, out_option
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.counterexamples.store import load
@@ -105,26 +105,23 @@ def validate(*, file: Path, budget: int, as_json: bool) -> None:
     Exit codes: 0 all accepted, 1 some rejected, 2 wrong usage or file.
     """
     findings = check_rows(read_rows(file), budget=budget)
-    if as_json:
-        text = json.dumps([_finding_json(f) for f in findings], indent=2)
-    else:
-        accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
-        text = "\n".join([*map(_finding_line, findings), accepted])
-    conclude(text, 0 if all(f.holds for f in findings) else 1)
+    accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
+    text = "\n".join([*map(_finding_line, findings), accepted])
+    content = [
+        {
+            "row": f.row.number,
+            "requirement": f.row.requirement,
+            "holds": f.holds,
+            "robustness": f.robustness,
+            "claimed": f.row.robustness,
+            "reason": f.reason,
+        }
+        for f in findings
+    ]
+    conclude(as_shown(text, content, as_json=as_json), 0 if all(f.holds for f in findings) else 1)
 
 
 def _finding_line(f: Revalidated) -> str:
     rejected = "rejected: " if f.robustness is None else ""  # without a simulation the claim is invalid
     robustness = "" if f.robustness is None else f", robustness {signed(f.robustness)}"
     return one_line(f"row {f.row.number}, {f.row.requirement}: {rejected}{f.reason}{robustness}")
-
-
-def _finding_json(finding: Revalidated) -> dict[str, object]:
-    return {
-        "row": finding.row.number,
-        "requirement": finding.row.requirement,
-        "holds": finding.holds,
-        "robustness": finding.robustness,
-        "claimed": finding.row.robustness,
-        "reason": finding.reason,
-    }

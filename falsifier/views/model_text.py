@@ -3,10 +3,9 @@
 The tables are plain text: a table library needs minutes for the 100,000 variables of large models.
 """
 
-import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import counted
@@ -35,12 +34,12 @@ def info_text(info: ModelInfo, *, everything: bool = False) -> str:
     return "\n".join(_lines(info, everything=everything))
 
 
-def info_json(info: ModelInfo) -> str:
-    """Return the description of a model as JSON."""
+def model_json(info: ModelInfo) -> dict[str, Any]:
+    """Convert the description of a model to a value that can be dumped as one JSON object."""
     content = {field.name: getattr(info, field.name) for field in fields(info)}
     names = [field.name for field in fields(Variable)]
     content["variables"] = [{name: getattr(v, name) for name in names} for v in info.variables]
-    return json.dumps(content, indent=2)
+    return content
 
 
 def _lines(info: ModelInfo, *, everything: bool) -> Iterator[str]:
@@ -112,11 +111,6 @@ def simulink_text(diagram: "Diagram") -> str:
         f"{counted(len(systems), 'system')}, {counted(len(diagram.charts), 'chart')}"
     )
     return f"{size}\n{structure_text(diagram)}"
-
-
-def simulink_json(diagram: "Diagram") -> str:
-    """Return the content of a diagram as JSON."""
-    return json.dumps(asdict(diagram), indent=2)
 
 
 # Maximum number of inputs, and of outputs, that are shown of a component.

@@ -141,18 +141,18 @@ def test_info_draws_a_system_as_text_and_as_a_picture(tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (("AT", "--diagram"), "AT is a single FMU, which has no connections; --diagram draws systems"),
-        (("SharedFeeder", "--out", "s.svg"), "--out names the picture of --diagram; add --diagram"),
+        (("SharedFeeder", "--out", "s.svg"), "--out: names the picture of --diagram; add --diagram"),
         (
             ("SharedFeeder", "--diagram", "--out", "s.txt"),
             "s.txt: expected a file name that ends in .svg, .png",
         ),
-        (("SharedFeeder", "--diagram", "--json"), "leave out --json, --check and --all"),
+        (("SharedFeeder", "--diagram", "--json"), "--json: leave it out"),
         (("SharedFeeder", "--diagram", "--out", "no/s.svg"), "no/s.svg: no such folder no"),
     ],
 )
 def test_info_says_why_it_does_not_draw(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:
     done = falsifier("info", *arguments, cwd=tmp_path)
-    assert done.code == 2 and said in done.err and done.err.count("\n") == 1
+    assert done.code == 2 and said in done.err
 
 
 def test_info_of_a_simulink_file(tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ def test_wrong_choices_are_errors(tmp_path: Path) -> None:
     assert (bundled.code, taken.code, second.code) == (2, 2, 2)
     assert "--out" in bundled.err
     assert "the spec has a requirement 'R' already; choose another --name" in taken.err
-    assert "--choose 2: there is 1 reading only" in second.err
+    assert "--choose 2: expected 1 to 1" in second.err
 
 
 def test_without_a_language_model_a_template_is_proposed(tmp_path: Path) -> None:
