@@ -1,7 +1,7 @@
 """Writing specs: starters for an FMU, with comments on what to fill in, and requirements added to a spec."""
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 from os.path import relpath
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Item, Table
+from tomlkit.items import Item
 
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
@@ -49,160 +49,128 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
         SpecError: if there is nothing to search, or nothing to write a requirement about.
     """
     inputs = [v for v in info.inputs if v.kind != "string"]
-    tunable = _tunable(info)
+    settable = [v for v in info.variables if v.settable and v.kind != "string" and v.causality != "input"]
+    # Parameters, or else start values; real ones first.
+    tunable = [v for v in settable if v.causality == "parameter"] or settable
+    tunable.sort(key=lambda v: v.kind != "real")
     if not inputs and not tunable:
         raise SpecError(
             f"{info.name}: nothing to search: the {info.noun} has no input, parameter or start value to set"
         )
-    document = tomlkit.document()
-    document.add(_comment(f"{info.name}: {info.description}" if info.description else info.name))
-    document.add(tomlkit.nl())
+    sections = [_comment(f"{info.name}: {info.description}" if info.description else info.name)]
+    model = ["[model]"]
     if isinstance(fmu, Path):
-        document.add("model", _model_table(fmu, info))
+        model += [f"fmu = {_toml(fmu.as_posix())}"]
+        model += [f"interface = {_toml(default_interface(info) or 'co-simulation')}"]
     else:
-        _add_components(document, fmu, info)
-    if inputs:
-        sections = tomlkit.table(is_super_table=True)
-        free = _freedom(info)
-        for v in inputs:
-            sections.add(v.name, _input_table(v, free))
-        document.add("inputs", sections)
+        sections += _components(fmu, info)
+    stop_time = info.stop_time or DEFAULT_STOP_TIME
+    doubt = "" if info.stop_time else f"the {info.noun} specifies none: check this"
+    model += [_noted(f"stop_time = {_toml(stop_time)}", doubt)]
+    model += ["# output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time"]
+    # The limits that fit the placeholder requirement, whose window is the whole simulation.
+    step = choose_grid(stop_time, fmu_step=info.step_size).interval
+    free = default_freedom((), stop_time=stop_time, step=step)
+    sections += ["\n".join(model), *(_input(v, free) for v in inputs)]
     if tunable:
-        document.add("parameters", _parameters_table(tunable, searched=() if inputs else tunable[:1]))
-    requirements = tomlkit.table(is_super_table=True)
-    requirements.add(_STARTED, _requirement_table(info))
-    document.add("requirements", requirements)
-    return tomlkit.dumps(document)
+        sections.append(_parameters(tunable, searched=() if inputs else tunable[:1]))
+    sections.append(_requirement(info, stop_time))
+    return "\n\n".join(sections) + "\n"
 
 
-def _tunable(info: ModelInfo) -> list[Variable]:
-    """Return the parameters that can be set, or else the start values; real ones first."""
-    settable = [v for v in info.variables if v.settable and v.kind != "string" and v.causality != "input"]
-    parameters = [v for v in settable if v.causality == "parameter"]
-    return sorted(parameters or settable, key=lambda v: v.kind != "real")
-
-
-def _add_components(document: tomlkit.TOMLDocument, fmus: Mapping[str, Path], info: ModelInfo) -> None:
-    components = tomlkit.table(is_super_table=True)
+def _components(fmus: Mapping[str, Path], info: ModelInfo) -> Iterator[str]:
     for name, path in fmus.items():
-        section = tomlkit.table()
-        section.add("fmu", path.as_posix())
-        section.add(_comment("step = SECONDS  # of its own; default: the communication step"))
-        section.add(tomlkit.nl())
-        components.add(name, section)
-    document.add("components", components)
-    connections = tomlkit.table()
-    connections.add(_comment("INPUT = OUTPUT; an input that is connected needs no [inputs] section below:"))
+        yield (
+            f"[components.{_key(name)}]\nfmu = {_toml(path.as_posix())}\n"
+            "# step = SECONDS  # of its own; default: the communication step"
+        )
+    lines = ["INPUT = OUTPUT; an input that is connected needs no [inputs] section below:"]
     for v in info.inputs:
-        component = v.name.removesuffix(_local(v.name))
+        component, local = v.name.removesuffix(_local(v.name)), _local(v.name)
         others = [o.name for o in info.outputs if o.kind == v.kind and not o.name.startswith(component)]
-        near = [o for o in others if _local(o) == _local(v.name)]
+        near = [o for o in others if _local(o) == local]
         shown = " or ".join(f'"{o}"' for o in near or others[:_SHOWN_VARIABLES])
-        connections.add(_comment(f'"{v.name}" = {shown or "OUTPUT"}'))
-    connections.add(tomlkit.nl())
-    document.add("connections", connections)
-    document.add("model", _experiment_table(tomlkit.table(), info))
+        lines.append(f'"{v.name}" = {shown or "OUTPUT"}')
+    yield "\n".join(["[connections]", *map(_comment, lines)])
 
 
 def _local(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def _model_table(fmu: Path, info: ModelInfo) -> Table:
-    table = tomlkit.table()
-    table.add("fmu", fmu.as_posix())
-    table.add("interface", default_interface(info) or "co-simulation")
-    return _experiment_table(table, info)
-
-
-def _experiment_table(table: Table, info: ModelInfo) -> Table:
-    doubt = "" if info.stop_time else f"the {info.noun} specifies none: check this"
-    table.add("stop_time", _noted(info.stop_time or DEFAULT_STOP_TIME, doubt))
-    table.add(
-        _comment("output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time")
-    )
-    table.add(tomlkit.nl())
-    return table
-
-
-def _input_table(v: Variable, free: FreeSection) -> Table:
-    table = tomlkit.table()
+def _input(v: Variable, free: FreeSection) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
-    for line in (meaning, items_text(v) if v.literals else ""):
-        if line:
-            table.add(_comment(line))
-    low, high = _guessed(v)
+    lines = [f"[inputs.{_key(v.name)}]"]
+    lines += [_comment(line) for line in (meaning, items_text(v) if v.literals else "") if line]
+    low, high = v.limits
+    # What the FMU leaves open is one unit away from what it states.
+    if low is None:
+        low = 0.0 if high is None else high - 1.0
+    if high is None:
+        high = low + 1.0
     if low == high:
-        table.add("value", low)
-    else:
-        doubt = (
-            "" if v.is_bounded else "unbounded: the FMU specifies no min and max; replace with the real range"
-        )
-        table.add("range", _noted(_range(v, low, high), doubt))
-        table.add("control_points", DEFAULT_POINTS)
-        table.add("interpolation", "pchip" if v.kind == "real" else "constant")
-        limits = tomlkit.inline_table()
-        limits.update(free.model_dump())
-        table.add(
-            "free", _noted(limits, "engines may choose the control points; delete for the fixed ones above")
-        )
-    table.add(tomlkit.nl())
-    return table
+        return "\n".join([*lines, f"value = {_toml(low)}"])
+    doubt = "" if v.is_bounded else "unbounded: the FMU specifies no min and max; replace with the real range"
+    limits = f"{{max_control_points = {free.max_control_points}, min_interval = {_toml(free.min_interval)}}}"
+    choice = "engines may choose the control points; delete for the fixed ones above"
+    return "\n".join(
+        [
+            *lines,
+            _noted(f"range = {_range(v, low, high)}", doubt),
+            f"control_points = {DEFAULT_POINTS}",
+            f"interpolation = {_toml('pchip' if v.kind == 'real' else 'constant')}",
+            _noted(f"free = {limits}", choice),
+        ]
+    )
 
 
-def _freedom(info: ModelInfo) -> FreeSection:
-    """Return the limits that fit the placeholder requirement, whose window is the whole simulation."""
-    stop_time = info.stop_time or DEFAULT_STOP_TIME
-    step = choose_grid(stop_time, fmu_step=info.step_size).interval
-    return default_freedom((), stop_time=stop_time, step=step)
-
-
-def _guessed(v: Variable) -> tuple[float, float]:
-    """Return the range of an input; what the FMU leaves open is one unit away from what it states."""
-    least, most = v.limits
-    if least is None:
-        least = 0.0 if most is None else most - 1.0
-    return least, least + 1.0 if most is None else most
-
-
-def _parameters_table(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> Table:
-    table = tomlkit.table()
+def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> str:
+    lines = ["[parameters]"]
     for v in searched:
         start = v.start if isinstance(v.start, int | float) else 0.0
         reach = max(abs(start), 1.0) / 2
-        least, most = v.limits
-        limits = _range(v, start - reach if least is None else least, start + reach if most is None else most)
-        table.append(tomlkit.key([v.name, "range"]), _noted(limits, "replace with the real range"))
-    table.add(_comment("Each may be searched, or fixed with NAME = NUMBER:"))
+        low, high = v.limits
+        limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)
+        lines.append(_noted(f"{_key(v.name)}.range = {limits}", "replace with the real range"))
+    lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
     for v in tunable[:_SHOWN_PARAMETERS]:
         low, high = v.limits
-        shown = "[LOW, HIGH]" if low is None or high is None else str(_range(v, low, high))
+        shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
         default = f"{v.start} {v.unit}".rstrip()
-        table.add(_comment(f"{tomlkit.key(v.name).as_string()}.range = {shown}  # default: {default}"))
-    table.add(tomlkit.nl())
-    return table
+        lines.append(_comment(f"{_key(v.name)}.range = {shown}  # default: {default}"))
+    return "\n".join(lines)
 
 
-def _range(v: Variable, low: float, high: float) -> list[float]:
-    """Return a range; with integer bounds if the variable has only integer values."""
-    return [float(low), float(high)] if v.kind == "real" else [floor(low), ceil(high)]
-
-
-def _requirement_table(info: ModelInfo) -> Table:
+def _requirement(info: ModelInfo, stop_time: float) -> str:
     candidates = [v for v in info.observables if v.kind != "string"]
     if not candidates:
         raise SpecError(f"{info.name}: the FMU computes no variable that a requirement could be about")
-    table = tomlkit.table()
+    lines = [f"[requirements.{_STARTED}]"]
     if not info.outputs:
         shown = ", ".join(name_text(v.name) for v in candidates[:_SHOWN_VARIABLES])
         more = ", ..." if len(candidates) > _SHOWN_VARIABLES else ""
-        table.add(_comment(f"The FMU declares no outputs. Requirements may name any variable: {shown}{more}"))
-    stop_time = info.stop_time or DEFAULT_STOP_TIME
+        lines.append(
+            _comment(f"The FMU declares no outputs. Requirements may name any variable: {shown}{more}")
+        )
     # Nothing may be searched, or found to hold, before somebody has said what is required.
     formula = f"G[0,{stop_time:.10g}] ({name_text(candidates[0].name)} <= {PLACEHOLDER})"
-    table.add("formula", _noted(_formula_item(formula), "replace with the real requirement"))
-    table.add("description", "")
-    return table
+    lines.append(
+        _noted(f"formula = {_formula_item(formula).as_string()}", "replace with the real requirement")
+    )
+    return "\n".join([*lines, 'description = ""'])
+
+
+def _range(v: Variable, low: float, high: float) -> str:
+    """Return a range; with integer bounds if the variable has only integer values."""
+    return str([float(low), float(high)] if v.kind == "real" else [floor(low), ceil(high)])
+
+
+def _key(name: str) -> str:
+    return tomlkit.key(name).as_string()
+
+
+def _toml(value: object) -> str:
+    return tomlkit.item(value).as_string()
 
 
 def _formula_item(formula: str) -> Item:
@@ -210,16 +178,12 @@ def _formula_item(formula: str) -> Item:
     return tomlkit.string(formula, literal=formula.isprintable() and "'" not in formula)
 
 
-def _noted(value: object, comment: str) -> Item:
-    item: Item = tomlkit.item(value)
-    if comment:
-        item.comment(one_line(comment))
-        item.trivia.comment_ws = "  "
-    return item
+def _noted(line: str, comment: str) -> str:
+    return f"{line}  {_comment(comment)}" if comment else line
 
 
-def _comment(text: str) -> Any:
-    return tomlkit.comment(one_line(text))
+def _comment(text: str) -> str:
+    return f"# {one_line(text)}"
 
 
 @dataclass(frozen=True, slots=True)
