@@ -38,16 +38,16 @@ def search_space(
         with in_section(key=f"inputs.{name}"):
             variable = _input(name, info)
             if section.value is not None:
-                fixed[name] = fixed_value(variable, section.value)
+                fixed[name] = _fixed(variable, section.value)
             else:
-                searched.append(input_range(variable, section))
+                searched.append(_input_range(variable, section))
     for name, parameter in parameters.items():
         with in_section(key=f"parameters.{name}"):
             variable = _parameter(name, info)
             if parameter.range is not None:
-                ranges.append(parameter_range(variable, parameter.range))
+                ranges.append(_parameter_range(variable, parameter.range))
             elif parameter.value is not None and variable.kind != "string":
-                fixed[name] = fixed_value(variable, parameter.value)
+                fixed[name] = _fixed(variable, parameter.value)
     return SearchSpace(tuple(searched), tuple(ranges), stop_time), fixed
 
 
@@ -72,20 +72,29 @@ def _parameter(name: str, info: ModelInfo) -> Variable:
     return _variable(name, settable, f"the {info.noun} has no such parameter or start value")
 
 
-def input_range(variable: Variable, section: InputSection) -> InputRange:
-    """Return the searched input for a section, completed from the FMU's min, max, unit and description.
+def _check_unconnected(name: str, info: ModelInfo) -> None:
+    source = next((source for source, target in info.connections if target == name), None)
+    if source is not None:
+        raise SpecError(f"this input is connected to {source}; remove this section or the connection")
 
-    Raises:
-        SpecError: if range or control points are unknown, or the range exceeds the FMU's min and max.
-    """
-    smallest, largest = section.range or variable.limits
-    if smallest is None or largest is None:
+
+def _variable(name: str, variables: Iterable[Variable], otherwise: str) -> Variable:
+    known = {v.name: v for v in variables}
+    if name not in known:
+        raise SpecError(f"{otherwise}; {did_you_mean(name, known)}")
+    return known[name]
+
+
+def _input_range(variable: Variable, section: InputSection) -> InputRange:
+    """Return the searched input for a section, completed from the FMU's min, max, unit and description."""
+    low, high = section.range or variable.limits
+    if low is None or high is None:
         raise SpecError(
             "the FMU specifies no min and max for this input; add range = [low, high] or "
             f"--search {variable.name}=LOW:HIGH[:POINTS]",
             key="range",
         )
-    low, high = _within(variable, (smallest, largest))
+    _check(variable, low, high)
     if section.control_points is None:
         raise SpecError(
             "this key is missing; specify the number of evenly spaced control points", key="control_points"
@@ -96,7 +105,6 @@ def input_range(variable: Variable, section: InputSection) -> InputRange:
         raise SpecError(
             f'values of type {variable.kind} cannot be interpolated; use "constant"', key="interpolation"
         )
-    free = section.free
     return InputRange(
         variable.name,
         low,
@@ -104,7 +112,7 @@ def input_range(variable: Variable, section: InputSection) -> InputRange:
         control_points=section.control_points,
         interpolation=interpolation,
         hold=section.hold,
-        free=Freedom(free.max_control_points, free.min_interval) if free else None,
+        free=Freedom(**section.free.model_dump()) if section.free else None,
         unit=variable.unit,
         description=variable.description,
         kind=_value_kind(variable),
@@ -112,17 +120,12 @@ def input_range(variable: Variable, section: InputSection) -> InputRange:
     )
 
 
-def parameter_range(variable: Variable, limits: tuple[float, float]) -> ParameterRange:
-    """Return the searched parameter, completed from the FMU's start value, unit and description.
-
-    Raises:
-        SpecError: if the range exceeds the FMU's min and max, or the range of the variable's type.
-    """
-    low, high = _within(variable, limits)
+def _parameter_range(variable: Variable, limits: tuple[float, float]) -> ParameterRange:
+    """Return the searched parameter, completed from the FMU's start value, unit and description."""
+    _check(variable, *limits)
     return ParameterRange(
         variable.name,
-        low,
-        high,
+        *limits,
         nominal=variable.start if isinstance(variable.start, int | float) else None,
         unit=variable.unit,
         description=variable.description,
@@ -131,62 +134,43 @@ def parameter_range(variable: Variable, limits: tuple[float, float]) -> Paramete
     )
 
 
-def fixed_value(variable: Variable, value: float | str) -> float:
-    """Return a fixed value after checking it.
-
-    Raises:
-        SpecError: if the variable's type or the FMU's min and max do not allow it.
-    """
-    with in_section(key="value"):
-        if isinstance(value, str):
-            raise SpecError(
-                f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
-                f"{variable.kind}"
-            )
-        _check_limits(variable, f"{value:g}", value, value)
-        if not _contains_a_number(variable, value, value):
-            expected = "one of " + items_text(variable) if variable.literals else "an integer"
-            raise SpecError(f"{value:g}: expected {expected} for {variable.name!r}")
+def _fixed(variable: Variable, value: float | str) -> float:
+    if isinstance(value, str):
+        raise SpecError(
+            f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
+            f"{variable.kind}",
+            key="value",
+        )
+    _check(variable, value)
     return value
 
 
-def _within(variable: Variable, limits: tuple[float, float]) -> tuple[float, float]:
-    low, high = limits
-    with in_section(key="range"):
-        _check_limits(variable, f"[{low:g}, {high:g}]", low, high)
-        if not _contains_a_number(variable, low, high):
-            what = "item of the enumeration" if variable.literals else "integer"
-            raise SpecError(f"[{low:g}, {high:g}] contains no {what}; widen the range")
-    return low, high
-
-
-def _check_limits(variable: Variable, shown: str, low: float, high: float) -> None:
-    """Reject values outside the variable's type, its enumeration's items, or the FMU's min and max."""
+def _check(variable: Variable, low: float, high: float | None = None) -> None:
+    """Check a range, or a single value, against the variable's type and the FMU's min and max."""
+    key, shown, high = ("value", f"{low:g}", low) if high is None else ("range", f"[{low:g}, {high:g}]", high)
     known, numbers = variable.type_limits, variable.literals.values()
-    if known is not None and not known[0] <= low <= high <= known[1]:
-        raise SpecError(
-            f"{shown} exceeds the range of {variable.name!r}, which has the type {variable.type}, "
-            f"[{known[0]}, {known[1]}]"
-        )
-    if numbers and not min(numbers) <= low <= high <= max(numbers):
-        raise SpecError(
-            f"{shown} exceeds the items of the enumeration {variable.name!r}: {items_text(variable)}"
-        )
-    if (variable.low is not None and low < variable.low) or (
-        variable.high is not None and high > variable.high
-    ):
-        raise SpecError(
-            f"{shown} exceeds the FMU's limits for {variable.name!r}, "
-            f"[{_limit(variable.low)}, {_limit(variable.high)}]"
-        )
-
-
-def _contains_a_number(variable: Variable, low: float, high: float) -> bool:
-    if variable.kind == "real":
-        return True
-    if variable.literals:
-        return any(low <= number <= high for number in variable.literals.values())
-    return floor(high) >= ceil(low)
+    with in_section(key=key):
+        if known is not None and not known[0] <= low <= high <= known[1]:
+            raise SpecError(
+                f"{shown} exceeds the range of {variable.name!r}, which has the type {variable.type}, "
+                f"[{known[0]}, {known[1]}]"
+            )
+        if numbers and not min(numbers) <= low <= high <= max(numbers):
+            raise SpecError(
+                f"{shown} exceeds the items of the enumeration {variable.name!r}: {items_text(variable)}"
+            )
+        least, most = variable.low, variable.high
+        if (least is not None and low < least) or (most is not None and high > most):
+            limits = ", ".join("no limit" if limit is None else f"{limit:g}" for limit in (least, most))
+            raise SpecError(f"{shown} exceeds the FMU's limits for {variable.name!r}, [{limits}]")
+        held = any(low <= n <= high for n in numbers) if numbers else floor(high) >= ceil(low)
+        if variable.kind == "real" or held:
+            return
+        if key == "value":
+            expected = "one of " + items_text(variable) if numbers else "an integer"
+            raise SpecError(f"{shown}: expected {expected} for {variable.name!r}")
+        what = "item of the enumeration" if numbers else "integer"
+        raise SpecError(f"{shown} contains no {what}; widen the range")
 
 
 def items_text(variable: Variable) -> str:
@@ -200,16 +184,6 @@ def _value_kind(variable: Variable) -> ValueKind:
     return variable.kind
 
 
-def _limit(value: float | None) -> str:
-    return "no limit" if value is None else f"{value:g}"
-
-
-def _check_unconnected(name: str, info: ModelInfo) -> None:
-    source = next((source for source, target in info.connections if target == name), None)
-    if source is not None:
-        raise SpecError(f"this input is connected to {source}; remove this section or the connection")
-
-
 def string_values(
     parameters: Mapping[str, ParameterSection], info: ModelInfo, folder: Path
 ) -> tuple[tuple[str, str], ...]:
@@ -219,10 +193,3 @@ def string_values(
         for name, section in parameters.items()
         if section.value is not None and info[name].kind == "string"
     )
-
-
-def _variable(name: str, variables: Iterable[Variable], otherwise: str) -> Variable:
-    known = {v.name: v for v in variables}
-    if name not in known:
-        raise SpecError(f"{otherwise}; {did_you_mean(name, known)}")
-    return known[name]

@@ -125,15 +125,21 @@ def find_breach(root: Part, buffer: Floats, trajectory: Trajectory) -> Breach:
         buffer: values of all its parts.
         trajectory: the trajectory on which it was evaluated.
     """
-    whole = _Demand(root, wanted=True)
+    whole = _Demand.of(root, wanted=True)
     return Breach(tuple(_Search(buffer, trajectory).at(whole, _Spot(0))))
 
 
 class _Demand(NamedTuple):
-    """A part of a formula that had to be true, or false."""
+    """A part of a formula that had to be true, or false; no negation, as those are carried down."""
 
     part: Part
     wanted: bool
+
+    @classmethod
+    def of(cls, part: Part, *, wanted: bool) -> "_Demand":
+        while isinstance(part.formula, Not):
+            part, wanted = part.children[0], not wanted
+        return cls(part, wanted)
 
     @property
     def formula(self) -> Formula:
@@ -141,10 +147,9 @@ class _Demand(NamedTuple):
 
     @property
     def text(self) -> str:
-        formula = self.formula
-        if isinstance(formula, Flag):
-            return f"{'' if self.wanted else 'not '}{formula.left}"
-        return self.part.text if self.wanted else str(negated(formula))
+        if isinstance(self.formula, Flag):
+            return f"{'' if self.wanted else 'not '}{self.formula.left}"
+        return self.part.text if self.wanted else str(negated(self.formula))
 
     @property
     def opposite(self) -> "_Demand":
@@ -153,21 +158,18 @@ class _Demand(NamedTuple):
     @property
     def operands(self) -> list["_Demand"]:
         """The operands, with what is demanded of them; of a chain of one connective all at once."""
-        found = [_Demand(child, self.wanted) for child in self.part.children]
-        if isinstance(self.formula, Implies):
+        formula, found = self.formula, [_Demand.of(child, wanted=self.wanted) for child in self.part.children]
+        if isinstance(formula, Implies):
             return [found[0].opposite, found[1]]
-        if isinstance(self.formula, Not):
-            return [found[0].opposite]
-        if isinstance(self.formula, And | Or):
-            kind = type(self.formula)
-            parts = (child.operands if type(child.formula) is kind else [child] for child in found)
-            return [child.plain for children in parts for child in children]
+        if isinstance(formula, And | Or):
+            chains = (
+                each.operands
+                if type(each.formula) is type(formula) and each.wanted is self.wanted
+                else [each]
+                for each in found
+            )
+            return [each for chain in chains for each in chain]
         return found
-
-    @property
-    def plain(self) -> "_Demand":
-        """The same without negations in front."""
-        return self.operands[0].plain if isinstance(self.formula, Not) else self
 
     @property
     def is_throughout(self) -> bool:
@@ -188,9 +190,8 @@ class _Demand(NamedTuple):
         return values if self.wanted else -values
 
     def met(self, buffer: Floats, span: Span) -> Truths:
-        """At which samples of a span it is met."""
-        true: Truths = self.part.over(buffer, *span) > 0
-        return true if self.wanted else ~true
+        """At which samples of a span it is met; on a limit, too, the sign says so."""
+        return self.margins(buffer, span) > 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,8 +252,6 @@ class _Search:
         match demand.formula:
             case Predicate():
                 yield self._compared(demand, spot)
-            case Not():
-                yield from self.at(operands[0], spot)
             case Next():
                 yield from self.at(operands[0], spot.moved(spot.sample + 1))
             case Until() if demand.wanted:
@@ -283,9 +282,7 @@ class _Search:
 
     def _throughout(self, demand: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was not met at every sample of a window."""
-        if isinstance(demand.formula, Not):
-            yield from self._throughout(demand.operands[0], window, spot)
-        elif demand.is_throughout:
+        if demand.is_throughout:
             yield from self._throughout(demand.operands[0], _inner(demand.part, window), spot)
         else:
             sample = window[0] + int(demand.margins(self.buffer, window).argmin())
@@ -295,8 +292,6 @@ class _Search:
         """Why a demand was met at no sample of a window."""
         if isinstance(demand.formula, Predicate):
             yield self._compared(demand, spot.settled, window)
-        elif isinstance(demand.formula, Not):
-            yield from self._never(demand.operands[0], window, spot)
         elif demand.is_sometime:
             yield from self._never(demand.operands[0], _inner(demand.part, window), spot)
         elif demand.is_choice:
@@ -305,9 +300,10 @@ class _Search:
         else:
             best = window[0] + int(demand.margins(self.buffer, window).argmax())
             if window[0] < window[1] and not spot.sought:
-                near = f"it came nearest at {seconds(self._time(best))}"
-                over = _over(*map(self._time, window))
-                spot = replace(spot, sought=f"{demand.text} held at no time {over}; {near}")
+                over, near = _over(*map(self._time, window)), seconds(self._time(best))
+                spot = replace(
+                    spot, sought=f"{demand.text} held at no time {over}; it came nearest at {near}"
+                )
             yield from self.at(demand, spot.moved(best))
 
     def _until(self, left: _Demand, right: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
@@ -320,7 +316,7 @@ class _Search:
 
     def _unequal(self, demand: _Demand, spot: _Spot) -> Iterator[Shortfall]:
         """Why an equivalence failed, told from a side that held; if none did, from what the left one was."""
-        left, right = (_Demand(child, wanted=True) for child in demand.part.children)
+        left, right = (_Demand.of(child, wanted=True) for child in demand.part.children)
         is_true = bool(left.met(self.buffer, (spot.sample, spot.sample))[0])
         if demand.wanted and not is_true:
             left, right = right, left
