@@ -16,7 +16,6 @@ from falsifier.errors import FormulaError, SpecError, did_you_mean, rejected
 from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 
-_DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
@@ -102,19 +101,28 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     >>> options_from(changes_from_options(ranges=["u=0:1:3"], stop_time=5.0))
     [('--search', 'u=0:1:3'), ('--stop-time', '5.0')]
     """
-    options = [
-        _option(name, section)
-        for sections in (changes.inputs, changes.parameters)
-        for name, section in sections.items()
+    sections: list[tuple[str, InputSection | ParameterSection]] = [
+        *changes.inputs.items(),
+        *changes.parameters.items(),
     ]
+    options = [_option(name, section) for name, section in sections]
     for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))
-    return [
-        *options,
-        *(("--allow", word) for word in changes.allow),
-        *(("--deny", word) for word in changes.deny),
-    ]
+    options += [("--allow", word) for word in changes.allow]
+    return options + [("--deny", word) for word in changes.deny]
+
+
+def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:
+    if section.value is not None:
+        value = section.value if isinstance(section.value, str) else f"{section.value:.17g}"
+        return "--set", f"{name}={value}"
+    if section.range is None:
+        return "--search", name
+    said = [f"{v:.17g}" for v in section.range]
+    if isinstance(section, InputSection) and section.control_points is not None:
+        said += [str(section.control_points), *([section.interpolation] if section.interpolation else [])]
+    return "--search", f"{name}={':'.join(said)}"
 
 
 def _changes(
@@ -141,7 +149,7 @@ def _input_section(name: str, choice: InputChoice) -> object:
         case None:
             return {}
         case InputSection():
-            return choice.model_dump(exclude_unset=True)
+            return choice
         case int() | float():
             return {"value": choice}
         case (low, high, *more) if len(more) <= 2:
@@ -152,7 +160,7 @@ def _input_section(name: str, choice: InputChoice) -> object:
 def _parameter_section(name: str, choice: ParameterChoice) -> object:
     match choice:
         case ParameterSection():
-            return choice.model_dump(exclude_unset=True)
+            return choice
         case int() | float():
             return {"value": choice}
         case str():
@@ -160,6 +168,19 @@ def _parameter_section(name: str, choice: ParameterChoice) -> object:
         case (low, high):
             return {"range": (low, high)}
     raise SpecError(f"parameters.{name}: expected a number, text or (low, high)")
+
+
+def named_file(text: str, folder: Path) -> str:
+    """Return the absolute path if the text names a file, or a folder with a slash; otherwise the text."""
+    path = folder / text
+    try:
+        is_path = path.is_file() or ("/" in text and path.is_dir())
+    except (OSError, ValueError):
+        return text
+    return str(path.absolute()) if text and is_path else text
+
+
+# -- texts of options ----------------------------------------------------------------------------------------
 
 
 def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[str, dict[str, object]]:
@@ -173,7 +194,7 @@ def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[
 
 def _value(option: str) -> tuple[str, dict[str, object]]:
     name, parts = _split(option, "--set", "NAME=VALUE", "mass=1200")
-    numbers = [_as_number(part) for part in parts]
+    numbers = [_number(part) for part in parts]
     if None in numbers:
         return name, {"value": named_file(":".join(parts), Path())}
     if len(numbers) > 1:
@@ -187,18 +208,18 @@ def _range(option: str) -> tuple[str, dict[str, object]]:
     if option.strip() and "=" not in option:
         return option.strip(), {}
     name, parts = _split(option, "--search", "NAME=LOW:HIGH[:POINTS]", "throttle=0:100:7")
-    if len(parts) == 1:
-        if _as_number(parts[0]) is not None:
-            raise SpecError(
-                f"--search {option}: expected a range LOW:HIGH; to keep it constant: --set {option}"
-            )
+    if len(parts) == 1 and _number(parts[0]) is not None:
+        raise SpecError(f"--search {option}: expected a range LOW:HIGH; to keep it constant: --set {option}")
+    if len(parts) == 1 or "" in (part.strip() for part in parts[:2]):
         raise SpecError(
-            f"--search {option}: expected a range LOW:HIGH with a colon, for example "
-            f"--search {name}={_as_range(parts[0])}"
+            f"--search {option}: expected NAME=LOW:HIGH, with a colon, for example --search {name}=0:100"
         )
-    if "" in (part.strip() for part in parts[:2]):
-        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH, for example --search {name}=0:1")
-    section: dict[str, object] = {"range": (_number(parts[0], option), _number(parts[1], option))}
+    if len(parts) > 4:
+        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
+    limits = [_number(part) for part in parts[:2]]
+    if None in limits:
+        raise SpecError(f"{option}: {parts[limits.index(None)]!r} is not a number")
+    section: dict[str, object] = {"range": limits}
     if len(parts) > 2:
         if not parts[2].isdigit():
             raise SpecError(
@@ -211,19 +232,7 @@ def _range(option: str) -> tuple[str, dict[str, object]]:
                 f"--search {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
             )
         section["interpolation"] = parts[3]
-    if len(parts) > 4:
-        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
     return name, section
-
-
-def named_file(text: str, folder: Path) -> str:
-    """Return the absolute path if the text names a file, or a folder with a slash; otherwise the text."""
-    path = folder / text
-    try:
-        is_path = path.is_file() or ("/" in text and path.is_dir())
-    except (OSError, ValueError):
-        return text
-    return str(path.absolute()) if text and is_path else text
 
 
 def _split(option: str, flag: str, ways: str, example: str) -> tuple[str, list[str]]:
@@ -233,38 +242,11 @@ def _split(option: str, flag: str, ways: str, example: str) -> tuple[str, list[s
     return name.strip(), rest.strip().split(":")
 
 
-def _as_number(text: str) -> float | None:
+def _number(text: str) -> float | None:
     try:
         return float(text)
     except ValueError:
         return None
-
-
-def _number(text: str, option: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise SpecError(f"{option}: {text!r} is not a number") from None
-
-
-def _as_range(text: str) -> str:
-    """Return the range that a text with another separator was meant to be, or an example."""
-    match = re.fullmatch(rf"[\[(]?\s*({_DIGITS})\s*(?:-|,|;|\.\.+|\bto\b|\s)\s*({_DIGITS})\s*[\])]?", text)
-    return f"{match[1]}:{match[2]}" if match else "0:100"
-
-
-def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:
-    if section.value is not None:
-        value = section.value if isinstance(section.value, str) else f"{section.value:.17g}"
-        return "--set", f"{name}={value}"
-    if section.range is None:
-        return "--search", name
-    said = [f"{v:.17g}" for v in section.range]
-    if isinstance(section, InputSection) and section.control_points is not None:
-        said.append(str(section.control_points))
-        if section.interpolation is not None:
-            said.append(section.interpolation)
-    return "--search", f"{name}={':'.join(said)}"
 
 
 def template_arguments(text: str) -> dict[str, Any]:
