@@ -12,7 +12,16 @@ import numpy as np
 
 from falsifier.errors import FormulaError
 from falsifier.stl import program as op
-from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, number_text
+from falsifier.stl.expression import (
+    FUNCTIONS_OF,
+    OPERATORS,
+    Arithmetic,
+    Call,
+    Expression,
+    Name,
+    Negative,
+    number_text,
+)
 from falsifier.stl.formula import (
     Always,
     And,
@@ -30,11 +39,9 @@ from falsifier.stl.margins import on_limit
 from falsifier.stl.program import Part, Place, Program
 
 _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
-_ARITHMETIC = {"+": op.ADD, "-": op.SUBTRACT, "*": op.MULTIPLY, "/": op.DIVIDE, "^": op.POWER}
-_FUNCTIONS = {
-    "abs": op.ABS, "sqrt": op.SQRT, "exp": op.EXP, "log": op.LOG, "sin": op.SIN, "cos": op.COS,
-    "min": op.MINIMUM, "max": op.MAXIMUM,
-}  # fmt: skip
+# Of numbers that are all floating-point, power is the faster one.
+_ARITHMETIC = OPERATORS | {"^": np.power}
+_NEGATION = op.scaled(-1.0)
 Node = Formula | Expression
 
 
@@ -134,23 +141,22 @@ class _Compiler:
                 self.places[node] = self._formula(node)
         return self.places[node]
 
-    def _emit(
-        self,
-        make: op.Maker,
-        first: int,
-        second: int,
-        *,
-        length: int,
-        width: int = 0,
-        p: float = 0.0,
-        q: float = 0.0,
-    ) -> int:
-        """Append one step and return the offset of its result."""
+    def _emit(self, function: op.Function, length: int, *operands: int, width: int = 0) -> int:
+        """Append one step and return the offset of its result.
+
+        Args:
+            function: what it calculates.
+            length: length of its result and of its operands.
+            operands: their offsets.
+            width: by how much the first one is longer.
+        """
+        reads = [slice(offset, offset + length) for offset in operands]
+        if width:
+            reads[0] = slice(operands[0], operands[0] + length + width)
         out = slice(self.size, self.size + length)
-        a, b = slice(first, first + length + width), slice(second, second + length)
-        self.steps.append(make(out, a, b, p, q))
+        self.steps.append(op.calculating(function, out, *reads))
         self.size += length
-        return self.size - length
+        return out.start
 
     def _expression(self, node: Expression) -> Place:
         first, last = self.needs[node]
@@ -158,44 +164,36 @@ class _Compiler:
         if isinstance(node, Name):
             return Place(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
         if not node.signals:
-            return Place(self._emit(op.FILL, 0, 0, length=n, q=_constant(node)) - first, first, last)
+            return Place(self._emit(op.constant(_constant(node)), n) - first, first, last)
         match node:
             case Arithmetic():
                 offset = self._arithmetic(node, first, n)
             case Negative(operand):
-                offset = self._negated(self.place(operand).at(first), n)
-            case Call():
-                offset = self._call(node, first, n)
+                offset = self._emit(_NEGATION, n, self.place(operand).at(first))
+            case Call(name):
+                function, sides = FUNCTIONS_OF[name], [self.place(o).at(first) for o in node.operands]
+                offset = self._emit(function, n, *sides[:2])
+                for other in sides[2:]:
+                    offset = self._emit(function, n, offset, other)
             case _:
                 raise TypeError(f"not an expression: {node!r}")
         return Place(offset - first, first, last)
-
-    def _call(self, node: Call, first: int, n: int) -> int:
-        code = _FUNCTIONS[node.function]
-        offsets = [self.place(operand).at(first) for operand in node.operands]
-        if len(offsets) == 1:
-            return self._emit(code, offsets[0], 0, length=n)
-        offset = offsets[0]
-        for other in offsets[1:]:
-            offset = self._emit(code, offset, other, length=n)
-        return offset
 
     def _arithmetic(self, node: Arithmetic, first: int, n: int) -> int:
         left, right, operator = node.left, node.right, node.operator
         if operator == "^" and not right.signals and _constant(right) == 2:
             # One multiplication is much faster than pow, and squares are frequent.
             base = self.place(left).at(first)
-            return self._emit(op.MULTIPLY, base, base, length=n)
+            return self._emit(np.multiply, n, base, base)
         if not right.signals and operator in "+-*":
             c = _constant(right)
-            p, q = (c, 0.0) if operator == "*" else (1.0, c if operator == "+" else -c)
-            return self._emit(op.SCALE, self.place(left).at(first), 0, length=n, p=p, q=q)
+            scale = op.scaled(c) if operator == "*" else op.scaled(1.0, c if operator == "+" else -c)
+            return self._emit(scale, n, self.place(left).at(first))
         if not left.signals and operator in "+-*":
             c = _constant(left)
-            p, q = (c, 0.0) if operator == "*" else (1.0 if operator == "+" else -1.0, c)
-            return self._emit(op.SCALE, self.place(right).at(first), 0, length=n, p=p, q=q)
-        a, b = self.place(left).at(first), self.place(right).at(first)
-        return self._emit(_ARITHMETIC[operator], a, b, length=n)
+            scale = op.scaled(c) if operator == "*" else op.scaled(1.0 if operator == "+" else -1.0, c)
+            return self._emit(scale, n, self.place(right).at(first))
+        return self._emit(_ARITHMETIC[operator], n, self.place(left).at(first), self.place(right).at(first))
 
     def _predicate(self, node: Predicate, first: int, n: int) -> int:
         left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
@@ -203,18 +201,14 @@ class _Compiler:
         if difference.signals:
             offset = self._arithmetic(difference, first, n)
         else:
-            offset = self._emit(op.FILL, 0, 0, length=n, q=_constant(difference))
+            offset = self._emit(op.constant(_constant(difference)), n)
         if node.operator in ("==", "!="):
-            offset = self._emit(op.ABS, offset, 0, length=n)
+            offset = self._emit(np.absolute, n, offset)
         if node.operator == "==":
-            offset = self._negated(offset, n)
+            offset = self._emit(_NEGATION, n, offset)
         self.checked[len(self.steps)] = node, Place(offset - first, first, first + n - 1)
-        margins = slice(offset, offset + n)
-        self.steps.append(op.CHECK(margins, margins, margins, on_limit(node.operator), 0.0))
+        self.steps.append(op.checking(slice(offset, offset + n), on_limit(node.operator)))
         return offset
-
-    def _negated(self, offset: int, n: int) -> int:
-        return self._emit(op.SCALE, offset, 0, length=n, p=-1.0)
 
     def _formula(self, node: Formula) -> Place:
         first, last = self.needs[node]
@@ -230,35 +224,29 @@ class _Compiler:
             return self._until(node, first, last)
         sides = [self.place(child).at(first) for child in node.children]
         if isinstance(node, Not):
-            offset = self._negated(sides[0], n)
+            offset = self._emit(_NEGATION, n, *sides)
         elif isinstance(node, And):
-            offset = self._emit(op.MINIMUM, *sides, length=n)
+            offset = self._emit(np.minimum, n, *sides)
         elif isinstance(node, Or):
-            offset = self._emit(op.MAXIMUM, *sides, length=n)
+            offset = self._emit(np.maximum, n, *sides)
         elif isinstance(node, Implies):
             offset = self._implication(sides[0], sides[1], n)
         else:
-            offset = self._emit(
-                op.MINIMUM,
-                self._implication(sides[0], sides[1], n),
-                self._implication(sides[1], sides[0], n),
-                length=n,
-            )
+            both = self._implication(sides[0], sides[1], n), self._implication(sides[1], sides[0], n)
+            offset = self._emit(np.minimum, n, *both)
         return Place(offset - first, first, last)
 
     def _implication(self, left: int, right: int, n: int) -> int:
-        return self._emit(op.MAXIMUM, self._negated(left, n), right, length=n)
+        return self._emit(np.maximum, n, self._emit(_NEGATION, n, left), right)
 
     def _window(self, node: Always | Eventually, first: int, last: int) -> Place:
-        below = self.place(node.operand)
-        is_always = isinstance(node, Always)
-        code = op.WINDOW_MINIMUM if is_always else op.WINDOW_MAXIMUM
-        start, end = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - first)
+        below, extreme = self.place(node.operand), np.minimum if isinstance(node, Always) else np.maximum
         if node.window is None and first < last:
-            code, last = (op.REST_MINIMUM if is_always else op.REST_MAXIMUM), self.samples - 1
-            offset = self._emit(code, below.at(first), 0, length=last - first + 1)
-        else:
-            offset = self._emit(code, below.at(first + start), 0, length=last - first + 1, width=end - start)
+            last = self.samples - 1
+            offset = self._emit(op.rest(extreme), last - first + 1, below.at(first))
+            return Place(offset - first, first, last)
+        start, end = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - first)
+        offset = self._emit(op.window(extreme), last - first + 1, below.at(first + start), width=end - start)
         return Place(offset - first, first, last)
 
     def _until(self, node: Until, first: int, last: int) -> Place:
@@ -271,19 +259,19 @@ class _Compiler:
         left, right = (self.place(child) for child in node.children)
         if node.window is None:
             n = self.samples - first
-            both = self._emit(op.MINIMUM, left.at(first), right.at(first), length=n)
-            offset = self._emit(op.UNTIL, left.at(first), both, length=n)
+            both = self._emit(np.minimum, n, left.at(first), right.at(first))
+            offset = self._emit(op.until, n, left.at(first), both)
             return Place(offset - first, first, self.samples - 1)
         n = last - first + 1
         start, end = window_samples(node.window, self.step)
         begin, width = first + start, end - start
-        both = self._emit(op.MINIMUM, left.at(begin), right.at(begin), length=n + width)
-        until = self._emit(op.UNTIL, left.at(begin), both, length=n + width)
-        soon = self._emit(op.WINDOW_MAXIMUM, both, 0, length=n, width=width)
-        offset = self._emit(op.MINIMUM, until, soon, length=n)
+        both = self._emit(np.minimum, n + width, left.at(begin), right.at(begin))
+        until = self._emit(op.until, n + width, left.at(begin), both)
+        soon = self._emit(op.window(np.maximum), n, both, width=width)
+        offset = self._emit(np.minimum, n, until, soon)
         if start > 0:
-            before = self._emit(op.WINDOW_MINIMUM, left.at(first), 0, length=n, width=start - 1)
-            offset = self._emit(op.MINIMUM, before, offset, length=n)
+            before = self._emit(op.window(np.minimum), n, left.at(first), width=start - 1)
+            offset = self._emit(np.minimum, n, before, offset)
         return Place(offset - first, first, last)
 
     def part(self, node: Formula) -> Part:

@@ -6,6 +6,7 @@ An expression is an immutable tree. ``str(expression)`` parses back to the same 
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -16,16 +17,11 @@ from falsifier.stl.names import name_text
 Operator = Literal["+", "-", "*", "/", "^"]
 Function = Literal["abs", "sqrt", "exp", "log", "sin", "cos", "min", "max"]
 
-UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
-    "abs": np.abs,
-    "sqrt": np.sqrt,
-    "exp": np.exp,
-    "log": np.log,
-    "sin": np.sin,
-    "cos": np.cos,
-}
-BINARY_FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {"min": np.minimum, "max": np.maximum}
-OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
+FUNCTIONS_OF: dict[str, Callable[..., Any]] = {
+    "abs": np.absolute, "sqrt": np.sqrt, "exp": np.exp, "log": np.log, "sin": np.sin, "cos": np.cos,
+    "min": np.minimum, "max": np.maximum,
+}  # fmt: skip
+OPERATORS: dict[str, Callable[..., Any]] = {
     "+": np.add,
     "-": np.subtract,
     "*": np.multiply,
@@ -162,13 +158,8 @@ class Call(Expression):
         return f"{self.function}({', '.join(map(str, self.operands))})"
 
     def _value(self, columns: Mapping[str, Any]) -> Any:
-        values = [operand._value(columns) for operand in self.operands]
-        if self.function in UNARY_FUNCTIONS:
-            return UNARY_FUNCTIONS[self.function](values[0])
-        result = values[0]
-        for value in values[1:]:
-            result = BINARY_FUNCTIONS[self.function](result, value)
-        return result
+        function, values = FUNCTIONS_OF[self.function], [each._value(columns) for each in self.operands]
+        return function(values[0]) if len(values) == 1 else reduce(function, values)
 
 
 # Units of plain numbers, which fit any other, and functions whose value has the unit of their operands.

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +14,9 @@ Floats = NDArray[np.float64]
 _TIME_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Changes a buffer; returns whether a checked value is not finite.
 Operation = Callable[[Floats], bool]
-# Makes a step from the parts that it writes and reads, and two numbers. The first operand of a sliding window
-# is longer than the result by the number of samples of the window after its first.
-Maker = Callable[[slice, slice, slice, float, float], Operation]
+# Fills ``out`` from none, one or two operands. The first operand of a sliding window is longer than the
+# result by the number of samples of the window after its first.
+Function = Callable[..., object]
 
 
 def run(steps: tuple[Operation, ...], buffer: Floats) -> int:
@@ -29,101 +28,97 @@ def run(steps: tuple[Operation, ...], buffer: Floats) -> int:
     return -1
 
 
-def _binary(function: np.ufunc) -> Maker:
-    def make(out: slice, a: slice, b: slice, _p: float, _q: float) -> Operation:
-        def step(x: Floats) -> bool:
-            function(x[a], x[b], out=x[out])
-            return False
+def calculating(function: Function, out: slice, *operands: slice) -> Operation:
+    """Return the step that fills a part of the buffer from others."""
+    a, b = (*operands, None, None)[:2]  # apart by their number: a loop over them would take time in each step
 
-        return step
+    def constant(x: Floats) -> bool:
+        function(out=x[out])
+        return False
 
-    return make
+    def unary(x: Floats) -> bool:
+        function(x[a], out=x[out])
+        return False
 
+    def binary(x: Floats) -> bool:
+        function(x[a], x[b], out=x[out])
+        return False
 
-def _unary(function: np.ufunc) -> Maker:
-    def make(out: slice, a: slice, _b: slice, _p: float, _q: float) -> Operation:
-        def step(x: Floats) -> bool:
-            function(x[a], out=x[out])
-            return False
-
-        return step
-
-    return make
+    return (constant, unary, binary)[len(operands)]
 
 
-def _filling(values: Callable[..., Any]) -> Maker:
-    """Make steps whose values are calculated from operands, length and numbers."""
+def checking(margins: slice, at_zero: float) -> Operation:
+    """Return the step that stops unless margins are finite; where one is 0, it becomes another number."""
 
-    def make(out: slice, a: slice, b: slice, p: float, q: float) -> Operation:
-        length = out.stop - out.start
-
-        def step(x: Floats) -> bool:
-            x[out] = values(x[a], x[b], length, p, q)
-            return False
-
-        return step
-
-    return make
-
-
-def _check(_out: slice, a: slice, _b: slice, p: float, _q: float) -> Operation:
     def step(x: Floats) -> bool:
-        margins = x[a]
-        if not margins.all():
-            margins[margins == 0.0] = p
-        return not np.isfinite(margins).all()
+        found = x[margins]
+        if not found.all():
+            found[found == 0.0] = at_zero
+        return not np.isfinite(found).all()
 
     return step
 
 
-def _window(extreme: np.ufunc) -> Maker:
-    def values(a: Floats, _b: Floats, length: int, _p: float, _q: float) -> Floats:
+def constant(value: float) -> Function:
+    """Return the function that is one number everywhere."""
+    return lambda out: out.fill(value)
+
+
+def scaled(factor: float, offset: float = 0.0) -> Function:
+    """Return the function ``factor * a + offset``."""
+
+    def function(a: Floats, out: Floats) -> None:
+        np.multiply(factor, a, out=out)
+        if offset:
+            np.add(out, offset, out=out)
+
+    return function
+
+
+def window(extreme: np.ufunc) -> Function:
+    """Return the minimum or maximum over a sliding window, whose width is doubled until it is reached."""
+
+    def function(a: Floats, out: Floats) -> None:
+        length = len(out)
         width = len(a) - length + 1
         if length == 1:
-            return np.asarray(extreme.reduce(a, axis=0))
+            out[...] = extreme.reduce(a, axis=0)
+            return
         covered = 1
         while 2 * covered <= width:
             a = extreme(a[:-covered], a[covered:])
             covered *= 2
         rest = width - covered
-        return np.asarray(extreme(a[:length], a[rest : rest + length]))
+        extreme(a[:length], a[rest : rest + length], out=out)
 
-    return _filling(values)
-
-
-def _rest(extreme: np.ufunc) -> Maker:
-    return _filling(lambda a, _b, _length, _p, _q: extreme.accumulate(a[::-1], axis=0)[::-1])
+    return function
 
 
-def _until(a: Floats, b: Floats, _length: int, _p: float, _q: float) -> Floats:
-    """Return ``max(b[i], min(a[i], result[i + 1]))``, from the last sample, where it is b, to the first.
+def rest(extreme: np.ufunc) -> Function:
+    """Return the minimum or maximum from each sample to the last one."""
+
+    def function(a: Floats, out: Floats) -> None:
+        out[...] = extreme.accumulate(a[::-1], axis=0)[::-1]
+
+    return function
+
+
+def until(a: Floats, b: Floats, out: Floats) -> None:
+    """Calculate ``max(b[i], min(a[i], result[i + 1]))``, from the last sample, where it is b, to the first.
 
     Each sample limits what follows to an interval, and limits one after the other are an interval again:
     those of 1, 2, 4, ... samples are combined.
     """
-    low, high = b.copy(), np.maximum(a, b)
-    high[-1] = low[-1]
+    out[...] = b
+    high = np.maximum(a, b)
+    high[-1] = out[-1]
     distance = 1
     while distance < len(a):
         here, there = slice(None, -distance), slice(distance, None)
-        below = np.maximum(low[here], np.minimum(high[here], low[there]))
-        high[here] = np.maximum(low[here], np.minimum(high[here], high[there]))
-        low[here] = below
+        below = np.maximum(out[here], np.minimum(high[here], out[there]))
+        high[here] = np.maximum(out[here], np.minimum(high[here], high[there]))
+        out[here] = below
         distance *= 2
-    return low
-
-
-ADD, SUBTRACT, MULTIPLY = _binary(np.add), _binary(np.subtract), _binary(np.multiply)
-DIVIDE, POWER = _binary(np.divide), _binary(np.power)
-MINIMUM, MAXIMUM = _binary(np.minimum), _binary(np.maximum)
-ABS, SQRT, EXP, LOG = _unary(np.absolute), _unary(np.sqrt), _unary(np.exp), _unary(np.log)
-SIN, COS = _unary(np.sin), _unary(np.cos)
-SCALE = _filling(lambda a, _b, _length, p, q: p * a + q if q else p * a)
-FILL = _filling(lambda _a, _b, _length, _p, q: q)
-WINDOW_MINIMUM, WINDOW_MAXIMUM = _window(np.minimum), _window(np.maximum)
-REST_MINIMUM, REST_MAXIMUM = _rest(np.minimum), _rest(np.maximum)
-UNTIL = _filling(_until)
-CHECK: Maker = _check  # stops unless the first operand is finite; where it is 0, it becomes the first number
 
 
 @dataclass(frozen=True, slots=True)
