@@ -1,22 +1,20 @@
 """The different values of robustness of a search; where they are few, what is missing for a lower one."""
 
-import operator
 from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted
 from falsifier.stl.breach import compared_sides
 from falsifier.stl.diagnosis import valued
-from falsifier.stl.formula import Comparison, Predicate, negated
+from falsifier.stl.formula import Predicate, negated
 from falsifier.stl.margins import signed
 from falsifier.stl.monitor import Verdict
 
@@ -28,10 +26,6 @@ _PER_LEVEL, _FEWEST = 4, 2
 _TOLD = 5
 # A signal without names of its values that makes more steps counts something without an end, such as events.
 _MOST_STEPS = 12
-_HOLDS: Mapping[Comparison, Callable[[Any, Any], Any]] = {
-    "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq,
-    "!=": operator.ne,
-}  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -146,7 +140,7 @@ class Climb:
             return
         self.trajectories += 1
         for predicate in _known(predicates, trajectory.columns):
-            for truth in np.unique(_truths(predicate, trajectory.columns)).tolist():
+            for truth in np.unique(predicate.holds(trajectory.columns)).tolist():
                 self._met[str(predicate), truth].append(number)
         for name in self.labels.keys() & trajectory.columns.keys():
             column = trajectory[name]
@@ -174,7 +168,7 @@ class Climb:
         if self._lowest is None:
             return
         predicate, verdict = self._lowest
-        is_true = bool(_truths(predicate, verdict.values))
+        is_true = bool(predicate.holds(verdict.values))
         needed = negated(predicate) if is_true else predicate
         value = valued(compared_sides(predicate)[0], verdict.values, verdict.robustness)
         met = self._met[str(predicate), not is_true]
@@ -214,9 +208,3 @@ class Climb:
 def _known(predicates: Sequence[Predicate], values: Mapping[str, Any]) -> list[Predicate]:
     """Return those whose signals all have values."""
     return [p for p in predicates if values.keys() >= set(p.signals)]
-
-
-def _truths(predicate: Predicate, values: Mapping[str, Any]) -> NDArray[np.bool_]:
-    """Whether a comparison holds, for values at one time or over time."""
-    left, right = (side.evaluate(values) for side in (predicate.left, predicate.right))
-    return np.asarray(_HOLDS[predicate.operator](left, right))

@@ -4,6 +4,7 @@ All times are compared as fractions: in floating point 3 s is not a multiple of 
 """
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, lcm
@@ -11,7 +12,6 @@ from math import ceil, gcd, lcm
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
-from falsifier.stl.formula import Window
 
 # Number of intervals if the FMU specifies no step.
 _DEFAULT_INTERVALS = 1000
@@ -89,11 +89,8 @@ def formula_times(formulas: Iterable[str]) -> list[float]:
     """Return the bounds in s of all windows; formulas that cannot be parsed have none."""
     found: list[float] = []
     for text in formulas:
-        try:
-            formula = parse(text)
-        except FormulaError:
-            continue
-        found += _bounds(formula)
+        with suppress(FormulaError):
+            found += _bounds(parse(text))
     return found
 
 
@@ -119,8 +116,7 @@ def exact(seconds: float) -> Fraction:
 
 
 def _bounds(formula: Formula) -> list[float]:
-    windows = (getattr(part, "window", None) for part in formula.walk())
-    return [bound for window in windows if window is not None for bound in (window.start, window.end)]
+    return [bound for window in formula.windows for bound in (window.start, window.end)]
 
 
 def _common(*times: Fraction) -> Fraction:
@@ -199,11 +195,9 @@ def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -
 
 def smallest_window(formulas: Iterable[str | Formula]) -> float | None:
     """Return the length in s of the smallest window that is longer than a moment; None if there is none."""
-    windows: list[Window | None] = []
+    lengths: list[float] = []
     for formula in formulas:
-        try:
+        with suppress(FormulaError):
             parsed = parse(formula) if isinstance(formula, str) else formula
-        except FormulaError:
-            continue
-        windows += [getattr(part, "window", None) for part in parsed.walk()]
-    return min((w.end - w.start for w in windows if w is not None and w.end > w.start), default=None)
+            lengths += [w.end - w.start for w in parsed.windows if w.end > w.start]
+    return min(lengths, default=None)

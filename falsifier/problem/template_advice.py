@@ -26,7 +26,7 @@ from falsifier.problem.sentence import (
 from falsifier.problem.template_arguments import tidy
 from falsifier.problem.templates import TEMPLATES
 from falsifier.problem.unit_check import spelled
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 
 WHAT_CANNOT_BE_SAID = (
     "Formulas compare values of the same sample. A rate needs a signal that is the rate, or the template "

@@ -27,7 +27,7 @@ from falsifier.problem.sections import FreeSection
 from falsifier.problem.source import MODEL_FILES, ProblemSource
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 
 # Stop time in s if the FMU specifies none.
 DEFAULT_STOP_TIME = 10.0

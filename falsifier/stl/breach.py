@@ -32,7 +32,7 @@ from falsifier.stl.formula import (
     Until,
     negated,
 )
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 from falsifier.stl.program import Part
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 
 Operator = Literal["+", "-", "*", "/", "^"]
 Function = Literal["abs", "sqrt", "exp", "log", "sin", "cos", "min", "max"]

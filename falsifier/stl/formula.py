@@ -2,11 +2,19 @@
 
 ``falsifier.stl.parse`` builds them from text; ``str(formula)`` parses back to the same tree. To inspect one,
 use ``formula.walk()``, ``formula.children`` and ``formula.predicates``.
+
+``true`` and ``false`` are replaced when a formula is read, by an equivalent one without them. Their
+robustness is infinite by definition, with either sign. A minimum or maximum with an infinite value is the
+other value or infinite itself, so that every constant either disappears or spreads to the formula around it.
+What remains has the same robustness and the same critical time, and finite values in all its parts.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.stl.expression import SUM, Expression, Name, Number, embraced, number_text
 
@@ -20,6 +28,10 @@ OPPOSITE: dict[Comparison, Comparison] = {
 }  # fmt: skip
 MIRRORED: dict[Comparison, Comparison] = {
     "<": ">", "<=": ">=", ">": "<", ">=": "<=", "==": "==", "!=": "!=",
+}  # fmt: skip
+_COMPARISONS: dict[Comparison, np.ufunc] = {
+    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal,
+    "==": np.equal, "!=": np.not_equal,
 }  # fmt: skip
 T = TypeVar("T")
 
@@ -80,6 +92,11 @@ class Formula:
         sides = dict.fromkeys(side for p in self.predicates for side in (p.left, p.right))
         return tuple(side for side in sides if side.signals and not isinstance(side, Name))
 
+    @property
+    def windows(self) -> tuple[Window, ...]:
+        """Windows of the temporal operators, from left to right; without those that have none."""
+        return tuple(w for f in self.walk() if (w := getattr(f, "window", None)) is not None)
+
     def horizon(self, step: float = 0.0) -> float:
         """Return the minimum length in s of a trajectory on which the formula can be evaluated at time 0.
 
@@ -100,6 +117,21 @@ class Predicate(Formula):
     left: Expression
     right: Expression
     binding: ClassVar[int] = COMPARISON
+
+    def margin(self, columns: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Return the signed margin, in the shape of the given columns; 0 where both sides are equal."""
+        left, right = self.left.evaluate(columns), self.right.evaluate(columns)
+        if self.operator in ("<", "<="):
+            return np.asarray(right - left)
+        if self.operator in (">", ">="):
+            return np.asarray(left - right)
+        distance = np.asarray(np.abs(left - right))
+        return -distance if self.operator == "==" else distance
+
+    def holds(self, columns: Mapping[str, Any]) -> NDArray[np.bool_]:
+        """Return where it is true, in the shape of the given columns."""
+        compare = _COMPARISONS[self.operator]
+        return np.asarray(compare(self.left.evaluate(columns), self.right.evaluate(columns)))
 
     def __str__(self) -> str:
         return f"{embraced(self.left, SUM)} {self.operator} {embraced(self.right, SUM)}"
@@ -276,3 +308,72 @@ def _renamed(node: Any, names: Mapping[str, str]) -> Any:
     if is_dataclass(node) and not isinstance(node, type):
         return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
     return node
+
+
+# -- true and false ------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Constant(Formula):
+    """``true`` or ``false``; only the parser makes them, and no parsed formula contains one."""
+
+    value: bool
+
+    def __str__(self) -> str:
+        return "true" if self.value else "false"
+
+
+TRUE, FALSE = Constant(value=True), Constant(value=False)
+
+
+def without_constants(formula: Formula) -> Formula:
+    """Return an equivalent formula without constants, or a constant if the formula is always true or false.
+
+    >>> from falsifier.stl import parse
+    >>> print(parse("true U[0,5] (x >= 1) and not false"))
+    F[0,5] (x >= 1)
+    """
+    match formula:
+        case Predicate() | Constant():
+            return formula
+        case Not(operand):
+            return _opposite(without_constants(operand))
+        case Next(operand) | Always(operand) | Eventually(operand):
+            inner = without_constants(operand)
+            return inner if isinstance(inner, Constant) else replace(formula, operand=inner)
+        case Until(left, right, window):
+            return _until(without_constants(left), without_constants(right), window)
+        case And(left, right) | Or(left, right) | Implies(left, right) | Iff(left, right):
+            return _joined(type(formula), without_constants(left), without_constants(right))
+    raise TypeError(f"not a formula: {formula!r}")
+
+
+def _opposite(formula: Formula) -> Formula:
+    if isinstance(formula, Constant):
+        return FALSE if formula.value else TRUE
+    return Not(formula)
+
+
+def _joined(kind: type[And | Or | Implies | Iff], left: Formula, right: Formula) -> Formula:
+    if kind is Implies and isinstance(right, Constant):
+        return right if right.value else _opposite(left)
+    if not isinstance(left, Constant):
+        left, right = right, left  # of the others, the operands can be exchanged
+    if not isinstance(left, Constant):
+        return kind(right, left)
+    if kind is Implies:
+        return right if left.value else TRUE
+    if kind is Iff:
+        return right if left.value else _opposite(right)
+    return left if left.value is (kind is Or) else right
+
+
+def _until(left: Formula, right: Formula, window: Window | None) -> Formula:
+    if FALSE in (left, right) or left == right == TRUE:
+        return FALSE if left == FALSE else right
+    if left == TRUE:
+        return Eventually(right, window)
+    if right == TRUE:
+        # The earliest time is the best one for the right operand; the left one must hold up to then.
+        return Always(left, Window(0.0, window.start)) if window and window.start > 0 else left
+    return Until(left, right, window)

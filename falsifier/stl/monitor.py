@@ -1,6 +1,6 @@
 """The monitor: robustness, critical time and diagnosis of a formula on trajectories with one time grid."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from typing import Any
@@ -13,9 +13,8 @@ from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl.breach import Breach, find_breach
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.diagnosis import Diagnosis, diagnose, path_to_decider
-from falsifier.stl.extremes import Extremes, Watched, extremes_of, watched_parts
-from falsifier.stl.formula import Formula
-from falsifier.stl.program import Program, fill, fill_many
+from falsifier.stl.formula import Formula, Implies, Or, Predicate
+from falsifier.stl.program import Part, Program, fill, fill_many
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +45,40 @@ class Verdict:
     def violated(self) -> bool:
         """Whether the requirement is violated."""
         return self.robustness < 0
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A part of a formula whose extremes are of interest.
+
+    Attributes:
+        formula: the implication or disjunction to which the part belongs; for a predicate itself.
+        part: the condition of an implication, an operand of a disjunction, or a predicate.
+        first: first sample at which it counts.
+        last: last sample.
+    """
+
+    formula: Formula
+    part: Part
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Extremes:
+    """Smallest and largest robustness of the watched parts over all samples at which they count.
+
+    Attributes:
+        lows: smallest robustness, shape (k,).
+        highs: largest robustness, shape (k,).
+        lowest: time in s of the smallest, shape (k,).
+        highest: time in s of the largest, shape (k,).
+    """
+
+    lows: NDArray[np.float64]
+    highs: NDArray[np.float64]
+    lowest: NDArray[np.float64]
+    highest: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +113,7 @@ class Monitor:
             )
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)
-        object.__setattr__(self, "watched", watched_parts(program.root))
+        object.__setattr__(self, "watched", tuple(_watched(program.root)))
         object.__setattr__(self, "_spare", [])  # buffers of earlier evaluations, for reuse
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -124,9 +157,14 @@ class Monitor:
             MonitorError: if the trajectory cannot be evaluated.
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
-        found = extremes_of(self.watched, buffer, self.step)
+        lows, highs, lowest, highest = np.empty((4, len(self.watched)))
+        for i, watched in enumerate(self.watched):
+            values = watched.part.over(buffer, watched.first, watched.last)
+            low, high = int(values.argmin()), int(values.argmax())
+            lows[i], highs[i] = values[low], values[high]
+            lowest[i], highest[i] = (watched.first + low) * self.step, (watched.first + high) * self.step
         self._spare.append(buffer)
-        return found
+        return Extremes(lows, highs, lowest, highest)
 
     def window(self, part: Formula) -> tuple[float, float]:
         """Return the first and last time in s at which a sub-formula matters to the robustness at time 0.
@@ -197,3 +235,17 @@ class Monitor:
         program = compile_formula(part, step=self.step, samples=self.samples, first=first, last=last)
         buffer = fill(program, trajectory, np.empty(program.size))
         return program.root.over(buffer, first, last).copy()
+
+
+def _watched(root: Part) -> Iterator[Watched]:
+    """Yield the conditions of implications, the operands of disjunctions, and the predicates."""
+    for part in root.walk():
+        parts: tuple[Part, ...] = ()
+        match part.formula:
+            case Implies():
+                parts = part.children[:1]
+            case Or():
+                parts = part.children
+            case Predicate():
+                parts = (part,)
+        yield from (Watched(part.formula, each, part.place.first, part.place.last) for each in parts)

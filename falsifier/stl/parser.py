@@ -26,7 +26,6 @@ from decimal import Decimal
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
-from falsifier.stl.constants import Constant, without_constants
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -52,6 +51,7 @@ from falsifier.stl.formula import (
     Always,
     And,
     Comparison,
+    Constant,
     Eventually,
     Flag,
     Formula,
@@ -63,9 +63,19 @@ from falsifier.stl.formula import (
     Predicate,
     Until,
     Window,
+    without_constants,
 )
-from falsifier.stl.lexer import JOIN, UNITS, Token, hint_after, hint_at, hint_for, syntax_error, tokenize
-from falsifier.stl.names import FUNCTIONS
+from falsifier.stl.lexer import (
+    FUNCTIONS,
+    JOIN,
+    UNITS,
+    Token,
+    hint_after,
+    hint_at,
+    hint_for,
+    syntax_error,
+    tokenize,
+)
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100

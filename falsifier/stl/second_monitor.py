@@ -46,11 +46,6 @@ from falsifier.stl.formula import (
 )
 from falsifier.stl.margins import ON_LIMIT
 
-_COMPARISONS = {
-    "<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal,
-    "==": np.equal, "!=": np.not_equal,
-}  # fmt: skip
-
 
 def robustness(formula: Formula, trajectory: Trajectory) -> float:
     """Return the robustness at time 0 computed by rtamt; exactly on the limit, its sign says what is true.
@@ -150,7 +145,7 @@ class _Translation:
 
     def truth(self, predicate: Predicate) -> str:
         """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""
-        true = _COMPARISONS[predicate.operator](self.values(predicate.left), self.values(predicate.right))
+        true = np.broadcast_to(predicate.holds(self.trajectory.columns), self.trajectory.times.shape)
         alias = f"v{len(self.columns)}"
         self.columns[alias] = np.where(true, 1.0, -1.0).tolist()
         return alias

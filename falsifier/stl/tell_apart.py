@@ -101,8 +101,7 @@ def _levels(formulas: tuple[Formula, ...], allowed: Interval) -> Floats:
 
 def _moments(formulas: tuple[Formula, ...], step: float, samples: int) -> NDArray[np.int64]:
     """Return samples at, beside and in the middle of the bounds of windows."""
-    windows = [w for f in formulas for part in f.walk() if (w := getattr(part, "window", None)) is not None]
-    bounds = {round(t / step) for w in windows for t in (w.start, w.end)}
+    bounds = {round(t / step) for f in formulas for w in f.windows for t in (w.start, w.end)}
     sums = {a + b for a in bounds for b in bounds}
     middle = {(a + b) // 2 for a in bounds for b in bounds}
     found = {k + d for k in bounds | sums for d in (-1, 0, 1)} | middle | {samples // 4, samples // 2}

@@ -40,7 +40,7 @@ from falsifier.record.run import falsify
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Result
 from falsifier.stl import parse
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text

@@ -7,11 +7,11 @@ from operator import eq, ge, gt, le, lt, ne
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.stl.constants import Constant
 from falsifier.stl.formula import (
     Always,
     And,
     Comparison,
+    Constant,
     Eventually,
     Formula,
     Iff,

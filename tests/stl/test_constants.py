@@ -5,8 +5,17 @@ from dataclasses import fields
 import pytest
 
 from falsifier.stl import Monitor, parse, second_monitor
-from falsifier.stl.constants import FALSE, TRUE, Constant, without_constants
-from falsifier.stl.formula import Formula, Iff, Implies, Predicate, Until
+from falsifier.stl.formula import (
+    FALSE,
+    TRUE,
+    Constant,
+    Formula,
+    Iff,
+    Implies,
+    Predicate,
+    Until,
+    without_constants,
+)
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_formula, random_trajectory
 

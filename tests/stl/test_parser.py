@@ -22,7 +22,7 @@ from falsifier.stl.formula import (
     Until,
     Window,
 )
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 from tests.stl.randoms import random_formula
 
 A, B, C = (Flag.of(Name(n)) for n in "abc")

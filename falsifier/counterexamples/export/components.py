@@ -37,7 +37,7 @@ from falsifier.fmu import FmuModel, System
 from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
-from falsifier.stl.names import name_text
+from falsifier.stl.lexer import name_text
 
 _NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
 _SSD, _SSC = f"{{{_NAMESPACE}Description}}", f"{{{_NAMESPACE}Common}}"

@@ -103,10 +103,10 @@ class PredictedCost:
         for j, r in enumerate(self.space.inputs):
             held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
             columns[r.name] = r.low + (r.high - r.low) * held
-        found = []
+        found: Margins = []
         with np.errstate(all="ignore"):  # what is not finite is cut by ``learnable``
             for predicate, discrete in zip(self.predicates, self.discrete, strict=True):
-                values = np.broadcast_to(_margin(predicate, columns), states.shape[:2])
+                values = np.broadcast_to(predicate.margin(columns), states.shape[:2])
                 found.append(np.clip(values, -_DISCRETE, _DISCRETE) if discrete else values)
         return found
 
@@ -204,16 +204,3 @@ def _in_cells(window: Window | None, step: float) -> Window | None:
         return Window(1.0, 1.0)  # a window shorter than a cell is approximated by the next grid point
     first = ceil(window.start / step - _ROUNDING)
     return Window(float(first), float(max(first, floor(window.end / step + _ROUNDING))))
-
-
-def _margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
-    left, right = predicate.left.evaluate(columns), predicate.right.evaluate(columns)
-    match predicate.operator:
-        case "<" | "<=":
-            return np.asarray(right - left)
-        case ">" | ">=":
-            return np.asarray(left - right)
-        case "==":
-            return -np.abs(left - right)
-        case "!=":
-            return np.asarray(np.abs(left - right))
