@@ -19,7 +19,7 @@ from falsifier.counterexamples.store import (
     problem_of,
     shrunk_file,
 )
-from falsifier.engines.known_first import KNOWN
+from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs

@@ -10,7 +10,9 @@ if TYPE_CHECKING:  # --help of commands lists engines, and needs nothing of thes
     from falsifier.llm.conversation import OnExchange
     from falsifier.llm.messages import Chat
 
-# Origin of candidates that are simulated in place of an answer of a language model.
+# Origins of candidates that no engine chose: what a search starts from, and what is simulated in place of an
+# answer of a language model.
+KNOWN = "known"
 RANDOM_CHANGE = "random change"
 
 

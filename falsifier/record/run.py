@@ -1,6 +1,5 @@
 """The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
 
-from collections import deque
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -14,8 +13,7 @@ from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
-from falsifier.engines.known_first import KNOWN, KnownFirst
-from falsifier.engines.protocol import AsksLLM, Engine
+from falsifier.engines.protocol import KNOWN, AsksLLM, Engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -295,9 +293,8 @@ def carry_out(
         recorded = manifest.read(directory) if begun and directory else None
         stated = described or recorded
         told = told_problems(request, problems, stated.contexts if stated else {})
-        made = [engine] if engine is not None else make_engines(request, told, chat, levels)
-        known = deque(replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from)
-        engines: list[Engine] = [KnownFirst(each, known) for each in made] if known else made
+        engines = [engine] if engine is not None else make_engines(request, told, chat, levels)
+        known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         for problem in problems:
             stack.callback(problem.model.close)
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
@@ -321,9 +318,10 @@ def carry_out(
             problems,
             engines,
             request.budget,
+            known=known,
             steps=steps,
             jobs=request.jobs,
-            in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in made),
+            in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in engines),
             levels=levels,
             directory=directory,
             listeners=all_listeners,

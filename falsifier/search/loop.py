@@ -8,8 +8,8 @@ from math import inf
 from pathlib import Path
 from time import perf_counter
 
-from falsifier.engines.known_first import KNOWN
-from falsifier.engines.protocol import RANDOM_CHANGE, AsksLLM, Engine, FollowsRun, HasRemarks
+from falsifier.core.candidate import Candidate
+from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun, HasRemarks
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -41,6 +41,7 @@ def search(
     engines: Sequence[Engine],
     budget: Budget,
     *,
+    known: Sequence[Candidate] = (),
     steps: Steps | None = None,
     jobs: int = 1,
     in_batches: bool = False,
@@ -59,6 +60,7 @@ def search(
         problems: what to falsify; they differ only in their requirement.
         engines: one per problem.
         budget: limits of the run.
+        known: candidates that are simulated first, before any engine is asked; they count.
         steps: how to ask, simulate and confirm; default: everything in this process.
         jobs: number of simulations at a time.
         in_batches: whether an engine is asked for that many candidates at once, because each question costs;
@@ -90,7 +92,8 @@ def search(
     levels = tuple(levels) or (RefineLevel(0, problems[0].space),)
     steps = steps or Steps()
     began = perf_counter() - prepared - steps.seconds
-    loop = _Loop(states, levels, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
+    first = _Known(deque(known))
+    loop = _Loop(states, first, levels, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
     status: ResultStatus
     try:
         loop.attach()
@@ -165,11 +168,26 @@ class RequirementState:
 _Started = tuple[RequirementState, Callable[[], Evaluation]]
 
 
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """Proposes the candidates that a search starts from, like an engine."""
+
+    left: deque[Candidate]
+    name: str = KNOWN
+
+    def ask(self, n: int = 1) -> list[Candidate]:
+        return [self.left.popleft() for _ in range(min(n, len(self.left)))]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        pass
+
+
 @dataclass(slots=True)
 class _Loop:
     """State of a running search: the imperative shell around values and pure functions."""
 
     states: list[RequirementState]
+    known: _Known
     levels: tuple[RefineLevel, ...]
     budget: Budget
     steps: Steps
@@ -276,7 +294,7 @@ class _Loop:
 
     def ask(self, state: RequirementState, n: int) -> None:
         """Ask for n candidates, and start to simulate them."""
-        engine = state.engine
+        engine = self.known if self.known.left else state.engine
         candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
         self.turns += 1
         self.think(seconds)

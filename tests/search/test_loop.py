@@ -16,6 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.record.journal import read_journal
 from falsifier.record.records import AskedRecord, EndedRecord, EvaluatedRecord
 from falsifier.record.run import falsify
@@ -23,6 +24,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
 from falsifier.search.loop import search
 from falsifier.search.steps import Steps
+from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import broken, mostly_broken, never
@@ -257,3 +259,15 @@ def test_what_prepares_a_run_counts_such_as_the_import_of_litellm(monkeypatch: p
     ticks = iter([0.0, 61.0])
     monkeypatch.setattr("falsifier.record.run.perf_counter", lambda: next(ticks))
     assert falsify(lag_problem(), "uniform", budget=Budget(5, seconds=60.0)).status == "failed"
+
+
+def test_known_candidates_come_first_and_once_where_requirements_share_the_search() -> None:
+    one = lag_problem("G[0,10] (x <= 5)")
+    other = replace(one, requirement=Requirement("other", parse("G[0,10] (x >= -5)")))
+    known = make_engine("uniform", one, seed=9).ask(3)
+    engines = [make_engine("uniform", each, seed=1) for each in (one, other)]
+    for budget in (3, 4):
+        results = search([one, other], engines, Budget(budget), known=known)
+        keys = [e.candidate.key for e in results[1].evaluations]
+        assert keys[:3] == [c.key for c in known] and len(set(keys)) == budget
+        assert results[0].status == "not falsified"
