@@ -20,7 +20,7 @@ from scipy.optimize import differential_evolution
 
 from falsifier import load_problem, make_engine
 from falsifier.core.candidate import Candidate
-from falsifier.engines.box import UnitBox
+from falsifier.engines.layout import fixed_layout
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu.model import FmuModel
 from falsifier.problem.problem import Problem
@@ -43,7 +43,7 @@ class Counter:
 
     def __init__(self, problem: Problem, simulations: int) -> None:
         self.problem, self.simulations = problem, simulations
-        self.box = UnitBox(problem.space)
+        self.box = fixed_layout(problem.space)
         self.used, self.failed, self.lowest = 0, 0, float("inf")
         self.best: Candidate | None = None
         interval = problem.experiment.output_interval

@@ -12,7 +12,7 @@ from math import inf
 from falsifier.core.arguments import whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted
-from falsifier.engines.box import UnitBox
+from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -224,7 +224,7 @@ def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | N
     smallest = min((e.robustness for e in evaluations if e.robustness is not None), default=None)
     for number, evaluation in enumerate(evaluations, start=1):
         if evaluation.violated:
-            drawable = UnitBox(space).represents(evaluation.candidate)
+            drawable = fixed_layout(space).represents(evaluation.candidate)
             return Searched(len(evaluations), smallest, number, drawable)
     return Searched(len(evaluations), smallest)
 

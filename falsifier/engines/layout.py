@@ -3,21 +3,30 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
-from falsifier.engines.box import Array, settled
+from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, nearest_value
 from falsifier.problem.problem import Problem
 
+# Single precision in the rollout of learnt dynamics, double precision elsewhere.
+Array = NDArray[np.floating[Any]]
+# Engines learn from numbers up to this one: products of larger ones overflow in single precision.
+_LARGEST = 1e25
 # Cells over the formula's horizon on which free inputs are held and outputs predicted: enough for pieces of
 # 1 % of the horizon.
 CELLS = 100
 # Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
 _MAX_HORIZONS = 20
+
+
+def learnable(numbers: ArrayLike) -> NDArray[np.float64]:
+    """Return numbers, of any shape, with infinite and huge ones cut to what can be calculated with."""
+    return np.clip(np.asarray(numbers, dtype=np.float64), -_LARGEST, _LARGEST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +93,11 @@ class Layout:
     space: SearchSpace
     codings: tuple[Coding, ...]
 
+    @property
+    def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
+        """Ranges of the inputs, then of the parameters."""
+        return (*self.space.inputs, *self.space.parameters)
+
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
         """Indices of the coordinates of each input and each parameter."""
@@ -116,18 +130,25 @@ class Layout:
     @cached_property
     def has_gaps(self) -> bool:
         """Whether some points stand for the same candidate, because not every level of a range is a value."""
-        return any(r.kind != "real" or r.low == r.high for r in self._ranges)
+        return any(r.kind != "real" or r.low == r.high for r in self.ranges)
 
     def settled(self, points: Array) -> Array:
         """Return the points, shape (..., d), that the candidates of these points have.
 
         Integers, Booleans and enumerations are at the nearest number, what cannot vary is at 0.
         """
-        return settled(points, self._ranges, self.groups) if self.has_gaps else points
-
-    @property
-    def _ranges(self) -> tuple[InputRange | ParameterRange, ...]:
-        return (*self.space.inputs, *self.space.parameters)
+        if not self.has_gaps:
+            return points
+        result = np.array(points, dtype=np.float64)
+        for r, group in zip(self.ranges, self.groups, strict=True):
+            if r.low == r.high:
+                result[..., group] = 0.0
+            elif r.kind != "real":
+                levels, which = np.unique(np.clip(result[..., group], 0.0, 1.0), return_inverse=True)
+                values = [nearest_value(r, r.low + (r.high - r.low) * float(v)) for v in levels]
+                scaled = (np.array(values) - r.low) / (r.high - r.low)
+                result[..., group] = scaled[which].reshape(result[..., group].shape)
+        return result
 
     def inputs(self, points: Array, grid: TimeGrid) -> Array:
         """Return scaled inputs and parameters in the horizon's cells for m points, (m, cells, groups)."""
@@ -156,6 +177,12 @@ class Layout:
             for p, v in zip(self.space.parameters, scalars, strict=True)
         }
         return self.space.admit(Candidate(signals, parameters, origin, rationale))
+
+    def represents(self, candidate: Candidate) -> bool:
+        """Whether all signals have the control points of this layout, so that a point stands for them."""
+        signals = [candidate.signals[r.name] for r in self.space.inputs]
+        own = [(coding.times, coding.interpolation) for coding in self.codings]
+        return [(signal.times, signal.interpolation) for signal in signals] == own
 
     def point(self, candidate: Candidate) -> Array:
         """Return the point whose signals have the candidate's values at this layout's control points."""
@@ -190,6 +217,11 @@ class Layout:
                 return None
             levels.append(level)
         return tuple(levels)
+
+
+def fixed_layout(space: SearchSpace) -> Layout:
+    """Return the layout with the spec's control points."""
+    return Layout(space, tuple(_fixed(space, r) for r in space.inputs))
 
 
 def planning_layout(space: SearchSpace, grid: TimeGrid) -> Layout:

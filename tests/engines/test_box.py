@@ -5,13 +5,14 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.engines.box import BoxEngine, Proposal, UnitBox, Vector
+from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.layout import fixed_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.stl import Verdict
 from falsifier.testing import FREE, START, lag_problem
 
 PROBLEM = lag_problem(inputs=2, limit=2.0, free=FREE, parameters=[START])
-BOX = UnitBox(PROBLEM.space)
+BOX = fixed_layout(PROBLEM.space)
 
 
 def test_points_and_candidates_stand_for_each_other() -> None:
@@ -43,7 +44,7 @@ def test_a_free_signal_is_read_at_the_fixed_control_points_and_does_not_represen
 
 def test_a_range_of_one_value_has_a_coordinate_without_effect() -> None:
     (u,) = lag_problem().space.inputs
-    box = UnitBox(replace(lag_problem().space, inputs=(replace(u, low=0.5, high=0.5),)))
+    box = fixed_layout(replace(lag_problem().space, inputs=(replace(u, low=0.5, high=0.5),)))
     candidate = box.candidate(np.array([0.0, 0.3, 0.7, 1.0]), origin="", rationale="")
     assert set(candidate.signals["u"].values) == {0.5}
     assert box.point(candidate).tolist() == [0.0] * 4

@@ -7,7 +7,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
-from falsifier.engines.simple import CornerWalk
+from falsifier.engines.simple import Corners
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.stl import Verdict
 from falsifier.testing import START, drive, lag_problem, simulated
@@ -77,28 +77,29 @@ def test_what_has_a_single_value_has_one_extreme_and_reasons_name_the_levels() -
     assert first.signals["u"].values == second.signals["u"].values
 
 
+def levels(candidate: Candidate) -> tuple[float, ...]:
+    return tuple(signal.values[0] for signal in candidate.signals.values())
+
+
 def test_a_failed_corner_is_tried_once_and_never_built_upon() -> None:
-    rng = np.random.default_rng(3)
-    walk = CornerWalk(3)
-    first = walk.next(rng)
-    assert first is not None
-    walk.learn(first, None)
-    second = walk.next(rng)
-    assert second is not None
-    walk.learn(second, 1.0)
-    third = walk.next(rng)
-    assert third not in (None, first, second)
-    assert sum(a != b for a, b in zip(second, third or (), strict=True)) == 1, "the best one is built upon"
+    engine = make_engine("corners", lag_problem(inputs=3), seed=3)
+    (first,) = engine.ask()
+    engine.tell([Evaluation(first, "failed")])
+    (second,) = engine.ask()
+    engine.tell([Evaluation(second, verdict=Verdict(1.0, 0.0, "x"))])
+    (third,) = engine.ask()
+    assert len({levels(c) for c in (first, second, third)}) == 3
+    assert sum(a != b for a, b in zip(levels(second), levels(third), strict=True)) == 1
 
 
 def test_a_corner_that_was_heard_of_is_built_upon_and_not_tried() -> None:
-    walk = CornerWalk(2)
-    walk.heard((0, 0), 1.0)
-    rng = np.random.default_rng(0)
-    first = walk.next(rng)
-    assert first in ((0, 1), (1, 0))
-    walk.learn(first, 2.0)
-    walk.heard(first, 0.5)
-    assert walk.next(rng) == tuple(1 - level for level in first), "its own simulation counts"
-    assert not walk.is_done
-    assert walk.next(rng) is not None and walk.is_done and walk.next(rng) is None
+    engine = Corners(lag_problem(inputs=2), seed=0)
+    engine.hear(np.full(engine.box.dimension, 0.1), 1.0)
+    (first,) = engine.ask()
+    assert sum(levels(first)) == 0.0, "one input is high, the other low"
+    engine.tell([Evaluation(first, verdict=Verdict(2.0, 0.0, "x"))])
+    engine.hear(engine.box.point(first), 0.5)
+    (second,) = engine.ask()
+    assert levels(second) == tuple(-level for level in levels(first)), "its own simulation counts"
+    assert not engine.is_done
+    assert set(levels(*engine.ask())) == {1.0} and engine.is_done

@@ -5,10 +5,10 @@ from abc import abstractmethod
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
-from scipy.stats import qmc
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import Proposal, Vector
 from falsifier.engines.optimisers.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.engines.simple import Sobol
 from falsifier.problem.problem import Problem
 
 # Maximum number of points of the process, whose cost grows with their cube: half the best, half the latest.
@@ -20,22 +20,19 @@ _STARTS = 3
 _SAMPLES = 512
 
 
-class GaussianProcessEngine(BoxEngine):
+class GaussianProcessEngine(Sobol):
     """Sobol points first, then the most promising point of a Gaussian process of the costs so far."""
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        d = self.box.dimension
-        self._sequence = qmc.Sobol(min(d, qmc.Sobol.MAXDIM), scramble=True, seed=np.random.default_rng(seed))
-        self._start = min(20, 2 * d + 2)
+        self._start = min(20, 2 * self.box.dimension + 2)
         self._points: list[Vector] = []
         self._costs: list[float] = []
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._asked < self._start or len(self._costs) < 2:
-            point = rng.random(self.box.dimension)
-            point[: self._sequence.d] = self._sequence.random(1)[0]
-            return Proposal(point, "a Sobol point: too few evaluations for a Gaussian process yet")
+            few = "a Sobol point: too few evaluations for a Gaussian process yet"
+            return Proposal(super()._propose(rng).point, few)
         points, costs = self._kept()
         return self._most_promising(points, standardised(costs), rng)
 
