@@ -12,7 +12,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.errors import CandidateError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.testing import BIAS, START, EngineContract, drive, lag_problem, simulated
+from falsifier.testing import BIAS, START, EngineContract, lag_problem
 
 
 class Refused(Exception):
@@ -110,30 +110,3 @@ class TestLagProblem:
         # x' = 0.5 + 0.125 - x from 0.25, by Euler with 0.1 s.
         expected = 0.625 + (0.25 - 0.625) * 0.9 ** np.arange(101)
         np.testing.assert_allclose(found.trajectory["x"], expected, atol=1e-12)
-
-    def test_by_default_full_input_violates_and_rest_does_not(self) -> None:
-        problem = lag_problem()
-        assert evaluate(problem, problem.space.decode([1.0] * 4)).violated
-        assert not evaluate(problem, problem.space.decode([0.0] * 4)).violated
-
-
-def test_driving_an_engine_asks_and_tells_in_turn() -> None:
-    problem = lag_problem()
-    told: list[int] = []
-
-    class Counting(Wrapped):
-        def tell(self, evaluations: Sequence[Evaluation]) -> None:
-            told.append(len(evaluations))
-
-    asked = drive(Counting(problem, 0), simulated(problem, lambda x: float(x[-1])), rounds=3, n=2)
-    assert len(asked) == 6
-    assert told == [2, 2, 2]
-
-
-def test_simulations_are_judged_by_the_margin_that_is_given() -> None:
-    problem = lag_problem()
-    (candidate,) = make_engine("uniform", problem, seed=0).ask()
-    found = simulated(problem, lambda x: float(x[-1]))(candidate)
-    assert found.trajectory is not None
-    assert found.robustness == found.trajectory["x"][-1]
-    assert found.trajectory.names == ("x", "u")

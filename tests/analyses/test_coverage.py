@@ -7,14 +7,9 @@ import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
 from falsifier.analyses.coverage import (
-    PARTS,
     Coverage,
-    allowed_labels,
-    cells_of,
     coverage_of,
-    edges_of,
     fastest_rate,
-    labels_of,
     pace_of,
 )
 from falsifier.errors import SpecError
@@ -136,17 +131,3 @@ def test_how_fast_an_input_changed(signal: Signal, pace: str, rate: float | None
     found = fastest_rate(signal, 10.0)
     assert found == (None if rate is None else pytest.approx(rate, rel=0.01))
     assert pace_of(signal, found, InputRecord(name="u", low=0.0, high=100.0), 10.0) == pace
-
-
-def test_parts_of_short_lists_of_numbers_are_the_numbers() -> None:
-    u = InputRecord(name="u", low=0, high=2, kind="integer")
-    assert edges_of(u) == [(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]
-    assert cells_of(u, np.array([0.0, 1.0, 2.0])).tolist() == [0, 1, 2]
-    assert len(edges_of(InputRecord(name="u", low=0, high=50, kind="integer"))) == PARTS
-    assert edges_of(InputRecord(name="u", low=1, high=1)) == [(1.0, 1.0)]
-    assert allowed_labels(u) == {0: "0", 1: "1", 2: "2"}
-
-
-def test_modes_are_named_by_their_kind() -> None:
-    assert labels_of("boolean", ()) == {0: "false", 1: "true"}
-    assert labels_of("enumeration", [("N", 0), ("D", 1)]) == {0: "N", 1: "D"}

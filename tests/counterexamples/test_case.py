@@ -6,7 +6,7 @@ from falsifier import falsify
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.case import case_of, known_inputs, nearest_miss
 from falsifier.counterexamples.store import save, to_store
-from falsifier.errors import CandidateError, FalsifierError, JournalError, SpecError
+from falsifier.errors import CandidateError, JournalError, SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import simulate
 from falsifier.testing import lag_problem
@@ -88,8 +88,3 @@ def test_a_counterexample_file_is_taken_as_it_is(tmp_path: Path) -> None:
     violation = simulate(problem, {"u": Signal((0.0,), (1.0,), "linear")})
     file = save(to_store(confirm(problem, violation)), tmp_path / "counterexample.json")
     assert known_inputs(file, problem).candidate.signals["u"].values == (1.0,)
-
-
-def test_anything_else_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FalsifierError, match=r"nothing\.json"):
-        known_inputs(tmp_path / "nothing.json", lag_problem())

@@ -8,7 +8,6 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.search.budget import Budget
 from falsifier.testing import lag_problem
 from tests.problems import never
 
@@ -36,18 +35,6 @@ def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Pat
 def test_a_check_that_cannot_simulate_is_an_error() -> None:
     with pytest.raises(SimulationError, match="all 10 simulations failed"):
         check(lag_problem(response=never), engine="uniform")
-
-
-def test_without_a_database_nothing_is_stored(tmp_path: Path) -> None:
-    checked = check(lag_problem("G[0,10] (x <= 0.5)"), engine="corners", budget=10)
-    assert checked.counterexample is not None
-    assert (checked.file, checked.replayed) == (None, ())
-
-
-def test_a_requirement_that_holds_uses_its_budget_up() -> None:
-    checked = check(lag_problem("G[0,10] (x <= 2)"), engine="uniform", budget=Budget(4))
-    assert (checked.counterexample, checked.file) == (None, None)
-    assert checked.result is not None and checked.result.spent.simulations == 4
 
 
 def test_what_cannot_be_confirmed_when_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,6 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
-from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.problems import never
 from tests.stepped import euler_problem
@@ -49,13 +48,6 @@ def folder(tmp_path: Path) -> Path:
     shutil.copy(bundled("fmus") / "AT.fmu", folder / "AT.fmu")
     (folder / "my.toml").write_text(SPEC)
     return folder
-
-
-def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
-    problem = lag_problem()
-    stored = to_store(violation(problem))
-    assert load(save(stored, tmp_path / "deep" / "c.json")) == stored
-    assert list((tmp_path / "deep").iterdir()) == [tmp_path / "deep" / "c.json"]
 
 
 def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
@@ -165,18 +157,6 @@ def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
     assert [p for p, _ in database.fetch(one)] == [path]
     assert list(database.fetch(other)) == []
     assert list(database.fetch(lag_problem())) == []
-
-
-def test_the_formula_is_kept_as_text() -> None:
-    problem = lag_problem("G[0,10] (x <= 0.9 or u < -2)")
-    stored = to_store(violation(problem))
-    assert parse(stored.formula) == problem.requirement.formula
-    assert stored.what_broke.startswith("alternative 1 of 2: x <= 0.9 was violated from ")
-
-
-def test_a_path_may_be_a_text(tmp_path: Path) -> None:
-    path = save(to_store(violation(lag_problem())), tmp_path / "counterexample.json")
-    assert load(str(path)) == load(path) == load(str(tmp_path))
 
 
 def test_rights_move_with_the_file_and_a_spec_of_today_gives_no_more(folder: Path, tmp_path: Path) -> None:

@@ -3,15 +3,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from falsifier.core.model import Experiment
 from falsifier.engines import make_engine
 from falsifier.errors import MonitorError, SpecError
-from falsifier.evaluation.confirm import confirm, half_step, other_interface
+from falsifier.evaluation.confirm import (
+    Movement,
+    confirm,
+    other_interface,
+    step_convergence,
+    sufficient_step,
+)
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.fmu import Frame
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.stl import second_monitor
 from falsifier.testing import lag_problem
+from tests.fmu.fixtures import isolated, ramp
+from tests.fmu.small_systems import loop
 from tests.stepped import euler_problem
 
 # x(1) of x' = 1 - x by explicit Euler: 1 - 0.9**10 with 0.1 s, 1 - 0.95**20 with 0.05 s.
@@ -39,14 +49,6 @@ def test_a_violation_that_vanishes_at_half_the_step_is_fragile_and_says_by_how_m
     assert found.halved == pytest.approx(0.65 - FINE)
     assert f"does not violate: robustness {0.65 - FINE:+.6g}" in found.reason
     assert f"a change of {COARSE - FINE:+.4g}" in found.reason
-
-
-def test_the_halved_step_starts_from_the_given_one_and_keeps_the_grid() -> None:
-    problem = euler_problem("G[1,1] (x <= 0.6)")
-    assert half_step(problem).experiment.step_size == pytest.approx(0.05)
-    stepped = replace(problem, experiment=replace(problem.experiment, step_size=0.02))
-    assert half_step(stepped).experiment.step_size == pytest.approx(0.01)
-    assert half_step(stepped).experiment.output_interval == problem.experiment.output_interval
 
 
 def test_fragile_violations_do_not_count_and_are_listed_apart() -> None:
@@ -128,8 +130,24 @@ def test_the_other_interface_of_an_fmu_confirms_too() -> None:
     assert there.robustness == pytest.approx(here.robustness, abs=0.05)
 
 
-def test_euler_agrees_with_the_function() -> None:
-    one, other = (highest(p).trajectory for p in (euler_problem("G[0,10] (x <= 1)"), lag_problem()))
-    assert one is not None
-    assert other is not None
-    np.testing.assert_allclose(one["x"], other["x"], rtol=1e-12)
+def test_halving_the_step_moves_outputs_by_half_the_error_of_holding() -> None:
+    """A held ramp lags by half a step: x is off by h / 2 (1 - exp(-t / T)), and half of that moves."""
+    model = isolated("Lag_2")
+    moved = step_convergence(model, Experiment(4.0, 0.1, ("x", "T")), {"u": ramp(4.0)})
+    assert moved["x"].largest == pytest.approx(0.1 / 4 * (1 - np.exp(-2.0)), rel=0.03)
+    assert moved["x"].time == pytest.approx(4.0)
+    assert moved["T"] == Movement(0.0, 0.0, 0.0)
+    assert moved["T"].relative == 0.0
+    finer = step_convergence(model, Experiment(4.0, 0.1, ("x",), step_size=0.01), {"u": ramp(4.0)})
+    assert finer["x"].relative == pytest.approx(0.1 * moved["x"].relative, rel=0.05)
+
+
+def test_the_step_that_a_coupling_needs_is_found() -> None:
+    """With a gain of 30 and a time constant of 2 s, the loop is stable below a step of some 0.13 s."""
+    experiment = Experiment(4.0, 0.2, ("plant.y",))
+    model = replace(loop(), frame=Frame(values=(("pi.k", 30.0),)))
+    found = sufficient_step(model, experiment, {}, share=0.01, halvings=6)
+    assert found is not None and found <= 0.025
+    moved = step_convergence(model, replace(experiment, step_size=found), {})
+    assert moved["plant.y"].relative <= 0.01
+    assert sufficient_step(model, experiment, {}, share=0.01, halvings=0) is None

@@ -6,7 +6,7 @@ from falsifier.errors import JournalError
 from falsifier.problem.loading import load_problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.manifest import Manifest, describe, file_hashes
+from falsifier.record.manifest import Manifest, describe
 from falsifier.search.request import RunRequest
 from falsifier.testing import FREE, START, lag_problem
 from tests.record.support import write_manifest
@@ -58,22 +58,3 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
     (tmp_path / "manifest.json").write_text("{")
     with pytest.raises(JournalError, match="is damaged"):
         manifest.read(tmp_path)
-
-
-def test_changed_files_are_named_and_new_ones_are_none(tmp_path: Path) -> None:
-    manifest.check_unchanged(tmp_path, {"a": "1"}, {"a": "1", "b": "2"})
-    with pytest.raises(JournalError, match="a has changed"):
-        manifest.check_unchanged(tmp_path, {"a": "1"}, {"a": "2"})
-
-
-def test_hashes_follow_the_content_of_the_spec(tmp_path: Path) -> None:
-    fmu = PROBLEMS[0].model.path  # type: ignore[attr-defined]
-    spec = tmp_path / "my.toml"
-    text = f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\n[inputs.throttle]\ncontrol_points = 2\n'
-    text += "[requirements.R]\nformula = 'G[0,20] (speed <= 120)'\n"
-    found = []
-    for more in ("", "# a comment\n"):
-        spec.write_text(text + more)
-        found.append(file_hashes(load_problem(str(spec))))
-    assert found[0].keys() == found[1].keys()
-    assert [found[0][p] == found[1][p] for p in found[0]] == [True, False]

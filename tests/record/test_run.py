@@ -1,7 +1,6 @@
 """The one way to search, as users call it."""
 
 import json
-from collections import deque
 from pathlib import Path
 
 import pytest
@@ -72,11 +71,6 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
     assert manifest.read(tmp_path / "shared").names == ("NEVER", "HARD")
 
 
-def test_a_budget_may_be_a_number_of_simulations() -> None:
-    counts = [falsify(impossible(), "uniform", budget=b).spent.simulations for b in (3, Budget(3))]
-    assert counts == [3, 3]
-
-
 @pytest.mark.parametrize(
     ("name", "given"),
     [
@@ -97,10 +91,6 @@ def test_numbers_that_cannot_be_used_are_named(name: str, given: object) -> None
 def test_whole_numbers_may_be_those_of_numpy() -> None:
     result = falsify(impossible(), "uniform", budget=int64(3), seed=int64(7))  # type: ignore[call-overload]
     assert result.spent.simulations == 3
-
-
-def test_any_sequence_of_problems_gives_a_list() -> None:
-    assert [r.problem.name for r in falsify(deque([easy(), hard()]), "corners", budget=1)] == ["EASY", "HARD"]
 
 
 def test_a_chat_leads_by_itself_and_its_name_is_recorded(tmp_path: Path) -> None:

@@ -141,13 +141,6 @@ def test_inputs_and_values_of_the_whole_stay(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
 
 
-def test_interfaces_stay(tmp_path: Path) -> None:
-    model = built({"plant": solved("Lag_2"), "pi": "Gain_3"}, LOOP)
-    found = again(model, tmp_path)
-    assert [m.interface for m in found.network.members] == ["model-exchange", "co-simulation"]
-    np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
-
-
 def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
     from fmpy.ssp.ssd import read_ssd
 

@@ -1,5 +1,4 @@
 import csv
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +10,14 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.tables import (
     InputTable,
-    by_declaration,
     input_table,
     matlab_names,
-    start_of,
-    start_values,
     write_csv,
-    write_json,
     write_mat,
     write_ssv,
 )
-from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
-from tests.fmu import fixtures
 
 
 def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:
@@ -60,14 +53,6 @@ def test_the_csv_reads_back_exactly(tmp_path: Path) -> None:
     ]
 
 
-def test_without_start_values_the_files_are_empty_and_valid(tmp_path: Path) -> None:
-    assert json.loads(write_json({}, tmp_path / "s.json").read_text()) == {}
-    table = InputTable(np.array([0.0, 1.0]), {})
-    content = loadmat(write_mat(table, {}, tmp_path / "i.mat"))
-    assert content["start_values"].size == 0
-    assert content["names"].size == 0
-
-
 @pytest.mark.parametrize(
     ("name", "accepted"),
     [
@@ -95,40 +80,3 @@ def test_steps_stand_where_the_simulation_set_them() -> None:
     assert table.times.tolist() == pytest.approx([0.0, 1.25, 1.25, 50.0])
     assert table.columns["throttle"].tolist() == [100.0, 100.0, 35.0, 35.0]
     assert table.columns["brake"].tolist() == [0.0] * 4
-
-
-def test_interpolated_signals_have_a_row_at_every_communication_point() -> None:
-    problem = lag_problem(free=Freedom(10, 0.1))
-    candidate = Candidate({"u": Signal((0.0, 10.0), (-1.0, 1.0), "linear")})
-    table = input_table(problem, candidate)
-    assert len(table.times) == problem.experiment.samples
-    np.testing.assert_allclose(table.columns["u"], np.linspace(-1, 1, 101), atol=1e-12)
-
-
-def test_start_values_are_the_fixed_and_the_searched_parameters(tmp_path: Path) -> None:
-    from dataclasses import replace
-
-    problem = replace(lag_problem(), parameters={"gain": 0.1 + 0.2, "u": 0.5})
-    start = start_values(problem, Candidate({}, {"x0": -1.5}))
-    assert start == {"gain": 0.1 + 0.2, "x0": -1.5}
-    assert json.loads(write_json(start, tmp_path / "s.json").read_text()) == start
-
-
-def test_arrays_are_completed() -> None:
-    model = FmuModel(fixtures.path("Arrays_3"))
-    given = {"A[1,2]": 5.0, "offset[1]": 1.0}
-    assert by_declaration(model, given, lambda name: start_of(model, name)) == {
-        "A": [0.0, 5.0, -1.0, 0.0],
-        "offset": [1.0, 20.0],
-    }
-
-
-def test_aliases_appear_under_the_name_that_is_declared() -> None:
-    model = FmuModel(fixtures.path("Aliases_3"))
-    assert model.place("plant.y") == ("y", 0)
-    assert model.elements("y") == ("y",)
-    assert by_declaration(model, {"u": 1.0}, lambda name: 0.0) == {"u": [1.0]}
-
-
-def test_other_models_have_no_arrays() -> None:
-    assert by_declaration(lag_problem().model, {"x[1]": 2.0}, lambda name: 0.0) == {"x[1]": [2.0]}
