@@ -62,8 +62,7 @@ def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
                 ) from None
             if entry.filename in (_TERMINALS, _DESCRIPTION):
                 root = read_xml(content, f"{fmu}: {entry.filename}", SpecError)
-                lines = list(_terminals(root) if entry.filename == _TERMINALS else _annotations(root))
-                content = "\n".join(lines).encode()
+                content = "\n".join(_lines(root)).encode()
             if content.strip():
                 yield entry.filename, content
 
@@ -79,38 +78,27 @@ def _may_tell(name: PurePosixPath) -> bool:
     )
 
 
-def _terminals(root: Element) -> Iterator[str]:
-    for terminal in root.iter("Terminal"):
-        members = [
-            f"{m.get('memberName') or m.get('variableName')} = {m.get('variableName')}"
-            for m in terminal.iter("TerminalMemberVariable")
-        ]
-        kind = terminal.get("terminalKind") or terminal.get("matchingRule") or ""
-        described = terminal.get("description")
-        yield (
-            f"terminal {terminal.get('name')}{f' ({kind})' if kind else ''}"
-            f"{f', {described}' if described else ''}: {', '.join(members)}"
+def _lines(root: Element) -> Iterator[str]:
+    """Return the terminals or annotations of a file, with the variables that annotations belong to."""
+    yield from map(_outline, root.iter("Terminal"))
+    owners = (("", root), *((f"{v.get('name')}: ", v) for v in root.findall("ModelVariables/*")))
+    for prefix, owner in owners:
+        for place in ("VendorAnnotations/Tool", "Annotations/Tool", "Annotations/Annotation"):
+            yield from (f"{prefix}{_outline(found)}" for found in owner.findall(place))
+
+
+def _outline(element: Element) -> str:
+    """Return an element and all within it in one line."""
+    return "; ".join(
+        " ".join(
+            [
+                each.tag.rpartition("}")[2],
+                *(f"{name}={value}" for name, value in each.attrib.items()),
+                *(each.text or "").split(),
+            ]
         )
-
-
-def _annotations(root: Element) -> Iterator[str]:
-    """Return the annotations of a model description, with the variables that they belong to."""
-    for place in ("VendorAnnotations/Tool", "Annotations/Annotation"):
-        yield from (_annotation(found, "") for found in root.findall(place))
-    for variable in root.findall("ModelVariables/*"):
-        for found in (*variable.findall("Annotations/Tool"), *variable.findall("Annotations/Annotation")):
-            yield _annotation(found, f"{variable.get('name')}: ")
-
-
-def _annotation(element: Element, of: str) -> str:
-    kind = element.get("name") or element.get("type") or ""
-    text = " ".join(" ".join(element.itertext()).split())
-    values = [
-        f"{inner.tag.rpartition('}')[2]} {' '.join(f'{k}={v}' for k, v in inner.attrib.items())}".strip()
-        for inner in element.iter()
-        if inner is not element
-    ]
-    return f"{of}annotation {kind}: {'; '.join(values)} {text}".strip()
+        for each in element.iter()
+    )
 
 
 def text_of(content: bytes) -> str | None:
@@ -121,24 +109,22 @@ def text_of(content: bytes) -> str | None:
     >>> text_of("5 K".encode("utf-16")), text_of(bytes([53, 176])), text_of(bytes(4))
     ('5 K', '5°', None)
     """
-    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
-    try:
-        text = content.decode(encoding)
-    except UnicodeDecodeError:
-        if encoding != "utf-8":
-            return None
-        text = _western(content)
+    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "")
+    if encoding:
+        text = _decoded(content, encoding)
+    elif (text := _decoded(content, "utf-8")) is None:
+        # Windows-1252 has quotes and dashes where Latin-1 has control characters.
+        text = _decoded(content, "cp1252") or content.decode("latin-1")
         if _CONTROL.search(text):
             return None
-    return None if "\0" in text else text
+    return None if text is None or "\0" in text else text
 
 
-def _western(content: bytes) -> str:
-    """Return the text in Windows-1252, which has quotes and dashes where Latin-1 has control characters."""
+def _decoded(content: bytes, encoding: str) -> str | None:
     try:
-        return content.decode("cp1252")
+        return content.decode(encoding)
     except UnicodeDecodeError:
-        return content.decode("latin-1")
+        return None
 
 
 class Sentry:

@@ -1,8 +1,9 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,7 +12,6 @@ from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text,
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
-from falsifier.context.thresholds import Threshold
 from falsifier.context.values import SIMULINK, Compared, Context, Excerpt
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
@@ -41,11 +41,6 @@ class _File:
     sha256: str
     content: str | Diagram
     is_named: bool
-
-    @property
-    def otherwise(self) -> str:
-        """What to do if it has a secret."""
-        return _LEAVE_OUT if self.is_named else NAME_THEM
 
 
 # Files with what they contain.
@@ -81,14 +76,16 @@ def gather(
     """
     sentry = Sentry(checked) if is_told else None
     found = [_read(Path(name), name, sentry) for name in dict.fromkeys(files)]
-    left_out = []
+    notes = []
     for fmu in fmus:
         for entry, content in inside(fmu):
-            inner = _of_fmu(content, f"{fmu.name}: {entry}", sentry)
-            if inner is None:
-                left_out.append(f"context {fmu.name}: {entry} is left out, because it is not text")
-            else:
-                found.append(inner)
+            name, text = f"{fmu.name}: {entry}", text_of(content)
+            if text is None:
+                notes.append(f"context {name} is left out, because it is not text")
+                continue
+            if sentry is not None:
+                sentry.look(text, name, name, NAME_THEM)
+            found.append(_File(name, name, sha256(content).hexdigest(), text, is_named=False))
     sources = {f.path: source_of(f.content, f.name) for f in found if isinstance(f.content, str)}
     library = [source for source in sources.values() if source is not None]
 
@@ -107,18 +104,21 @@ def gather(
     crossings = crossings_of(limits, ranges)
     if sentry is None:
         return Context(crossings=crossings)
-    compared = tuple(_limited(_compared(contents, signals)))
+    told = _compared(contents, signals)
+    sizes = accumulate(map(_size, told))
+    compared = tuple(each for each, size in zip(told, sizes, strict=True) if size <= _MAX_COMPARED)
     chosen = _fitting(contents, MAX_TOTAL - sum(_size(each) for each in compared))
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
         # Encodings may have hidden a secret before.
         beside = [t.text for t in readable.found] + [told for _, told in readable.modes]
-        told = "\n".join((text, *beside))
-        sentry.look(told, f"{file.path}, as it is told", file.path, file.otherwise)
+        whole = "\n".join((text, *beside))
+        otherwise = _LEAVE_OUT if file.is_named else NAME_THEM
+        sentry.look(whole, f"{file.path}, as it is told", file.path, otherwise)
         form = f"{readable.forms[i].name}{', because the rest is too long' if i else ''}"
         excerpts.append(Excerpt(file.path, file.name, file.sha256, form, text))
     sentry.refuse_unused()
-    return Context(tuple(excerpts), compared, crossings, (*left_out, *sentry.notes))
+    return Context(tuple(excerpts), compared, crossings, (*notes, *sentry.notes))
 
 
 def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
@@ -133,47 +133,24 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
         content = path.read_bytes()
     except OSError as error:
         raise SpecError(f"context {name}: cannot be read ({error.strerror or error})") from None
-    read: str | Diagram | None
-    if path.suffix.lower() in SIMULINK:
-        parts = read_parts(path) if path.suffix.lower() == ".slx" else {"": content}
-        for part, packed in parts.items():
-            shown = f"{name}: {part}" if part else name
-            if sentry is not None:
-                sentry.look(packed.decode("utf-8", "replace"), shown, name, _LEAVE_OUT)
-        read = read_diagram(path)
-    else:
-        read = text_of(content)
-        if read is None:
-            raise SpecError(
-                f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
-                "UTF-8, or leave it out"
-            )
-        if sentry is not None:
-            sentry.look(read, name, name, _LEAVE_OUT)
-    return _File(name, path.name, sha256(content).hexdigest(), read, is_named=True)
-
-
-def _of_fmu(content: bytes, name: str, sentry: Sentry | None) -> _File | None:
-    """Return a file of an FMU; None if it is not text."""
-    text = text_of(content)
+    is_diagram, is_package = path.suffix.lower() in SIMULINK, path.suffix.lower() == ".slx"
+    text = content.decode("utf-8", "replace") if is_diagram else text_of(content)
     if text is None:
-        return None
-    if sentry is not None:
-        sentry.look(text, name, name, NAME_THEM)
-    return _File(name, name, sha256(content).hexdigest(), text, is_named=False)
+        raise SpecError(
+            f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
+            "UTF-8, or leave it out"
+        )
+    if sentry is not None and is_package:
+        for part, packed in read_parts(path).items():
+            sentry.look(packed.decode("utf-8", "replace"), f"{name}: {part}", name, _LEAVE_OUT)
+    elif sentry is not None:
+        sentry.look(text, name, name, _LEAVE_OUT)
+    read = read_diagram(path) if is_diagram else text
+    return _File(name, path.name, sha256(content).hexdigest(), read, is_named=True)
 
 
 def _size(compared: Compared) -> int:
     return len(compared.text) + len(compared.place)
-
-
-def _limited(compared: Iterable[Compared]) -> Iterator[Compared]:
-    """Return as many comparisons as fit."""
-    left = _MAX_COMPARED
-    for each in compared:
-        left -= _size(each)
-        if left >= 0:
-            yield each
 
 
 def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
@@ -201,20 +178,18 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
     return chosen
 
 
-def _compared(contents: _Contents, signals: Collection[str]) -> Iterator[Compared]:
-    """Return all thresholds, those of signals of the model first."""
+def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:
+    """Return what sets signals of the model, then thresholds, those of signals first."""
     ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
     for name in signals:
         words = name.split(".")
         for i in range(len(words)):
             ends.setdefault(".".join(words[i:]).strip("'"), []).append(name)
     modes = [m for _, readable in contents for m in readable.modes if m[0] in ends]
-    yield from (Compared(tuple(ends[name]), text, "") for name, text in modes)
-    found = [t for _, readable in contents for t in readable.found]
-    told = [(tuple(sorted(name for end in _plain(t) & ends.keys() for name in ends[end])), t) for t in found]
-    ordered = sorted(told, key=lambda pair: not pair[0])
-    yield from (Compared(names, t.text, t.place) for names, t in ordered[:_MAX_COMPARISONS])
-
-
-def _plain(threshold: Threshold) -> frozenset[str]:
-    return frozenset(name.strip("'") for name in threshold.names)
+    limits = []
+    for threshold in (t for _, readable in contents for t in readable.found):
+        met = ends.keys() & {name.strip("'") for name in threshold.names}
+        names = tuple(sorted(name for end in met for name in ends[end]))
+        limits.append(Compared(names, threshold.text, threshold.place))
+    limits.sort(key=lambda each: not each.signals)
+    return [*(Compared(tuple(ends[name]), text, "") for name, text in modes), *limits[:_MAX_COMPARISONS]]

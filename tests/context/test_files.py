@@ -42,10 +42,13 @@ def test_only_what_may_say_something_is_opened(tmp_path: Path) -> None:
         "sources/model.c",
         "terminalsAndIcons/terminalsAndIcons.xml",
     ]
-    assert found["terminalsAndIcons/terminalsAndIcons.xml"] == "terminal bus (plug), CAN: v = bus_v"
+    assert found["terminalsAndIcons/terminalsAndIcons.xml"] == (
+        "Terminal name=bus matchingRule=plug description=CAN; "
+        "TerminalMemberVariable memberName=v variableName=bus_v"
+    )
     assert found["modelDescription.xml"].splitlines() == [
-        "annotation org.x: limit value=3",
-        "u: annotation t:  deep",
+        "Annotation type=org.x; limit value=3",
+        "u: Annotation type=t deep",
     ]
 
 
