@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import reduce
 from pathlib import Path
 
 from falsifier.campaigns.directory import (
@@ -171,13 +170,11 @@ class Follower:
 
 
 def total(spent: Iterable[Spent]) -> Spent:
-    """Sum of what several runs have spent."""
-    return reduce(_plus, spent, Spent())
+    """Sum of what several runs have spent; unknown if that of any run is."""
+    listed = list(spent)
 
-
-def _plus(a: Spent, b: Spent) -> Spent:
     def added(name: str) -> float | None:
-        one, other = getattr(a, name), getattr(b, name)
-        return None if one is None or other is None else one + other
+        numbers = [getattr(each, name) for each in listed]
+        return None if None in numbers else sum(numbers)
 
     return Spent(**{f.name: added(f.name) for f in fields(Spent)})  # type: ignore[arg-type]

@@ -18,7 +18,6 @@ from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import Schedule
 from falsifier.campaigns.worker import Done, RunTask, unpack
-from falsifier.context.values import Context
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import Workers, open_workers
@@ -122,11 +121,6 @@ def resume_campaign(
             return _work(directory, record, problems, workers, tuple(listeners))
 
 
-def _recorded(directory: Path) -> dict[str, Context]:
-    """Return what a run that has begun was told of context files."""
-    return read(directory).contexts if holds_run(directory) else {}
-
-
 def _work(
     directory: Path,
     record: CampaignRecord,
@@ -147,7 +141,9 @@ def _work(
     for name in unfinished:
         request = record.runs[name]
         problem = problems[request.problems[0]]
-        told = told_problems(request, [problem], _recorded(run_directory(directory, name)))
+        place = run_directory(directory, name)
+        recorded = read(place).contexts if holds_run(place) else {}  # of context files, as the run was told
+        told = told_problems(request, [problem], recorded)
         described = describe(request, told, method_of(request).label)
         tasks.append(RunTask(name, request, problem, described, directory.absolute(), mark))
 

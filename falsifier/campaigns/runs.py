@@ -3,7 +3,7 @@
 A search shared by several requirements appears as one run per requirement.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,11 +130,7 @@ def load(directory: Path) -> list[Run]:
     """
     described = ((path, manifests.read(path)) for path in run_directories(directory))
     return _told_apart(
-        [
-            _run(path, manifest.of(name), shared=manifest.shared)
-            for path, manifest in described
-            for name in manifest.names
-        ]
+        [_run(path, manifest, name) for path, manifest in described for name in manifest.names]
     )
 
 
@@ -152,7 +148,7 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
     if requirement is None and manifest.shared:
         names = ", ".join(manifest.names)
         raise JournalError(f"{directory}: several requirements share this run; choose one of {names}")
-    return _run(directory, manifest.of(requirement or manifest.names[0]), shared=manifest.shared)
+    return _run(directory, manifest, requirement or manifest.names[0])
 
 
 def _told_apart(runs: list[Run]) -> list[Run]:
@@ -169,8 +165,9 @@ def _told_apart(runs: list[Run]) -> list[Run]:
     ]
 
 
-def _run(directory: Path, manifest: Manifest, *, shared: bool) -> Run:
-    return run_of(directory, manifest, read_summary(directory, manifest.requirement.name), shared=shared)
+def _run(directory: Path, manifest: Manifest, requirement: str) -> Run:
+    summary = read_summary(directory, requirement)
+    return run_of(directory, manifest.of(requirement), summary, shared=manifest.shared)
 
 
 def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: bool) -> Run:
@@ -205,7 +202,8 @@ def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: boo
 
 def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:
     """One row per run, as plain columns of equal length."""
-    return _columns([_row(run) for run in runs])
+    rows = [_row(run) for run in runs]
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}
 
 
 def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
@@ -240,7 +238,3 @@ def _row(run: Run) -> dict[str, Any]:
         "cost": run.spent.cost,
         "directory": str(run.directory),
     }
-
-
-def _columns(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else ())}

@@ -5,7 +5,6 @@ import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from io import StringIO
-from typing import Any
 
 from falsifier.campaigns.published import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.request import Method
@@ -76,26 +75,18 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
     The published results apply to the specs' own (fixed) parameterization of instance 1, so only rows of that
     parameterization show them.
     """
-    groups = group(runs)
-    found = {key: statistics(members) for key, members in groups.items()}
-    others = {
-        (requirement, method): published.scores(requirement) if comparable(method) else {}
-        for requirement, method in groups
-    }
-    names = dict(COLUMNS) if any(others.values()) else {}
-    rows = [
-        (
-            requirement,
-            method.label,
-            _rate(found[key]),
-            *_numbers(found[key]),
-            *((_place(score(found[key]), _competitors(published, key, others)),) if names else ()),
-            *(_cell(others[key].get(name)) for name in names),
-        )
-        for key in groups
-        for requirement, method in [key]
-    ]
-    notes = {_unfinished_note()} if any(s.unfinished for s in found.values()) else set[str]()
+    found = {key: statistics(members) for key, members in group(runs).items()}
+    others = {key: published.scores(key[0]) if comparable(key[1]) else {} for key in found}
+    names = COLUMNS if any(others.values()) else {}
+    rows = []
+    for (requirement, method), numbers in found.items():
+        row = [requirement, method.label, _rate(numbers), *(text(numbers) for text in _NUMBERS.values())]
+        if names:
+            known = others[requirement, method]
+            place = _place(score(numbers), published.competitors(requirement)) if known else NONE
+            row += [place, *(_cell(known.get(name)) for name in names)]
+        rows.append(tuple(row))
+    notes = {_UNFINISHED} if any(s.unfinished for s in found.values()) else set[str]()
     legend = f"{_LEGEND} {_PUBLISHED_LEGEND}" if names else _LEGEND
     notes |= set(_sources(published)) if names else set()
     header = ("requirement", "method", "FR", *_NUMBERS, *(("rank",) if names else ()), *names.values())
@@ -104,7 +95,7 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
 
 def ablation_table(runs: Iterable[Run], published: Published) -> Table:
     """Make a table of prompt variants side by side, with the published results for each."""
-    ours = _by_column(runs, lambda m: f"{m.variant} ({_without(m, variant='')})" if m.variant else "")
+    ours = _by_column(runs, lambda m: f"{m.variant} ({replace(m, variant='').label})" if m.variant else "")
     theirs = {f"{name} published": scores for name, scores in published.ablation.items()}
     return _side_by_side("Prompt variants: FR / S", ours, theirs)
 
@@ -125,7 +116,16 @@ TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
 
 def statistics_json(runs: Iterable[Run]) -> str:
     """All statistics as JSON: a list of objects, one per requirement and method."""
-    return json.dumps([_json_row(key, members) for key, members in group(runs).items()], indent=2) + "\n"
+    rows = [
+        {
+            "requirement": requirement,
+            "label": method.label,
+            **asdict(method),
+            **asdict(statistics(members)),
+        }
+        for (requirement, method), members in group(runs).items()
+    ]
+    return json.dumps(rows, indent=2) + "\n"
 
 
 def comparable(method: Method) -> bool:
@@ -138,18 +138,19 @@ def score(found: Statistics) -> Score:
     return Score(found.falsified, found.runs, found.mean)
 
 
-_NUMBERS = (
-    "FR 95 %",
-    "mean S",
-    "mean 95 %",
-    "median S",
-    "std S",
-    "best robustness",
-    "sim. s",
-    "total s",
-    "tokens",
-    "cost $",
-)
+# Columns with what they show of the statistics.
+_NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
+    "FR 95 %": lambda s: _interval(s.rate_interval, 2),
+    "mean S": lambda s: _number(s.mean, 1),
+    "mean 95 %": lambda s: _interval(s.mean_interval, 1),
+    "median S": lambda s: _number(s.median, 1),
+    "std S": lambda s: _number(s.deviation, 1),
+    "best robustness": lambda s: NONE if s.best is None else f"{shown(s.best):.4g}",
+    "sim. s": lambda s: _number(s.simulation_seconds if s.runs else None, 2),
+    "total s": lambda s: _number(s.seconds if s.runs else None, 2),
+    "tokens": lambda s: _number(s.tokens if s.runs else None, 0),
+    "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
+}
 _LEGEND = (
     "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
     "deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. Seconds, "
@@ -161,36 +162,10 @@ _PUBLISHED_LEGEND = (
 )
 
 
-def _competitors(
-    published: Published, key: tuple[str, Method], others: Mapping[tuple[str, Method], Mapping[str, Score]]
-) -> list[Score]:
-    return published.competitors(key[0]) if others[key] else []
-
-
-def _unfinished_note() -> str:
-    return (
-        "+n: n more runs failed or have not ended; of the other numbers, only best robustness includes them."
-    )
-
-
-def _numbers(s: Statistics) -> tuple[str, ...]:
-    spent: tuple[str, ...] = (NONE,) * 4
-    if s.runs:
-        spent = (
-            _number(s.simulation_seconds, 2),
-            _number(s.seconds, 2),
-            _number(s.tokens, 0),
-            "unknown" if s.cost is None else _number(s.cost, 4),
-        )
-    return (
-        _interval(s.rate_interval, 2),
-        _number(s.mean, 1),
-        _interval(s.mean_interval, 1),
-        _number(s.median, 1),
-        _number(s.deviation, 1),
-        NONE if s.best is None else f"{shown(s.best):.4g}",
-        *spent,
-    )
+_LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
+_UNFINISHED = (
+    "+n: n more runs failed or have not ended; of the other numbers, only best robustness includes them."
+)
 
 
 def _rate(s: Statistics) -> str:
@@ -236,10 +211,6 @@ def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, 
     return found
 
 
-def _without(method: Method, *, variant: str) -> str:
-    return replace(method, variant=variant).label
-
-
 def _side_by_side(
     title: str, ours: Mapping[str, Mapping[str, Score]], theirs: Mapping[str, Mapping[str, Score]]
 ) -> Table:
@@ -252,18 +223,5 @@ def _side_by_side(
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
 
 
-_LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
-
-
 def _share_cell(cell: Score | None) -> str:
     return NONE if cell is None else f"{cell.falsified}/{cell.runs} / {_number(cell.mean, 1)}"
-
-
-def _json_row(key: tuple[str, Method], members: list[Run]) -> dict[str, Any]:
-    requirement, method = key
-    return {
-        "requirement": requirement,
-        "label": method.label,
-        **asdict(method),
-        **asdict(statistics(members)),
-    }

@@ -7,7 +7,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import InputRange, Range, SearchSpace
 from falsifier.errors import CandidateError
 
 
@@ -43,14 +43,17 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
     signals = {}
     for r in space.inputs:
         if r.name not in candidate.signals:
-            raise CandidateError(f"input {r.name!r} is searched and missing: give it, or keep it constant")
+            raise _missing(r)
         signals[r.name], changed = _fitted_signal(space, r, candidate.signals[r.name])
         notes += changed
     parameters = {}
     for p in space.parameters:
+        value = candidate.parameters.get(p.name, p.nominal)
+        if value is None:
+            raise _missing(p)
         if p.name not in candidate.parameters:
-            notes.append(f"{p.name} is not given: {_nominal(p):g}, its value if it is not searched")
-        parameters[p.name] = candidate.parameters.get(p.name, p.nominal or 0.0)
+            notes.append(f"{p.name} is not given: {value:g}, its value if it is not searched")
+        parameters[p.name] = value
     return Fitted(
         space.admit(replace(candidate, signals=signals, parameters=parameters)), tuple(dict.fromkeys(notes))
     )
@@ -65,7 +68,7 @@ def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[S
     for time, value in zip(signal.times, signal.values, strict=True):
         if time <= space.stop_time and not r.low <= value <= r.high:
             raise CandidateError(
-                f"input {r.name!r} at t = {time:g} s: {value:g} is outside its range [{r.low:g}, {r.high:g}]"
+                f"{r.label} at t = {time:g} s: {value:g} is outside its range [{r.low:g}, {r.high:g}]"
             )
     times, interpolation = _allowed(r, signal, space)
     values = signal.held(None).sample(np.asarray(times))
@@ -85,7 +88,5 @@ def _allowed(r: InputRange, signal: Signal, space: SearchSpace) -> tuple[tuple[f
     return even_times(count, stop_time=space.stop_time, interpolation=interpolation), interpolation
 
 
-def _nominal(p: ParameterRange) -> float:
-    if p.nominal is None:
-        raise CandidateError(f"parameter {p.name!r} is searched and missing: give it, or keep it constant")
-    return p.nominal
+def _missing(ranged: Range) -> CandidateError:
+    return CandidateError(f"{ranged.label} is searched and missing: give it, or keep it constant")

@@ -47,63 +47,16 @@ class Freedom:
 
 
 @dataclass(frozen=True, slots=True)
-class InputRange:
-    """One searched input signal.
+class Range:
+    """What an input or parameter may be.
 
     Attributes:
-        name: the input's name in the model.
-        low: lower bound in the input's unit; the next allowed number, unless reals are.
+        name: its name in the model.
+        low: lower bound in its unit; the next allowed number, unless reals are.
         high: upper bound.
-        control_points: number of evenly spaced control points of the fixed parameterization.
-        interpolation: interpolation between the control points.
-        hold: sample-and-hold period in s, or None.
-        free: limits of a free parameterization, or None if only the fixed one is allowed.
-        unit: the input's unit, empty if unknown.
-        description: its meaning, from the model.
-        kind: type of its values; every type except real has integer values, held between control points.
-        items: names and numbers of an enumeration's items.
-
-    Raises:
-        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them,
-            or the control points, interpolation, hold or free are not as above.
-    """
-
-    name: str
-    low: float
-    high: float
-    _: KW_ONLY
-    control_points: int = 1
-    interpolation: Interpolation = "pchip"
-    hold: float | None = None
-    free: Freedom | None = None
-    unit: str = ""
-    description: str = ""
-    kind: ValueKind = "real"
-    items: tuple[tuple[str, int], ...] = ()
-
-    def __post_init__(self) -> None:
-        what = f"input {self.name!r}"
-        _check_range(what, self)
-        whole(f"{what}: control_points", self.control_points, least=1)
-        one_of(f"{what}: interpolation", self.interpolation, INTERPOLATIONS)
-        if self.hold is not None:
-            positive(f"{what}: hold", self.hold)
-        if self.free is not None:
-            instance(f"{what}: free", self.free, Freedom, "Freedom(max_control_points, min_interval)")
-
-
-@dataclass(frozen=True, slots=True)
-class ParameterRange:
-    """One searched parameter or initial state: a single number.
-
-    Attributes:
-        name: the parameter's name in the model.
-        low: lower bound in the parameter's unit; the next allowed number, unless reals are.
-        high: upper bound.
-        nominal: its value if it is not searched, if known.
         unit: its unit, empty if unknown.
         description: its meaning, from the model.
-        kind: type of its value; every type except real has integer values.
+        kind: type of its values; every type except real has integer values.
         items: names and numbers of an enumeration's items.
 
     Raises:
@@ -114,14 +67,77 @@ class ParameterRange:
     low: float
     high: float
     _: KW_ONLY
-    nominal: float | None = None
     unit: str = ""
     description: str = ""
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = ()
 
     def __post_init__(self) -> None:
-        _check_range(f"parameter {self.name!r}", self)
+        what = self.label
+        low, high = finite(f"{what}: low", self.low), finite(f"{what}: high", self.high)
+        if low > high:
+            raise SpecError(f"{what}: expected low <= high, got [{low:g}, {high:g}]")
+        if not isfinite(high - low):
+            raise SpecError(f"{what}: [{low:g}, {high:g}] is too wide to calculate with; narrow the range")
+        one_of(f"{what}: kind", self.kind, get_args(ValueKind))
+        if self.kind == "real":
+            return
+        possible = [n for _, n in self.items] or [ceil(low), floor(high)]
+        numbers = [n for n in possible if low <= n <= high]
+        if not numbers:
+            missing = "item of the enumeration" if self.items else "integer"
+            raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
+        # Engines try the bounds, so these must be numbers that are allowed.
+        object.__setattr__(self, "low", float(min(numbers)))
+        object.__setattr__(self, "high", float(max(numbers)))
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+        return f"input {self.name!r}" if isinstance(self, InputRange) else f"parameter {self.name!r}"
+
+
+@dataclass(frozen=True, slots=True)
+class InputRange(Range):
+    """One searched input signal; values that are not reals are held between control points.
+
+    Attributes:
+        control_points: number of evenly spaced control points of the fixed parameterization.
+        interpolation: interpolation between the control points.
+        hold: sample-and-hold period in s, or None.
+        free: limits of a free parameterization, or None if only the fixed one is allowed.
+
+    Raises:
+        SpecError: as of every range, or if the control points, interpolation, hold or free are not as above.
+    """
+
+    _: KW_ONLY
+    control_points: int = 1
+    interpolation: Interpolation = "pchip"
+    hold: float | None = None
+    free: Freedom | None = None
+
+    def __post_init__(self) -> None:
+        Range.__post_init__(self)  # super() does not know classes with slots
+        whole(f"{self.label}: control_points", self.control_points, least=1)
+        one_of(f"{self.label}: interpolation", self.interpolation, INTERPOLATIONS)
+        if self.hold is not None:
+            positive(f"{self.label}: hold", self.hold)
+        if self.free is not None:
+            expected = "Freedom(max_control_points, min_interval)"
+            instance(f"{self.label}: free", self.free, Freedom, expected)
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRange(Range):
+    """One searched parameter or initial state: a single number.
+
+    Attributes:
+        nominal: its value if it is not searched, if known.
+    """
+
+    _: KW_ONLY
+    nominal: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +186,7 @@ class SearchSpace:
                 raise SpecError(f"search space: {name!r} has two ranges; keep one")
 
     def __repr__(self) -> str:
-        ranges: tuple[InputRange | ParameterRange, ...] = (*self.inputs, *self.parameters)
+        ranges: tuple[Range, ...] = (*self.inputs, *self.parameters)
         searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in ranges)
         return f"<SearchSpace: {searched}; {self.stop_time:g} s>"
 
@@ -270,13 +286,10 @@ class SearchSpace:
         for name in (*candidate.signals, *candidate.parameters):
             if name not in self.names:
                 raise CandidateError(f"unknown input or parameter {name!r}; {did_you_mean(name, self.names)}")
-        for kind, ranges, given in (
-            ("input", self.inputs, candidate.signals),
-            ("parameter", self.parameters, candidate.parameters),
-        ):
-            for r in ranges:
-                if r.name not in given:
-                    raise CandidateError(f"{kind} {r.name!r} is missing")
+        missing: list[Range] = [r for r in self.inputs if r.name not in candidate.signals]
+        missing += [p for p in self.parameters if p.name not in candidate.parameters]
+        if missing:
+            raise CandidateError(f"{missing[0].label} is missing")
         times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
         outside = [
             *(_signal_outside(r, times[r.name], candidate.signals[r.name].values) for r in self.inputs),
@@ -308,52 +321,32 @@ def _admitted_signal(r: InputRange, times: tuple[float, ...], signal: Signal) ->
     return Signal(times, values, signal.interpolation, r.hold)
 
 
-def _check_range(what: str, ranged: InputRange | ParameterRange) -> None:
-    low, high = finite(f"{what}: low", ranged.low), finite(f"{what}: high", ranged.high)
-    if low > high:
-        raise SpecError(f"{what}: expected low <= high, got [{low:g}, {high:g}]")
-    if not isfinite(high - low):
-        raise SpecError(f"{what}: [{low:g}, {high:g}] is too wide to calculate with; narrow the range")
-    one_of(f"{what}: kind", ranged.kind, get_args(ValueKind))
-    if ranged.kind == "real":
-        return
-    possible = [n for _, n in ranged.items] or [ceil(low), floor(high)]
-    numbers = [n for n in possible if low <= n <= high]
-    if not numbers:
-        missing = "item of the enumeration" if ranged.items else "integer"
-        raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
-    # Engines try the bounds, so these must be numbers that are allowed.
-    object.__setattr__(ranged, "low", float(min(numbers)))
-    object.__setattr__(ranged, "high", float(max(numbers)))
-
-
 def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
     count = len(signal.times)
     if r.free is None:
         raise CandidateError(
-            f"input {r.name!r}: expected {r.control_points} evenly spaced control points with "
+            f"{r.label}: expected {r.control_points} evenly spaced control points with "
             f"{r.interpolation} interpolation, got {count} with {signal.interpolation}"
         )
     if r.kind != "real" and signal.interpolation != "constant" and count > 1:
         raise CandidateError(
-            f"input {r.name!r}: values of type {r.kind} cannot have {signal.interpolation} interpolation; "
+            f"{r.label}: values of type {r.kind} cannot have {signal.interpolation} interpolation; "
             f'use "constant"'
         )
     if count > r.free.max_control_points:
         raise CandidateError(
-            f"input {r.name!r}: {count} control points; at most {r.free.max_control_points} are allowed"
+            f"{r.label}: {count} control points; at most {r.free.max_control_points} are allowed"
         )
     gaps = np.diff(signal.times)
     if gaps.size and gaps.min() < r.free.min_interval * (1 - 1e-6):
         k = int(gaps.argmin())
         raise CandidateError(
-            f"input {r.name!r}: control points at {signal.times[k]:g} s and {signal.times[k + 1]:g} s are "
+            f"{r.label}: control points at {signal.times[k]:g} s and {signal.times[k + 1]:g} s are "
             f"less than {r.free.min_interval:g} s apart"
         )
     if signal.times[-1] > stop_time * (1 + 1e-9):
         raise CandidateError(
-            f"input {r.name!r}: the control point at {signal.times[-1]:g} s is after the stop time "
-            f"{stop_time:g} s"
+            f"{r.label}: the control point at {signal.times[-1]:g} s is after the stop time {stop_time:g} s"
         )
 
 
@@ -363,7 +356,7 @@ def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float
     )
 
 
-def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
+def nearest_value(ranged: Range, value: float) -> float:
     """Return the nearest number that an input or parameter can take; for reals, the value itself."""
     if ranged.kind == "real":
         return value
@@ -373,11 +366,11 @@ def nearest_value(ranged: InputRange | ParameterRange, value: float) -> float:
     return float(min(max(round(value), ceil(ranged.low)), floor(ranged.high)))
 
 
-def _into_range(value: float, ranged: InputRange | ParameterRange) -> float:
+def _into_range(value: float, ranged: Range) -> float:
     return nearest_value(ranged, min(max(float(value), ranged.low), ranged.high))
 
 
-def _is_outside(ranged: InputRange | ParameterRange, value: float) -> bool:
+def _is_outside(ranged: Range, value: float) -> bool:
     # Whatever is nearest to an allowed number is rounded to it.
     tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low) if ranged.kind == "real" else 0.5
     return not ranged.low - tolerance <= value <= ranged.high + tolerance
@@ -385,23 +378,22 @@ def _is_outside(ranged: InputRange | ParameterRange, value: float) -> bool:
 
 def _signal_outside(r: InputRange, times: Sequence[float], values: Sequence[float]) -> str:
     """What is outside the range of an input; empty if nothing is."""
-    if r.low <= min(values) and max(values) <= r.high:
-        return ""
     found = [(t, v) for t, v in zip(times, values, strict=True) if _is_outside(r, v)]
     if not found:
         return ""
-    bounds = f"[{r.low:g}, {r.high:g}]"
     if len(set(values)) == 1 < len(values):
-        return f"input {r.name!r}: {values[0]:g} is outside its range {bounds}"
+        return f"{r.label}: {values[0]:g} is {_outside(r)}"
     shown = found[:_SHOWN_VALUES]
     more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
     at, what = (", ".join(f"{pair[k]:g}" for pair in shown) for k in (0, 1))
     verb = "is" if len(found) == 1 else "are"
-    return f"input {r.name!r} at t = {at} s{more}: {what}{more} {verb} outside its range {bounds}"
+    return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {_outside(r)}"
 
 
 def _parameter_outside(p: ParameterRange, value: float) -> str:
     """Whether a parameter is outside its range, in words; empty if it is not."""
-    if not _is_outside(p, value):
-        return ""
-    return f"parameter {p.name!r}: {value:g} is outside its range [{p.low:g}, {p.high:g}]"
+    return f"{p.label}: {value:g} is {_outside(p)}" if _is_outside(p, value) else ""
+
+
+def _outside(ranged: Range) -> str:
+    return f"outside its range [{ranged.low:g}, {ranged.high:g}]"
