@@ -3,7 +3,7 @@
 Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
@@ -43,24 +43,6 @@ _URGENT = 1e6
 _PERIOD_FACTOR = 1.5
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """An interval of constant value, from start to end in s."""
-
-    value: float
-    start: float
-    end: float
-
-
-def pieces(times: Array, column: Array) -> list[Piece]:
-    """Intervals of constant value in order."""
-    starts = [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
-    ends = [*starts[1:], len(times) - 1]
-    return [
-        Piece(float(column[a]), float(times[a]), float(times[b])) for a, b in zip(starts, ends, strict=True)
-    ]
-
-
 Label = Callable[[float, str], str]
 
 
@@ -76,18 +58,16 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
     >>> change_list(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 1.0, 2.0, 2.0]), clock=2)
     '1, then 2 from 2 s'
     """
-    found = pieces(times, column)
-    values = [label(p.value, plain(p.value, 6)) for p in found]
-    words = values[:1]
-    words += [
-        f"{value} from {plain(p.start, clock)} s" for value, p in zip(values[1:], found[1:], strict=True)
-    ]
-    if len(words) == 1:
-        return f"constant {words[0]}"
-    if len(words) > _SHOWN_CHANGES:
+    first, *rest = _pieces(times, column)
+    begin = label(first[0], plain(first[0], 6))
+    if not rest:
+        return f"constant {begin}"
+    changes = [f"{label(v, plain(v, 6))} from {plain(start, clock)} s" for v, start, _ in rest]
+    if len(changes) >= _SHOWN_CHANGES:
         half = _SHOWN_CHANGES // 2
-        words = [*words[:half], f"{len(words) - 2 * half} more changes", *words[-half:]]
-    return f"{words[0]}, then {', '.join(words[1:])}"
+        left_out = f"{len(changes) + 1 - 2 * half} more changes"
+        changes = [*changes[: half - 1], left_out, *changes[-half:]]
+    return f"{begin}, then {', '.join(changes)}"
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
@@ -95,35 +75,43 @@ def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda
 
     The first interval does not count as entered, and the last one is cut off by the end of the times.
     """
-    found = pieces(times, column)
-    if len(found) < 2:
-        return ""
+    found = _pieces(times, column)
     words = []
-    for value in sorted({p.value for p in found}):
-        again = [p for p in found[1:] if p.value == value]
-        complete = [p for p in again if p is not found[-1]]
-        name = label(value, plain(value, 6))
+    for value in sorted({value for value, _, _ in found}) if len(found) > 1 else ():
+        entered = [(start, end) for v, start, end in found[1:] if v == value]
+        complete = entered[:-1] if found[-1][0] == value else entered
         if complete:
-            shortest = min(complete, key=lambda p: p.end - p.start)
-            length = plain(shortest.end - shortest.start, 3)
-            begin = plain(shortest.start, clock)
-            words.append(f"{name}: entered {_times(len(again))}, shortest stay {length} s from {begin} s")
-        elif again:
-            end = plain(float(times[-1]), clock)
-            words.append(f"{name}: entered at {plain(again[0].start, clock)} s and still held at {end} s")
+            start, end = min(complete, key=lambda stay: stay[1] - stay[0])
+            count = "once" if len(entered) == 1 else f"{len(entered)} times"
+            stay = f"shortest stay {plain(end - start, 3)} s from {plain(start, clock)} s"
+            told = f"entered {count}, {stay}"
+        elif entered:
+            ((start, end),) = entered
+            told = f"entered at {plain(start, clock)} s and still held at {plain(end, clock)} s"
         else:
-            words.append(f"{name}: never entered again")
+            told = "never entered again"
+        words.append(f"{label(value, plain(value, 6))}: {told}")
     return "; ".join(words)
+
+
+def _pieces(times: Array, column: Array) -> list[tuple[float, float, float]]:
+    """Intervals of constant value in order: the value, start and end in s."""
+    starts = [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
+    ends = [*starts[1:], len(times) - 1]
+    return [(float(column[a]), float(times[a]), float(times[b])) for a, b in zip(starts, ends, strict=True)]
 
 
 def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, float] | None:
     """Start and end in s of the longest uninterrupted interval in which this is true; None if it never is."""
-    edges = np.diff(np.concatenate(([0], wrong.astype(np.int8), [0])))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
-    if not starts.size:
-        return None
-    longest = int((ends - starts).argmax())
-    return float(times[starts[longest]]), float(times[ends[longest]])
+    begin, end = max(_runs(wrong), key=lambda run: run[1] - run[0], default=(0, 0))
+    return (float(times[begin]), float(times[end - 1])) if end else None
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First index and index after the last of each run of true flags."""
+    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
+    starts, ends = np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist()
+    return list(zip(starts, ends, strict=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +138,16 @@ class Swing:
         inside = (times >= self.start) & (times <= self.end)
         return np.asarray(np.where(inside, np.maximum(np.maximum(low - column, column - high), 0.0), 0.0))
 
+    def text(self, clock: int) -> str:
+        """Interval, period and envelopes in words, times with so many decimals."""
+        first, last = self.periods
+        changes = max(first, last) > _PERIOD_FACTOR * min(first, last)
+        period = f"{first:.2g} s, at the end {last:.2g} s" if changes else f"{first:.2g} s"
+        return (
+            f"oscillates from {plain(self.start, clock)} to {plain(self.end, clock)} s with period {period}, "
+            f"between {_pairs(self.lower, clock)} and {_pairs(self.upper, clock)}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Course:
@@ -174,16 +172,15 @@ class Course:
 
         Args:
             clock: decimals of times.
-
-        >>> Course((((0.0, 1.0, 0.1), (2.5, 3.0, 0.1)),), (), 0.0, 0.0, 0.1).text(clock=1)
-        '0:1 2.5:3'
         """
         parts = [(points[0][0], _pairs(points, clock)) for points in self.lines]
-        parts += [(swing.start, _swing_text(swing, clock)) for swing in self.swings]
+        parts += [(swing.start, swing.text(clock)) for swing in self.swings]
         told = "; ".join(text for _, text in sorted(parts, key=lambda part: part[0]))
         if self.error <= self.claimed:
             return told
-        return f"{told} (each value within {_upwards(self.error)})"
+        decimals = decimals_for(self.error, 2)
+        # Rounded up: it is not less than it is told to be.
+        return f"{told} (each value within {plain(self.error + 0.5 * 10.0**-decimals, decimals)})"
 
 
 def course(
@@ -359,12 +356,6 @@ def _envelope(times: Array, column: Array, extrema: list[int], allowed: Array) -
     return _points(at, values, allowed[extrema], chosen)
 
 
-def _runs(flags: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """First index and index after the last of each run of true flags."""
-    edges = np.diff(np.concatenate(([0], flags.astype(np.int8), [0])))
-    yield from zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True)
-
-
 def _worst(
     times: Array, column: Array, allowed: Array, first: float, a: int, b: int
 ) -> tuple[float, int, int, int]:
@@ -397,39 +388,19 @@ def coarse_clock(stop_time: float) -> int:
     return decimals_for(stop_time / 2, 3)
 
 
-def _are_ambiguous(points: Points, clock: int) -> bool:
-    """Whether two breakpoints read as different values at the same time."""
-    return any(
-        plain(a, clock) == plain(b, clock) and _value(v, u) != _value(w, x)
-        for (a, v, u), (b, w, x) in pairwise(points)
-    )
-
-
 def _pairs(points: Points, clock: int) -> str:
-    while clock < _FINEST_CLOCK and _are_ambiguous(points, clock):
+    """Points as ``time:value``; no two that read as different values have the same time."""
+    values = [_value(value, allowed) for _, value, allowed in points]
+    while True:
+        told = list(zip((plain(time, clock) for time, _, _ in points), values, strict=True))
+        if clock >= _FINEST_CLOCK or not any(a[0] == b[0] and a[1] != b[1] for a, b in pairwise(told)):
+            return " ".join(dict.fromkeys(f"{time}:{value}" for time, value in told))
         clock += 1
-    return " ".join(dict.fromkeys(f"{plain(t, clock)}:{_value(v, allowed)}" for t, v, allowed in points))
 
 
 def _value(value: float, allowed: float) -> str:
     """A value with the digits that what it may be off by leaves."""
     return plain(value, decimals_for(_OF_DIGITS * allowed, 1)) if allowed else f"{value:.9g}"
-
-
-def _upwards(error: float) -> str:
-    """An error with two digits, not less than it is."""
-    decimals = decimals_for(error, 2)
-    return plain(error + 0.5 * 10.0**-decimals, decimals)
-
-
-def _swing_text(swing: Swing, clock: int) -> str:
-    first, last = swing.periods
-    changes = max(first, last) > _PERIOD_FACTOR * min(first, last)
-    period = f"{first:.2g} s, at the end {last:.2g} s" if changes else f"{first:.2g} s"
-    return (
-        f"oscillates from {plain(swing.start, clock)} to {plain(swing.end, clock)} s with period {period}, "
-        f"between {_pairs(swing.lower, clock)} and {_pairs(swing.upper, clock)}"
-    )
 
 
 def column_decimals(column: Array, *, margin: float | None = None) -> int:
@@ -439,7 +410,3 @@ def column_decimals(column: Array, *, margin: float | None = None) -> int:
         return usual
     limit = decimals_for(float(np.abs(column).max()), 9)
     return min(max(usual, decimals_for(margin, 3)), limit)
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
