@@ -150,7 +150,7 @@ class ModelInfo:
     def __contains__(self, name: object) -> bool:
         return any(v.name == name for v in self.variables)
 
-    def kind(self, name: str) -> str:
+    def kind(self, name: str) -> Kind:
         """Return the type of a variable's values; real if there is no such variable."""
         return next((v.kind for v in self.variables if v.name == name), "real")
 

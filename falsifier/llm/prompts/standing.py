@@ -201,8 +201,8 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
     yield "Recorded signals:"
     for name in recorded:
         kind = view.kind(name) if view.tells_kinds else "real"
-        kind = ", ".join(view.items(name)) or ("" if kind == "real" else kind)
-        text = f"- {name}{_bracketed(view.unit(name))}{kind and f', {kind}'}"
+        values = ", ".join(view.items(name)) or ("" if kind == "real" else kind)
+        text = f"- {name}{_bracketed(view.unit(name))}{values and f', {values}'}"
         text += _described(view.description(name))
         if name in start:
             low, high = start[name]

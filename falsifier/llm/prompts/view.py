@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from falsifier.context.values import Context
-from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.model import Experiment, Kind, ModelInfo
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
@@ -62,7 +62,7 @@ class View:
         """Description of a signal; empty if it has none."""
         return self.info[name].description if name in self.info else ""
 
-    def kind(self, name: str) -> str:
+    def kind(self, name: str) -> Kind:
         """Type of a signal's values; real if unknown."""
         return self.info.kind(name)
 
