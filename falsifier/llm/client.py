@@ -1,8 +1,10 @@
 """An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures."""
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
+from math import isfinite
 from time import perf_counter
 from typing import Any
 
@@ -16,24 +18,21 @@ from falsifier.llm.failures import (
 )
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
-    calls_in,
+    completed,
     dropped_parameters,
-    echo_of,
     listed_price,
     load_litellm,
     may_take_tools,
-    sent_message,
-    sent_tool,
-    storable,
 )
 from falsifier.llm.messages import (
     MODES,
     UNREADABLE,
     ChatReply,
     ChatRequest,
+    Message,
     Mode,
+    ToolCall,
     Usage,
-    below,
     cleaned,
 )
 from falsifier.llm.providers import find_key, known, provider_of
@@ -96,12 +95,9 @@ class LiteLLMChat:
     @property
     def parameters(self) -> Mapping[str, Any]:
         """What is sent in addition to the messages, without secrets."""
-        address = (
-            {"content": self.content}
-            if self.content
-            else {"api_base": self.api_base and redact(self.api_base)}
-        )
-        stated = {"effort": self.effort, **address}
+        stated = {"effort": self.effort, "content": self.content or None}
+        if self.api_base and not self.content:
+            stated["api_base"] = redact(self.api_base)
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:
@@ -122,31 +118,29 @@ class LiteLLMChat:
         """Do nothing; storing replies is CachedChat's concern."""
 
     def _asked(self, request: ChatRequest) -> ChatReply:
-        if request.tools and not self._may_offer_tools():
-            request = _without_tools(request)
+        if request.tools and self._takes_tools is None:
+            self._takes_tools = may_take_tools(self.llm, api_base=self.api_base)
         while True:
+            if not self._takes_tools:
+                request = request.model_copy(update={"tools": ()})
             mode = max(self.mode, self._mode_with_tools, key=MODES.index) if request.tools else self.mode
+            below = MODES[MODES.index(mode) + 1 :] if request.reply_schema is not None else ()
             try:
-                return self._noted(request, mode, self.send(request, mode))
-            except FormatUnsupportedError:
-                plainer = below(mode) if request.reply_schema is not None else None
-                if plainer is None and not request.tools:
-                    raise
-                if plainer is None:
-                    request = self._refused_with_tools(request)
+                reply = self.send(request, mode)
+            except (FormatUnsupportedError, ToolsUnsupportedError) as error:
+                if below and isinstance(error, FormatUnsupportedError):
+                    self._descend(request, below[0])
+                elif request.tools:
+                    self._refuse_tools(request)
                 else:
-                    self._descend(request, plainer)
-            except ToolsUnsupportedError:
-                request = self._refused_with_tools(request)
-
-    def _noted(self, request: ChatRequest, mode: Mode, reply: ChatReply) -> ChatReply:
-        """Return a reply; after several that the server could not parse, ask in a plainer way from now on."""
-        self._unreadable = self._unreadable + 1 if reply.finish_reason == UNREADABLE else 0
-        plainer = below(mode) if request.reply_schema is not None else None
-        if self._unreadable >= _MOST_UNREADABLE and plainer is not None:
-            self._unreadable = 0
-            self._descend(request, plainer)
-        return reply
+                    raise
+            else:
+                # After several that the server could not parse, ask in a plainer way from now on.
+                self._unreadable = self._unreadable + 1 if reply.finish_reason == UNREADABLE else 0
+                if self._unreadable >= _MOST_UNREADABLE and below:
+                    self._unreadable = 0
+                    self._descend(request, below[0])
+                return reply
 
     def _descend(self, request: ChatRequest, plainer: Mode) -> None:
         if request.tools:
@@ -154,13 +148,8 @@ class LiteLLMChat:
         else:
             self.mode = plainer
 
-    def _may_offer_tools(self) -> bool:
-        if self._takes_tools is None:
-            self._takes_tools = may_take_tools(self.llm, api_base=self.api_base)
-        return self._takes_tools
-
-    def _refused_with_tools(self, request: ChatRequest) -> ChatRequest:
-        """Remember that the server rejects tools; return the request without them."""
+    def _refuse_tools(self, request: ChatRequest) -> None:
+        """Remember that the server rejects tools."""
         if any(message.role == "tool" for message in request.messages):
             # The conversation contains tool calls already, which cannot be sent without the tools.
             raise ChatError(
@@ -168,7 +157,6 @@ class LiteLLMChat:
                 "use --engine llm, which offers no tools"
             )
         self._takes_tools = False
-        return _without_tools(request)
 
     def send(self, request: ChatRequest, mode: Mode | None = None) -> ChatReply:
         """Send one request.
@@ -190,34 +178,31 @@ class LiteLLMChat:
         mode = mode or self.mode
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
-        litellm = load_litellm()
+        load_litellm()
         arguments = self._arguments(request, mode)
         left = request.seconds_left
         if left is not None and left <= 0:  # the import above may have taken it
             raise ChatError(f"{self.llm}: nothing was sent: the time limit ended while the client was loaded")
         timeout = min(self.timeout, _LONGEST_TIMEOUT)
-        seconds = timeout if left is None else min(timeout, left)
         started = perf_counter()
 
         def ask() -> ChatReply:
-            response = litellm.completion(
-                model=self.llm,
+            response = completed(
+                self.llm,
                 messages=[sent_message(m, marks=known(self.llm).marks) for m in request.messages],
                 api_base=self.api_base,
                 timeout=timeout,
-                drop_params=True,  # what the LLM does not accept is omitted; _effective() reports it
                 **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, mode, perf_counter() - started)
 
         try:
-            return cleaned(within(seconds, ask), secrets)
+            return cleaned(within(timeout if left is None else min(timeout, left), ask), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
                 error,
                 llm=self.llm,
                 api_base=self.api_base,
-                key_variables=known(self.llm).keys,
                 secrets=secrets,
                 offers_tools=bool(request.tools),
                 options=self.options,
@@ -242,22 +227,18 @@ class LiteLLMChat:
         return {**known(self.llm).defaults, **self.options}
 
     def _arguments(self, request: ChatRequest, mode: Mode) -> dict[str, Any]:
-        provider = known(self.llm)
         arguments = self._options()
-        if provider.openai_client:
-            arguments["max_retries"] = 0  # the client would silently retry twice
         if provider_of(self.llm) == "openai" and self.api_base is None:
             # Requests that begin alike go to the machine that has kept the beginning.
             beginning = request.messages[0].content.encode()
             arguments["prompt_cache_key"] = sha256(beginning).hexdigest()[:16]
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
-            if provider.effort == "allowed":
+            if known(self.llm).effort == "allowed":
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
         if request.reply_schema is not None and mode in ("bounded_schema", "json_schema"):
-            schema = (
-                request.reply_schema if mode == "bounded_schema" else without_limits(request.reply_schema)
-            )
+            schema = request.reply_schema
+            schema = schema if mode == "bounded_schema" else without_limits(schema)
             arguments["response_format"] = {
                 "type": "json_schema",
                 "json_schema": {"name": "reply", "strict": True, "schema": schema},
@@ -265,10 +246,8 @@ class LiteLLMChat:
         elif request.reply_schema is not None and mode == "json_object":
             arguments["response_format"] = {"type": "json_object"}
         if request.tools:
-            arguments["tools"] = [without_limits(sent_tool(tool)) for tool in request.tools]
-            # Given tools, litellm imports its MCP gateway, whose packages are not among litellm's own
-            # requirements. It removes this argument before sending.
-            arguments["_skip_mcp_handler"] = True
+            functions = [without_limits(tool.model_dump()) for tool in request.tools]
+            arguments["tools"] = [{"type": "function", "function": each} for each in functions]
         if request.max_tokens:
             arguments["max_tokens"] = max(request.max_tokens, arguments.get("max_tokens") or 0)
         return arguments
@@ -282,7 +261,9 @@ class LiteLLMChat:
         text = storable(choice.message.content or refusal)
         echo = known(self.llm).echo
         calls = calls_in(choice.message, echo)
-        reported = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
+        cost = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
+        # Another server under a listed name has its own prices, and zero is true of local ones only.
+        is_true = known(self.llm).local or (cost and self.api_base is None)
         return ChatReply(
             text=text,
             tool_calls=calls,
@@ -295,17 +276,11 @@ class LiteLLMChat:
                 request=request,
                 text="".join((text, *(call.arguments for call in calls))),
                 price=self.price,
-                reported_cost=self._believed(reported),
+                reported_cost=cost if is_true else None,
             ),
             seconds=seconds,
             parameters=self._effective(arguments, mode),
         )
-
-    def _believed(self, cost: float | None) -> float | None:
-        """Reported cost if it can be true: another server under a listed name has its own prices."""
-        if known(self.llm).local:
-            return cost
-        return cost if cost and self.api_base is None else None
 
     def _effective(self, arguments: Mapping[str, Any], mode: Mode) -> dict[str, Any]:
         """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
@@ -321,8 +296,80 @@ class LiteLLMChat:
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
 
 
-def _without_tools(request: ChatRequest) -> ChatRequest:
-    return request.model_copy(update={"tools": ()})
+def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
+    """Message with OpenAI's field names; an assistant's message that only makes calls has no content.
+
+    Args:
+        message: what is sent.
+        marks: whether to mark what the next question will begin with, too.
+    """
+    sent: dict[str, Any] = {"role": message.role, "content": message.content}
+    if marks and message.stable:
+        kept, rest = message.content[: message.stable], message.content[message.stable :]
+        sent["content"] = [
+            {"type": "text", "text": kept, "cache_control": {"type": "ephemeral"}},
+            *([{"type": "text", "text": rest}] if rest else []),
+        ]
+    if message.tool_call_id:
+        sent["tool_call_id"] = message.tool_call_id
+    if message.tool_calls:
+        sent |= {
+            "content": message.content or None,
+            "tool_calls": [_sent_call(c) for c in message.tool_calls],
+        }
+    return {**sent, **message.echo}
+
+
+def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
+    """Calls in a reply, in order.
+
+    Args:
+        message: as the client library returns it.
+        echo: fields of a call that must be sent back to the provider.
+    """
+    return tuple(
+        ToolCall(
+            id=call.id or f"call-{number}",
+            name=call.function.name or "",
+            arguments=storable(call.function.arguments or ""),
+            echo=echo_of(call, echo),
+        )
+        for number, call in enumerate(getattr(message, "tool_calls", None) or (), start=1)
+    )
+
+
+def echo_of(source: Any, names: Sequence[str]) -> dict[str, Any]:
+    """The non-empty fields of a reply, or of a call in it, that must be sent back to the provider."""
+    found = {name: getattr(source, name, None) for name in names}
+    return {name: value for name, value in found.items() if value}
+
+
+def storable(text: str) -> str:
+    """Text without unpaired surrogates, which UTF-8 cannot encode: the journal could not store them."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def _sent_call(call: ToolCall) -> dict[str, Any]:
+    function = {"name": call.name, "arguments": _as_servers_take(call.arguments)}
+    return {"id": call.id, "type": "function", "function": function, **call.echo}
+
+
+def _as_servers_take(arguments: str) -> str:
+    """Arguments of an earlier call; empty ones if they are not JSON, because servers reject the conversation.
+
+    The answer to the call says what was wrong with them.
+    """
+    try:
+        json.loads(arguments, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError):
+        return "{}"
+    return arguments
+
+
+def _finite(number: str) -> float:
+    if not isfinite(float(number)):
+        raise ValueError(f"{number} is not finite")
+    return float(number)
 
 
 def _refusal(message: Any) -> str:

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
+from falsifier.llm.litellm_adapter import own_words
 from falsifier.llm.providers import known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
@@ -38,14 +39,8 @@ _UNREADABLE_WORDS = (
     "failed to validate json",
     "failed to call a function",
 )
-_CONTEXT_WORDS = ("contextwindow", "context_length", "maximum context", "context size", "exceed_context")
-_QUOTA_WORDS = ("insufficient_quota", "exceeded your current quota", "billing")
-# A key that is right may belong to an account that is not.
-_ACCOUNT_WORDS = ("organization", "organisation", "project", "verif", "not have access", "region", "country")
 _LONGEST_DETAIL = 600
-# What the client library puts before the server's own words, several times over.
 _FULL_STOP = re.compile(r"(?<!\.)\.$")
-_CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
 _TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
@@ -54,6 +49,7 @@ _LONGER = (
 )
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
+_THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
 class TransientChatError(ChatError):
@@ -95,12 +91,79 @@ class UnreadableReplyError(ChatError):
     """The LLM answered, but its server could not parse that in the form that was asked for."""
 
 
+class _RefusedOptionError(ChatError):
+    """The server does not take an option of the user."""
+
+
+# What a failure may be: its HTTP statuses (none listed: any, or none), words of which it says at least one
+# (none listed: whatever it says), the class of the error, and cause and cure, with the server's own words as
+# ``{detail}``. The first one that fits counts.
+_CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...] = (
+    (
+        (403,),
+        # A key that is right may belong to an account that is not.
+        ("organization", "organisation", "project", "verif", "not have access", "region", "country"),
+        ChatError,
+        "the account behind {keys} may not use this LLM: have it allowed for the organisation or project of "
+        "the key, or take another LLM or key. {detail}",
+    ),
+    (
+        (413,),
+        (),
+        ContextExceededError,
+        "the request is larger than the server, or a proxy before it, takes; use a plainer prompt variant "
+        "(--variant), or raise its limit. {detail}",
+    ),
+    ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
+    ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
+    # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
+    (
+        (400, 404, 422, 500, 501),
+        ("tool", "function call", "function_call"),
+        ToolsUnsupportedError,
+        "{detail}",
+    ),
+    (
+        (400, 422),
+        (),
+        _RefusedOptionError,
+        "the server refuses the option {option}; drop --llm-option {option}. {detail}",
+    ),
+    (
+        (404,),
+        (),
+        ChatError,
+        "no such LLM or address; check the LLM's name, --api-base, and whether the account behind {keys} may "
+        "use it. {detail}",
+    ),
+    (
+        (),
+        ("contentpolicy", "content_policy", "content management policy"),
+        ChatError,
+        "the provider's content filter rejected the prompt; try another LLM or --anonymous. {detail}",
+    ),
+    (
+        (),
+        ("contextwindow", "context_length", "maximum context", "context size", "exceed_context"),
+        ContextExceededError,
+        "the prompt is too long for this LLM; {longer}use a plainer prompt variant (--variant) or another "
+        "LLM. The server says: {detail}",
+    ),
+    (
+        (429,),
+        ("insufficient_quota", "exceeded your current quota", "billing"),
+        ChatError,
+        "the account behind {keys} has no quota left. {detail}",
+    ),
+    ((400, 422, 501), _FORMAT_WORDS, FormatUnsupportedError, "{detail}"),
+)
+
+
 def classify(
     error: Exception,
     *,
     llm: str,
     api_base: str | None,
-    key_variables: tuple[str, ...],
     secrets: Iterable[str],
     offers_tools: bool = False,
     options: Iterable[str] = (),
@@ -111,114 +174,74 @@ def classify(
         error: what the client library raised.
         llm: name of the LLM.
         api_base: address of the server, if stated.
-        key_variables: environment variables that may contain the key.
         secrets: texts to remove from the message.
         offers_tools: whether the request offered tools.
         options: names of the options that the user passes on.
     """
-    where = f" at {redact(api_base, secrets)}" if api_base else ""
-    if isinstance(error, RefusedReplyError):
-        return ChatError(f"{llm}{where}: {redact(printable(str(error)), secrets)}")
-    status = _status(error)
-    text = redact(printable(f"{type(error).__name__}: {error}"), secrets)
-    lowered = _beginning(text).lower()
-    detail = _beginning(_own_words(text))
-    if status is not None and not _LETTERS.search(detail):
-        detail = f"the server answers with the HTTP status {status} and without a reason"
-    keys = " or ".join(key_variables) or "the API key"
-    address = server_address(llm, api_base)
-    if _is_refused(error) and _is_this_machine(address):
-        command = known(llm).start
-        start = f"the server with '{command}'" if command else "the LLM's server"
+    provider, address = known(llm), server_address(llm, api_base)
+    where = f"{llm} at {redact(api_base, secrets)}: " if api_base else f"{llm}: "
+    if _is_refused(error) and (urlsplit(address).hostname or "") in _THIS_MACHINE:
+        start = f"the server with '{provider.start}'" if provider.start else "the LLM's server"
         return TransientChatError(
             f"{llm}: nothing is listening at {redact(address, secrets)}: start {start}, "
             "or correct --api-base",
             patience=_LOCAL_PATIENCE,
         )
+    said = redact(printable(str(error)), secrets)
+    if isinstance(error, RefusedReplyError):
+        return ChatError(where + said)
     if isinstance(error, BrokenReplyError):
-        return TransientChatError(f"{llm}{where}: {redact(printable(str(error)), secrets)}")
-    if status == 403 and any(word in lowered for word in _ACCOUNT_WORDS):
-        return ChatError(
-            f"{llm}{where}: the account behind {keys} may not use this LLM: have it allowed for the "
-            f"organisation or project of the key, or take another LLM or key. {detail}"
-        )
-    if status == 413:
-        return ContextExceededError(
-            f"{llm}{where}: the request is larger than the server, or a proxy before it, takes; use a "
-            f"plainer prompt variant (--variant), or raise its limit. {detail}"
-        )
-    if status in (401, 403):
-        return ChatError(f"{llm}{where}: the provider rejected the key; check {keys}. {detail}")
-    if status in (400, 422, 500) and any(word in lowered for word in _UNREADABLE_WORDS):
-        return UnreadableReplyError(f"{llm}{where}: {detail}")
-    speaks_of_format = any(word in lowered for word in _FORMAT_WORDS)
-    # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
-    if (
-        offers_tools
-        and status in (400, 404, 422, 500, 501)
-        and any(word in lowered for word in _TOOL_WORDS)
-        and not speaks_of_format
-    ):
-        return ToolsUnsupportedError(f"{llm}{where}: {detail}")
+        return TransientChatError(where + said)
+    status, text = _status(error), f"{type(error).__name__}: {said}"
+    lowered = _shortened(" ".join(text.split())).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
-    if status in (400, 422) and refused:
-        return ChatError(
-            f"{llm}{where}: the server refuses the option {refused}; drop --llm-option {refused}. {detail}"
-        )
-    if status == 404:
-        return ChatError(
-            f"{llm}{where}: no such LLM or address; check the LLM's name, --api-base, and whether the "
-            f"account behind {keys} may use it. {detail}"
-        )
-    if "contentpolicy" in lowered or "content_policy" in lowered or "content management policy" in lowered:
-        return ChatError(
-            f"{llm}{where}: the provider's content filter rejected the prompt; try another LLM or "
-            f"--anonymous. {detail}"
-        )
-    if any(word in lowered for word in _CONTEXT_WORDS):
-        is_own = api_base is not None or known(llm).local
-        return ContextExceededError(
-            f"{llm}{where}: the prompt is too long for this LLM; {_LONGER if is_own else ''}use a plainer "
-            f"prompt variant (--variant) or another LLM. The server says: {detail}"
-        )
-    if status == 429 and any(word in lowered for word in _QUOTA_WORDS):
-        return ChatError(f"{llm}{where}: the account behind {keys} has no quota left. {detail}")
-    if status in (400, 422, 501) and speaks_of_format:
-        return FormatUnsupportedError(f"{llm}{where}: {detail}")
-    if status in _TRANSIENT_STATUS or (status or 0) >= 500 or _is_connection(error):
+    impossible = {
+        ToolsUnsupportedError: not offers_tools or any(word in lowered for word in _FORMAT_WORDS),
+        _RefusedOptionError: not refused,
+    }
+    filled = {
+        "keys": " or ".join(provider.keys) or "the API key",
+        "longer": _LONGER if api_base is not None or provider.local else "",
+        "option": refused,
+        "detail": _detail(text, status),
+    }
+    for statuses, words, kind, cure in _CURES:
+        fits = not words or any(word in lowered for word in words)
+        if fits and (status in statuses or not statuses) and not impossible.get(kind):
+            return kind(where + cure.format(**filled))
+    is_connection = isinstance(error, ConnectionError | TimeoutError)
+    if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
         return TransientChatError(
-            f"{llm}{where}: {detail}", retry_after=_retry_after(error), for_all=status == 429
+            where + filled["detail"], retry_after=_retry_after(error), for_all=status == 429
         )
-    return ChatError(f"{llm}{where}: {detail}")
+    return ChatError(where + filled["detail"])
 
 
-def _own_words(text: str) -> str:
-    """What the server said, without the classes of the client library's errors, and out of its JSON."""
-    said = _CLASSES.sub("", text, count=1).strip() if _CLASSES.match(text) else text
+def _detail(text: str, status: int | None) -> str:
+    """What the server said in one line, out of its JSON or its page, and without the full stop.
+
+    More follows in most messages.
+    """
+    said = own_words(text)
     try:
         told = json.loads(said)["error"]["message"]
     except (ValueError, TypeError, KeyError, RecursionError):
         told = said
     if title := _TITLE.search(said):
         told = title[1]
-    return told if isinstance(told, str) and told.strip() else text
+    detail = _FULL_STOP.sub("", _shortened(told if isinstance(told, str) and told.strip() else text))
+    if status is not None and not _LETTERS.search(detail):
+        return f"the server answers with the HTTP status {status} and without a reason"
+    return detail
 
 
-def _beginning(text: str) -> str:
-    """Beginning of a message in one line, without the stack trace that the client library may append."""
-    text = " ".join(text.split("Traceback (most recent call last)")[0].split())
-    # Without its full stop, because more follows in most messages.
-    return _FULL_STOP.sub("", text) if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 
 
 def _status(error: Exception) -> int | None:
     status = getattr(error, "status_code", None)
     return int(status) if isinstance(status, int | str) and str(status).isdigit() else None
-
-
-def _is_connection(error: Exception) -> bool:
-    # The client library raises a plain IndexError for a reply without choices.
-    return isinstance(error, ConnectionError | TimeoutError | IndexError)
 
 
 def _is_refused(error: BaseException | None) -> bool:
@@ -228,10 +251,6 @@ def _is_refused(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-def _is_this_machine(address: str) -> bool:
-    return (urlsplit(address).hostname or "") in ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
 def _retry_after(error: Exception) -> float | None:

@@ -1,26 +1,45 @@
-"""The only place that imports litellm, and only when an LLM is used: the import takes seconds."""
+"""litellm: imported here and nowhere else, only when an LLM is used, because the import takes seconds.
 
-import json
+What works around it stands here, each with the version in which it was seen and the issue of
+github.com/BerriAI/litellm that tells of it:
+
+- On import it reads a .env file (1.106.2, #12576) and fetches lists from the network (1.106.2, #2677):
+  ``_ENVIRONMENT`` prevents both.
+- It makes pydantic warn of its own types (1.83, #37949) and of replies in another form than its own
+  (1.106.2, #11759): ``_WARNINGS`` are not shown.
+- It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` tells its own handler how to
+  make one.
+- Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124), and with tools its
+  MCP gateway is imported, whose packages are not among its requirements (1.106.2, #32993): ``completed``.
+- Of some providers it drops an effort that they take, unless the parameter is named (1.106.2, #14039):
+  ``Provider.effort``.
+- It lists prices that nobody knows as zero (huggingface, 1.106.2, no issue): ``listed_price``.
+- It puts the classes of its errors before a server's words, several times over, and a stack trace after them
+  (1.106.2, #9682): ``own_words``.
+- It replaces every error if tenacity is missing (#19462): that is among our requirements.
+"""
+
 import os
+import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from inspect import signature
-from math import isfinite
 from typing import Any
 
 from falsifier.errors import ChatError, ChatSetupError, did_you_mean
-from falsifier.llm.messages import Message, Tool, ToolCall
 from falsifier.llm.providers import PROVIDERS, known, provider_of
 from falsifier.llm.transport import guarded_client
 from falsifier.llm.usage import Price
 
-# What litellm would do on import or first use, and the variables that prevent it.
 _ENVIRONMENT = {
-    "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # fetch a price list
-    "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",  # fetch a list of headers
-    "LITELLM_MODE": "PRODUCTION",  # read a .env file
+    "LITELLM_LOCAL_MODEL_COST_MAP": "True",
+    "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",
+    "LITELLM_MODE": "PRODUCTION",
 }
+_WARNINGS = (".*`?ReadOnly`? qualifier", "Pydantic serializer warnings")
+_CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
+_TRACE = "Traceback (most recent call last)"
 # Providers that pass options on to servers of all kinds.
 _ROUTERS = frozenset({"openrouter", "huggingface"})
 # Parameters that litellm drops for LLMs that do not accept them.
@@ -43,23 +62,34 @@ def load_litellm() -> Any:
     except ImportError as error:
         raise ChatError(f"litellm cannot be imported ({error}): pip install litellm") from None
     litellm.suppress_debug_info = True
-    # litellm's own types, and replies of another form, cause these warnings of pydantic; the user can do
-    # nothing about the first, and is told of the second.
-    for text in (".*`ReadOnly` qualifier", "Pydantic serializer warnings"):
+    for text in _WARNINGS:
         warnings.filterwarnings("ignore", message=text, category=UserWarning)
     _guard(litellm)
     return litellm
 
 
 def _guard(litellm: Any) -> None:
-    """Let litellm make its HTTP clients so that requests can be limited and cut.
-
-    It takes a client for OpenAI's library only; its own handler makes one where it is first used.
-    """
+    """Let litellm make its HTTP clients so that requests can be limited and cut."""
     from litellm.llms.custom_httpx.http_handler import HTTPHandler, get_ssl_configuration
 
     litellm.client_session = guarded_client(verify=get_ssl_configuration())
     HTTPHandler.create_client = lambda self: guarded_client(verify=get_ssl_configuration(self.ssl_verify))
+
+
+def completed(llm: str, **arguments: Any) -> Any:
+    """Send one request, and only one, and return litellm's response; arguments as of its ``completion``."""
+    if known(llm).openai_client:
+        arguments["max_retries"] = 0
+    if arguments.get("tools"):
+        arguments["_skip_mcp_handler"] = True
+    # What the LLM does not accept is omitted; dropped_parameters() tells it.
+    return load_litellm().completion(model=llm, drop_params=True, **arguments)
+
+
+def own_words(text: str) -> str:
+    """What a server said in an error of litellm, in one line."""
+    text = " ".join(text.split(_TRACE)[0].split())
+    return _CLASSES.sub("", text, count=1).strip() if _CLASSES.match(text) else text
 
 
 def check_name(llm: str) -> None:
@@ -183,84 +213,3 @@ def _takes(llm: str, arguments: Mapping[str, Any]) -> bool:
     except Exception:  # unknown here; the request itself will show it
         return True
     return True
-
-
-def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
-    """Message with OpenAI's field names; an assistant's message that only makes calls has no content.
-
-    Args:
-        message: what is sent.
-        marks: whether to mark what the next question will begin with, too.
-    """
-    sent: dict[str, Any] = {"role": message.role, "content": message.content}
-    if marks and message.stable:
-        kept, rest = message.content[: message.stable], message.content[message.stable :]
-        sent["content"] = [
-            {"type": "text", "text": kept, "cache_control": {"type": "ephemeral"}},
-            *([{"type": "text", "text": rest}] if rest else []),
-        ]
-    if message.tool_call_id:
-        sent["tool_call_id"] = message.tool_call_id
-    if message.tool_calls:
-        sent |= {
-            "content": message.content or None,
-            "tool_calls": [_sent_call(c) for c in message.tool_calls],
-        }
-    return {**sent, **message.echo}
-
-
-def sent_tool(tool: Tool) -> dict[str, Any]:
-    """Tool with OpenAI's field names."""
-    return {"type": "function", "function": tool.model_dump()}
-
-
-def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
-    """Calls in a reply, in order.
-
-    Args:
-        message: as the client library returns it.
-        echo: fields of a call that must be sent back to the provider.
-    """
-    return tuple(
-        ToolCall(
-            id=call.id or f"call-{number}",
-            name=call.function.name or "",
-            arguments=storable(call.function.arguments or ""),
-            echo=echo_of(call, echo),
-        )
-        for number, call in enumerate(getattr(message, "tool_calls", None) or (), start=1)
-    )
-
-
-def echo_of(source: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The non-empty fields of a reply, or of a call in it, that must be sent back to the provider."""
-    found = {name: getattr(source, name, None) for name in names}
-    return {name: value for name, value in found.items() if value}
-
-
-def storable(text: str) -> str:
-    """Text without unpaired surrogates, which UTF-8 cannot encode: the journal could not store them."""
-    return text.encode("utf-8", "replace").decode("utf-8")
-
-
-def _sent_call(call: ToolCall) -> dict[str, Any]:
-    function = {"name": call.name, "arguments": _as_servers_take(call.arguments)}
-    return {"id": call.id, "type": "function", "function": function, **call.echo}
-
-
-def _as_servers_take(arguments: str) -> str:
-    """Arguments of an earlier call; empty ones if they are not JSON, because servers reject the conversation.
-
-    The answer to the call says what was wrong with them.
-    """
-    try:
-        json.loads(arguments, parse_float=_finite, parse_constant=_finite)
-    except (ValueError, RecursionError):
-        return "{}"
-    return arguments
-
-
-def _finite(number: str) -> float:
-    if not isfinite(float(number)):
-        raise ValueError(f"{number} is not finite")
-    return float(number)

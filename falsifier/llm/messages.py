@@ -27,12 +27,6 @@ class _Value(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-def below(mode: Mode) -> Mode | None:
-    """Next plainer way of asking, or None."""
-    rest = MODES[MODES.index(mode) + 1 :]
-    return rest[0] if rest else None
-
-
 class _Sparse(_Value):
     """Omits empty fields that few messages use: a journal contains many messages."""
 

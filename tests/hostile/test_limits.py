@@ -104,7 +104,7 @@ def stated(value: str, **headers: str) -> float | None:
     """Seconds that are waited after a refusal with this Retry-After."""
     error = ConnectionError("busy")
     error.headers = {"retry-after": value, **headers}  # type: ignore[attr-defined]
-    found = classify(error, llm="openai/m", api_base=None, key_variables=(), secrets=())
+    found = classify(error, llm="openai/m", api_base=None, secrets=())
     assert isinstance(found, TransientChatError)
     return found.retry_after
 

@@ -183,12 +183,6 @@ def test_effective_parameters_name_what_was_dropped() -> None:
     assert "dropped" not in kept
 
 
-def test_a_server_of_ones_own_needs_no_key() -> None:
-    with serving(Step("a")) as server:
-        LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
-    assert lowered(server.received[0])["authorization"] == "Bearer none"
-
-
 def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     with serving(Step("a"), Step("b"), Step("c"), Step("d")) as server:
         foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).send(REQUEST)
@@ -203,14 +197,14 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
-def test_reasoning_tokens_and_text_are_kept() -> None:
-    step = Step("answer", extra={"reasoning_content": "first I thought"})
-    with serving(step, Step("<think>hidden</think>shown")) as server:
+def test_reasoning_and_refusals_are_told_apart() -> None:
+    refusal = Step(None, extra={"refusal": "I would rather not"})
+    with serving(Step("answer", extra={"reasoning_content": "first I thought"}), refusal) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         first, second = chat.send(REQUEST), chat.send(REQUEST)
-    assert first.reasoning == "first I thought"
-    assert first.usage.reasoning_tokens == 12
-    assert second.text.endswith("shown")
+    assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
+    assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
+    assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
 
 
 def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
@@ -232,81 +226,41 @@ def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
         assert not server.received
 
 
-def test_refusal_is_told_apart() -> None:
-    with serving(Step(None, extra={"refusal": "I would rather not"})) as server:
-        reply = LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
-    assert reply.finish_reason == "refusal"
-    assert reply.text == "I would rather not"
+FAILURES: list[tuple[Step, type[ChatError] | None, str]] = [
+    (Step(status=429, headers={"Retry-After": "7"}), TransientChatError, ""),
+    (Step(status=503), TransientChatError, ""),
+    (Step(hang_up=True), TransientChatError, ""),
+    (Step(raw='{"id": "1", "object": "chat.completion", "choices": []}'), TransientChatError, ""),
+    (Step(raw="<html>Bad gateway</html>"), TransientChatError, "Bad gateway"),
+    (Step(status=401, message="bad key sk-openai-secret"), None, "check "),
+    (Step(status=404, message="no such model"), None, "--api-base"),
+    (Step(status=400, message="response_format json_schema unsupported"), FormatUnsupportedError, ""),
+    (Step(status=429, message="insufficient_quota: check your billing"), None, "no quota left"),
+]
 
 
 @pytest.mark.usefixtures("keys")
 @pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine", "huggingface/org/mine"])
-class TestFailures:
-    """One request is one request: nothing is sent again behind our back."""
+@pytest.mark.parametrize(("step", "kind", "said"), FAILURES, ids=lambda v: getattr(v, "status", None) or "")
+def test_one_request_is_one_request(step: Step, kind: type[ChatError] | None, said: str, model: str) -> None:
+    """Nothing is sent again behind our back, and each failure is what it is."""
+    with serving(step, Step("never seen")) as server, pytest.raises(ChatError) as caught:
+        LiteLLMChat(model, api_base=server.url).send(REQUEST)
+    assert type(caught.value) is (kind or ChatError)
+    assert str(caught.value).startswith(f"{model} at ") and said in str(caught.value)
+    assert "sk-openai-secret" not in str(caught.value)
+    assert len(server.received) == 1
+    if "Retry-After" in step.headers and isinstance(caught.value, TransientChatError):
+        assert (caught.value.retry_after, caught.value.for_all) == (7, True)
 
-    def failing(self, model: str, *script: Step, **kwargs: Any) -> tuple[ChatError, int]:
-        with serving(*script) as server:
-            chat = LiteLLMChat(model, api_base=server.url, **kwargs)
-            with pytest.raises(ChatError) as caught:
-                chat.send(REQUEST)
-        return caught.value, len(server.received)
 
-    def test_rate_limit(self, model: str) -> None:
-        error, count = self.failing(model, Step(status=429, headers={"Retry-After": "7"}))
-        assert isinstance(error, TransientChatError)
-        assert error.retry_after == 7
-        assert error.for_all
-        assert count == 1
-
-    def test_server_error(self, model: str) -> None:
-        error, count = self.failing(model, Step(status=503), Step("never seen"))
-        assert isinstance(error, TransientChatError)
-        assert count == 1
-
-    def test_timeout(self, model: str) -> None:
-        error, count = self.failing(model, Step(silent=True), timeout=0.2)
-        assert error.lost.timed_out == 1 and error.lost.prompt_tokens > 0
-        assert isinstance(error, TransientChatError)
-        assert count == 1
-
-    def test_lost_connection(self, model: str) -> None:
-        error, _ = self.failing(model, Step(hang_up=True))
-        assert isinstance(error, TransientChatError)
-
-    def test_no_choices(self, model: str) -> None:
-        error, _ = self.failing(model, Step(raw='{"id": "1", "object": "chat.completion", "choices": []}'))
-        assert isinstance(error, TransientChatError)
-
-    def test_not_json(self, model: str) -> None:
-        error, _ = self.failing(model, Step(raw="<html>Bad gateway</html>"))
-        assert isinstance(error, TransientChatError)
-
-    def test_unauthorized_names_model_and_variable(self, model: str) -> None:
-        error, count = self.failing(model, Step(status=401, message="bad key sk-openai-secret"))
-        assert not isinstance(error, TransientChatError)
-        assert model in str(error)
-        assert "key" in str(error)
-        assert "sk-openai-secret" not in str(error)
-        assert count == 1
-
-    def test_unknown_model(self, model: str) -> None:
-        error, _ = self.failing(model, Step(status=404, message="no such model"))
-        assert not isinstance(error, TransientChatError)
-        assert "--api-base" in str(error)
-
-    def test_schema_refused(self, model: str) -> None:
-        error, _ = self.failing(model, Step(status=400, message="response_format json_schema unsupported"))
-        assert isinstance(error, FormatUnsupportedError)
-
-    def test_no_quota_is_not_worth_waiting(self, model: str) -> None:
-        error, _ = self.failing(model, Step(status=429, message="insufficient_quota: check your billing"))
-        assert not isinstance(error, TransientChatError)
-
-    def test_nobody_listens(self, model: str) -> None:
-        with serving() as server:
-            pass
-        with pytest.raises(TransientChatError, match=r"127\.0\.0\.1"):
-            LiteLLMChat(model, api_base=server.url).send(REQUEST)
+@pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine"])
+def test_a_request_without_an_answer_in_time_is_counted(model: str) -> None:
+    with serving(Step(silent=True)) as server, pytest.raises(TransientChatError) as caught:
+        LiteLLMChat(model, api_base=server.url, timeout=0.2).send(REQUEST)
+    assert caught.value.lost is not None
+    assert caught.value.lost.timed_out == 1 and caught.value.lost.prompt_tokens > 0
+    assert len(server.received) == 1
 
 
 def test_importing_the_layer_does_not_import_litellm() -> None:

@@ -1,4 +1,4 @@
-"""From a name to a chat: what is checked before anything is sent."""
+"""From a name to a chat: what is checked before anything is sent, and replies that are kept."""
 
 from pathlib import Path
 
@@ -7,71 +7,164 @@ import pytest
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import CachedChat, connect, preflight
+from falsifier.llm.conversation import converse
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
+from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
+from falsifier.llm.replay import ScriptedChat
+
+
+@pytest.fixture(autouse=True)
+def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (n for p in PROVIDERS.values() for n in p.keys):
+        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.mark.parametrize(
-    ("model", "variables"),
+    ("llm", "api_base", "environment", "key"),
+    [
+        ("openai/gpt-5-mini", None, {"OPENAI_API_KEY": " sk-1 "}, "sk-1"),
+        ("gemini/x", None, {"GOOGLE_API_KEY": "g"}, "g"),
+        ("gemini/x", None, {"GOOGLE_API_KEY": "g", "GEMINI_API_KEY": "first"}, "first"),
+        ("huggingface/openai/gpt-oss-20b", None, {"HF_TOKEN": "hf"}, "hf"),
+        ("openai/mine", "http://127.0.0.1/v1", {}, NO_KEY),
+        ("openai/mine", "http://127.0.0.1/v1", {"OPENAI_API_KEY": "sk-1"}, "sk-1"),
+        ("lm_studio/x", None, {}, NO_KEY),
+        ("llamafile/x", None, {}, NO_KEY),
+        ("ollama_chat/x", None, {}, None),
+        ("hosted_vllm/x", None, {}, None),
+        ("anthropic/x", "http://127.0.0.1", {}, None),
+    ],
+)
+def test_the_key_comes_from_the_providers_variables(
+    llm: str,
+    api_base: str | None,
+    environment: dict[str, str],
+    key: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    assert find_key(llm, api_base=api_base) == key
+    preflight(llm, api_base=api_base)
+
+
+@pytest.mark.parametrize(
+    ("llm", "variables"),
     [
         ("openai/gpt-5-mini", "OPENAI_API_KEY"),
         ("huggingface/openai/gpt-oss-20b", "HF_TOKEN or HUGGINGFACE_API_KEY"),
-        ("anthropic/claude-sonnet-4-5", "ANTHROPIC_API_KEY"),
         ("gemini/gemini-2.5-flash", "GEMINI_API_KEY or GOOGLE_API_KEY"),
     ],
 )
-def test_a_missing_key_names_its_variable(model: str, variables: str) -> None:
-    with pytest.raises(ChatError, match=f"{model}: no API key: set {variables}"):
-        connect(model)
-
-
-@pytest.mark.parametrize("variable", ["HF_TOKEN", "HUGGINGFACE_API_KEY"])
-def test_either_variable_will_do(variable: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(variable, "hf_something")
-    preflight("huggingface/openai/gpt-oss-20b")
-
-
-@pytest.mark.parametrize("model", ["ollama_chat/gpt-oss:20b", "lm_studio/x", "hosted_vllm/x", "llamafile/x"])
-def test_local_servers_need_no_key(model: str) -> None:
-    preflight(model)
-
-
-def test_an_empty_key_is_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_or_empty_key_names_its_variables(
+    llm: str, variables: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "  ")
-    with pytest.raises(ChatError, match="no API key"):
-        preflight("openai/gpt-5-mini")
+    with pytest.raises(ChatError, match=f"{llm}: no API key: set {variables}"):
+        connect(llm)
 
 
-@pytest.mark.parametrize("model", ["opnai/gpt-5-mini", "some-model", "openai/"])
-def test_a_name_of_no_provider_is_refused_with_the_form(model: str) -> None:
-    with pytest.raises(ChatError, match="expected PROVIDER/MODEL such as openai/gpt-5-mini"):
-        preflight(model)
+@pytest.mark.parametrize("llm", ["opnai/gpt-5-mini", "some-model", "openai/", "openai", "ollama_chat/ "])
+def test_a_name_of_no_provider_or_no_model_is_refused_with_the_form(llm: str) -> None:
+    with pytest.raises(ChatSetupError, match="expected PROVIDER/MODEL such as openai/gpt-5-mini") as caught:
+        preflight(llm)
+    assert ("did you mean 'openai'" in str(caught.value)) == (llm == "opnai/gpt-5-mini")
 
 
-def test_the_nearest_provider_is_suggested() -> None:
-    with pytest.raises(ChatError, match="did you mean 'openai'"):
-        preflight("opnai/gpt-5-mini")
-
-
-def test_a_cache_is_opt_in(tmp_path: Path) -> None:
-    assert isinstance(connect("ollama_chat/x"), LiteLLMChat)
-    assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
-
-
-@pytest.mark.parametrize("model", ["openai/gpt-5-mini", "anthropic/claude-sonnet-4-5"])
+@pytest.mark.parametrize("llm", ["openai/gpt-5-mini", "anthropic/claude-sonnet-4-5"])
 def test_an_option_that_the_provider_does_not_have_is_refused(
-    model: str, monkeypatch: pytest.MonkeyPatch
+    llm: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
         monkeypatch.setenv(variable, "sk-some-key")
     with pytest.raises(ChatSetupError, match=r"--llm-option max_token: .* did you mean 'max_tokens'"):
-        connect(model, options={"max_token": 9})
-    connect(model, options={"max_tokens": 9, "temperature": 1, "extra_headers": {"X": "y"}})
+        connect(llm, options={"max_token": 9})
+    connect(llm, options={"max_tokens": 9, "temperature": 1, "extra_headers": {"X": "y"}})
 
 
 def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
     connect("openai/m", api_base="http://127.0.0.1:9", options={"foo": 1})
     connect("ollama_chat/x", options={"foo": 1})
-
-
-def test_the_time_for_a_reply_is_not_an_option_of_the_provider() -> None:
     with pytest.raises(ChatSetupError, match="use --llm-option timeout=SECONDS"):
         connect("ollama_chat/x", options={"timeout": 5})
+
+
+def test_a_server_is_where_it_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OLLAMA_API_BASE", raising=False)
+    assert server_address("ollama_chat/x", None) == known("ollama/x").address
+    monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:1")
+    assert server_address("ollama_chat/x", None) == "http://127.0.0.1:1"
+    assert server_address("ollama_chat/x", "http://127.0.0.1:2") == "http://127.0.0.1:2"
+    assert server_address("openai/x", None) == ""
+
+
+@pytest.mark.parametrize(
+    ("llm", "mode"),
+    [
+        # Grammars that break gpt-oss are not tried.
+        ("ollama_chat/gpt-oss:20b", "prompt"),
+        ("lm_studio/openai/gpt-oss-20b", "prompt"),
+        ("huggingface/openai/gpt-oss-20b", "json_schema"),
+        ("ollama_chat/qwen3", "bounded_schema"),
+        ("openai/any", "bounded_schema"),
+        ("anthropic/claude-sonnet-4-5", "json_schema"),
+    ],
+)
+def test_the_first_way_of_asking_is_the_strictest_that_works(llm: str, mode: str) -> None:
+    assert first_mode(llm) == mode
+
+
+QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=5, cost=0.01), seconds=3.0)
+
+
+class TestCache:
+    def test_it_is_opt_in(self, tmp_path: Path) -> None:
+        assert isinstance(connect("ollama_chat/x"), LiteLLMChat)
+        assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
+
+    def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
+        inner = ScriptedChat([PAID, "never"])
+        chat = CachedChat(inner, tmp_path / "new" / "folder")
+        reply = chat.complete(QUESTION)
+        for _ in range(2):
+            chat.accepted(QUESTION, reply)
+        again = chat.complete(QUESTION)
+        assert (again.text, again.source, again.usage) == ("answer", "cache", Usage(cost=0.0))
+        assert len(inner.requests) == 1
+        assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]
+
+    def test_rejected_replies_are_not_kept_and_damaged_ones_asked_for_again(self, tmp_path: Path) -> None:
+        chat = CachedChat(ScriptedChat(["bad", PAID, "anew"]), tmp_path)
+        assert chat.complete(QUESTION).text == "bad"
+        chat.accepted(QUESTION, chat.complete(QUESTION))
+        (file,) = tmp_path.rglob("*.json")
+        file.write_text("{")
+        assert chat.complete(QUESTION).text == "anew"
+
+    def test_everything_that_is_sent_is_part_of_the_question(self, tmp_path: Path) -> None:
+        kept = CachedChat(ScriptedChat(["one"], llm="a"), tmp_path)
+        kept.accepted(QUESTION, kept.complete(QUESTION))
+        others = [
+            ("a", QUESTION.model_copy(update={"sample": 1})),
+            ("a", QUESTION.model_copy(update={"reply_schema": {"type": "object"}})),
+            ("a", QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)})),
+            ("b", QUESTION),
+        ]
+        for llm, other in others:
+            assert CachedChat(ScriptedChat(["two"], llm=llm), tmp_path).complete(other).text == "two"
+
+    def test_calls_of_tools_are_kept_like_answers(self, tmp_path: Path) -> None:
+        question = QUESTION.model_copy(update={"tools": (Tool(name="t", description="", parameters={}),)})
+        call = ChatReply(text="", tool_calls=(ToolCall(id="1", name="t", arguments="{}"),), usage=PAID.usage)
+        inner = ScriptedChat([call, PAID])
+
+        def ask(answer: str) -> str:
+            chat = CachedChat(inner, tmp_path)
+            return converse(chat, question, str, lambda _: None, respond=lambda _: answer)
+
+        assert [ask("seen") for _ in range(2)] == ["answer", "answer"]
+        assert len(inner.requests) == 2
+        # Another answer of the tool makes another question of what follows.
+        with pytest.raises(ChatError, match="the script"):
+            ask("other")

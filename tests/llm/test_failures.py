@@ -40,25 +40,23 @@ def test_ordinary_words_stay() -> None:
     assert redact(text) == text
 
 
-def test_no_secret_survives_classification() -> None:
-    error = classify(
-        RuntimeError("it was my-secret-key. Traceback (most recent call last): lots"),
-        llm="openai/x",
-        api_base="http://me:my-secret-key@host/v1",
-        key_variables=("OPENAI_API_KEY",),
-        secrets=("my-secret-key",),
-    )
-    assert "my-secret-key" not in str(error)
-    assert "Traceback" not in str(error)
-    assert "openai/x" in str(error)
+def told(error: Exception | str, llm: str = "m", api_base: str | None = None) -> ChatError:
+    """What becomes of an error of the client library."""
+    error = RuntimeError(error) if isinstance(error, str) else error
+    return classify(error, llm=llm, api_base=api_base, secrets=("my-secret-key",))
 
 
-def test_content_filter_and_long_prompts_say_what_to_do() -> None:
-    def told(text: str) -> str:
-        return str(classify(RuntimeError(text), llm="m", api_base=None, key_variables=(), secrets=()))
+def test_no_secret_and_no_stack_survives_classification() -> None:
+    said = "it was my-secret-key. Traceback (most recent call last): lots"
+    error = str(told(said, "openai/x", "http://me:my-secret-key@host/v1"))
+    assert "my-secret-key" not in error and "Traceback" not in error and "openai/x" in error
 
-    assert "--anonymous" in told("content_policy_violation")
-    assert "too long" in told("this model's maximum context length is 8192 tokens")
+
+def test_the_servers_words_come_without_classes_and_full_stop() -> None:
+    assert str(told("Connection error.")).endswith("Connection error")
+    assert str(told("still loading ...")).endswith("still loading ...")
+    assert "--anonymous" in str(told("content_policy_violation"))
+    assert "too long" in str(told("this model's maximum context length is 8192 tokens"))
 
 
 @pytest.mark.parametrize(
@@ -71,7 +69,7 @@ def test_content_filter_and_long_prompts_say_what_to_do() -> None:
     ],
 )
 def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str) -> None:
-    error = classify(RuntimeError(text), llm="m", api_base="http://x", key_variables=(), secrets=())
+    error = told(text, api_base="http://x")
     assert isinstance(error, ContextExceededError)
     assert "llama.cpp: --ctx-size" in str(error)
     said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
@@ -98,40 +96,18 @@ def test_where_nothing_listens_on_this_machine_little_patience_helps(model: str)
         assert "'ollama serve'" in str(caught.value)
 
 
-def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused() -> str:
-        told = classify(
-            ConnectionRefusedError(111, "Connection refused"),
-            llm="ollama_chat/m",
-            api_base=None,
-            key_variables=(),
-            secrets=(),
-        )
-        return str(told)
+REFUSED = ConnectionRefusedError(111, "Connection refused")
 
-    assert "nothing is listening at http://localhost:11434" in refused()
+
+def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "nothing is listening at http://localhost:11434" in str(told(REFUSED, "ollama_chat/m"))
     monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:4444")
-    assert "nothing is listening at http://127.0.0.1:4444" in refused()
+    assert "nothing is listening at http://127.0.0.1:4444" in str(told(REFUSED, "ollama_chat/m"))
 
 
 def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
-    error = classify(
-        ConnectionRefusedError(111, "Connection refused"),
-        llm="openai/m",
-        api_base="http://elsewhere.example/v1",
-        key_variables=(),
-        secrets=(),
-    )
-    assert isinstance(error, TransientChatError)
-    assert error.patience is None
-
-
-def test_the_full_stop_of_a_server_is_left_out() -> None:
-    def told(text: str) -> str:
-        return str(classify(RuntimeError(text), llm="m", api_base=None, key_variables=(), secrets=()))
-
-    assert told("Connection error.").endswith("Connection error")
-    assert told("still loading ...").endswith("still loading ...")
+    error = told(REFUSED, "openai/m", "http://elsewhere.example/v1")
+    assert isinstance(error, TransientChatError) and error.patience is None
 
 
 @pytest.mark.parametrize(

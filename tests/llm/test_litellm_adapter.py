@@ -4,10 +4,9 @@ from typing import Any
 
 import pytest
 
-from falsifier.errors import ChatSetupError
-from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.client import LiteLLMChat, sent_message
 from falsifier.llm.conversation import converse
-from falsifier.llm.litellm_adapter import check_name, listed_price, may_take_tools, sent_message
+from falsifier.llm.litellm_adapter import listed_price, may_take_tools
 from falsifier.llm.messages import Message, ToolCall
 from tests.llm.server import Step, serving
 from tests.llm.support import ADD, QUESTION, SCHEMA, add
@@ -84,12 +83,6 @@ class TestWire:
         assert usage.estimated
         assert usage.completion_tokens > 100
         assert usage.prompt_tokens > len(ADD.model_dump_json()) / 4
-
-
-@pytest.mark.parametrize("llm", ["openai", "openai/", "openai//", "ollama_chat/ "])
-def test_a_provider_alone_is_no_name(llm: str) -> None:
-    with pytest.raises(ChatSetupError, match="names a provider, but no model: expected PROVIDER/MODEL"):
-        check_name(llm)
 
 
 def test_prices() -> None:
