@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from falsifier.analyses.lint import ranges_of, static_findings
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, simulate
 from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.formalizing import (
-    ExampleSignal,
     ReadingReply,
     example_trajectory,
     formalizing_messages,
@@ -166,9 +166,7 @@ class _Asked:
         problems: list[str] = []
         for number, reply in enumerate(read_readings(text), start=1):
             try:
-                reading = checked_reading(reply, self._subject)
-                _check_new(reading, valid)
-                valid.append(reading)
+                valid.append(_checked_reading(reply, self._subject, valid))
             except RejectedReplyError as rejection:
                 problems.append(f"reading {number} ({reply.formula[:200]}): {rejection}")
         if len(valid) >= len(self.valid):
@@ -179,12 +177,13 @@ class _Asked:
         return valid
 
 
-def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
+def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Reading]) -> Reading:
     """Return a reading that passed all checks.
 
     Its formula must parse, name signals of the model, fit the stop time and the grid, compare what has the
-    same unit, and neither hold nor fail for all values in range. It must hold on the example that came with
-    it and fail on the counterexample: a reversed inequality contradicts its own examples.
+    same unit, neither hold nor fail for all values in range, and require something else than the others. It
+    must hold on the example that came with it and fail on the counterexample: a reversed inequality
+    contradicts its own examples.
 
     Raises:
         RejectedReplyError: stating what is wrong.
@@ -198,34 +197,25 @@ def checked_reading(reply: ReadingReply, subject: Subject) -> Reading:
     for found in static_findings(problem):
         if found.kind in ("always", "never", "units"):
             raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
-    if _compares_reals(formula, problem) and margins(formula, ranges_of(problem)).low == -ON_LIMIT:
-        raise RejectedReplyError(
-            "it can be violated only exactly on its limit, so that no margin leads a search: "
-            "for x == 3 write abs(x - 3) <= 0.5"
-        )
-    _check_examples(reply, formula, problem)
-    stated = replace(
-        problem,
-        experiment=replace(
-            problem.experiment,
-            outputs=tuple(dict.fromkeys((*problem.experiment.outputs, *_recorded(formula, problem)))),
-        ),
-    )
-    return Reading(formula, reply.meaning, in_words(formula), stated)
-
-
-def _compares_reals(formula: Formula, problem: Problem) -> bool:
-    """Whether two reals are compared for equality; whole numbers can be equal."""
-    return any(
+    compares_reals = any(  # whole numbers can be equal
         problem.info[name].kind == "real"
         for predicate in formula.predicates
         if predicate.operator in ("==", "!=")
         for name in predicate.signals
     )
-
-
-def _recorded(formula: Formula, problem: Problem) -> list[str]:
-    return [name for name in formula.signals if problem.info[name].causality != "input"]
+    if compares_reals and margins(formula, ranges_of(problem)).low == -ON_LIMIT:
+        raise RejectedReplyError(
+            "it can be violated only exactly on its limit, so that no margin leads a search: "
+            "for x == 3 write abs(x - 3) <= 0.5"
+        )
+    _check_examples(reply, formula, problem)
+    for number, other in enumerate(others, start=1):
+        if implies(formula, other.formula) and implies(other.formula, formula):
+            raise RejectedReplyError(f"it requires the same as reading {number}; leave it out")
+    recorded = (name for name in formula.signals if problem.info[name].causality != "input")
+    outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *recorded)))
+    stated = replace(problem, experiment=replace(problem.experiment, outputs=outputs))
+    return Reading(formula, reply.meaning, in_words(formula), stated)
 
 
 def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> None:
@@ -243,48 +233,38 @@ def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> Non
 
 
 def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> None:
-    for signals, satisfied in ((reply.satisfied, True), (reply.violated, False)):
-        robustness = _on_example(signals, formula, problem)
-        if (robustness >= 0) != satisfied:
-            said, found = ("satisfied", "violated") if satisfied else ("violated", "satisfied")
-            raise RejectedReplyError(
-                f"the example that you call {said} is {found} by the formula, with robustness "
-                f"{shown(robustness):.4g}: is an inequality reversed, or a window wrong?"
-            )
-
-
-def _on_example(signals: Sequence[ExampleSignal], formula: Formula, problem: Problem) -> float:
     experiment = problem.experiment
-    trajectory = example_trajectory(signals, formula.signals, experiment.times)
-    try:
-        monitor = Monitor(formula, experiment.output_interval, experiment.samples)
-        return monitor.evaluate(trajectory).robustness
-    except FalsifierError as error:
-        raise RejectedReplyError(f"the formula has no value on an example: {error}") from None
-
-
-def _check_new(reading: Reading, others: Sequence[Reading]) -> None:
-    for number, other in enumerate(others, start=1):
-        if implies(reading.formula, other.formula) and implies(other.formula, reading.formula):
-            raise RejectedReplyError(f"it requires the same as reading {number}; leave it out")
+    for signals, said, other in (
+        (reply.satisfied, "satisfied", "violated"),
+        (reply.violated, "violated", "satisfied"),
+    ):
+        trajectory = example_trajectory(signals, formula.signals, experiment.times)
+        try:
+            monitor = Monitor(formula, experiment.output_interval, experiment.samples)
+            verdict = monitor.evaluate(trajectory)
+        except FalsifierError as error:
+            raise RejectedReplyError(f"the formula has no value on an example: {error}") from None
+        if verdict.violated != (said == "violated"):
+            raise RejectedReplyError(
+                f"the example that you call {said} is {other} by the formula, with robustness "
+                f"{shown(verdict.robustness):.4g}: is an inequality reversed, or a window wrong?"
+            )
 
 
 def _judged(subject: Subject, readings: Sequence[Reading]) -> list[Reading]:
     """Judge readings on simulations with the inputs at their start values, or else in the middle."""
-    info = subject.problem.info
-    inputs = {r.name: _start(info[r.name].start, r.low, r.high) for r in subject.problem.space.inputs}
-    parameters = {p.name: _start(info[p.name].start, p.low, p.high) for p in subject.problem.space.parameters}
+    info, space = subject.problem.info, subject.problem.space
+
+    def start(searched: InputRange | ParameterRange) -> float:
+        value, low, high = info[searched.name].start, searched.low, searched.high
+        return float(value) if isinstance(value, int | float) and low <= value <= high else (low + high) / 2
+
+    inputs = {r.name: start(r) for r in space.inputs}
+    parameters = {p.name: start(p) for p in space.parameters}
     try:
-        return [
-            replace(reading, nominal=simulate(reading.problem, dict(inputs), parameters))
-            for reading in readings
-        ]
+        return [replace(r, nominal=simulate(r.problem, dict(inputs), parameters)) for r in readings]
     finally:
         subject.problem.model.close()
-
-
-def _start(start: float | str | None, low: float, high: float) -> float:
-    return float(start) if isinstance(start, int | float) and low <= start <= high else (low + high) / 2
 
 
 def _difference(first: int, second: int, one: Reading, other: Reading) -> Difference:
@@ -293,14 +273,10 @@ def _difference(first: int, second: int, one: Reading, other: Reading) -> Differ
     step = fitting_interval(And(one.formula, other.formula), stop, finest)
     if step is None:  # no grid of a reasonable size fits the windows of both
         return Difference(first, second, None, None)
-    found = [
-        tell_apart(
-            a.formula,
-            b.formula,
-            step=step,
-            samples=round(stop / step) + 1,
-            ranges=ranges_of(one.problem),
-        )
-        for a, b in ((one, other), (other, one))
-    ]
-    return Difference(first, second, *found)
+    samples, ranges = round(stop / step) + 1, [ranges_of(reading.problem) for reading in (one, other)]
+    return Difference(
+        first,
+        second,
+        tell_apart(one.formula, other.formula, step=step, samples=samples, ranges=ranges[0]),
+        tell_apart(other.formula, one.formula, step=step, samples=samples, ranges=ranges[1]),
+    )

@@ -1,6 +1,6 @@
 """What is wrong with requirements before anything is searched: nothing moves them, or they cannot fail."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import permutations
 from typing import Literal
@@ -115,7 +115,7 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
     found = {}
     for v in problem.info.variables:
         low, high = v.limits
-        found[v.name] = Interval(*(i if n is None else n for n, i in ((low, -np.inf), (high, np.inf))))
+        found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
     searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     return found | {r.name: Interval(r.low, r.high) for r in searched}
@@ -127,15 +127,13 @@ def _constants(problem: Problem) -> dict[str, float]:
     return {n: v for n, v in problem.parameters.items() if causality.get(n) in ("input", "parameter")}
 
 
-def _range_text(name: str, found: Interval) -> str:
-    if found.low == found.high:
-        return f"{name} = {found.low:g}"
-    return f"{name} in [{found.low:g}, {found.high:g}]"
-
-
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
     ranges = ranges_of(problem)
-    bounds = [_range_text(n, ranges[n]) for n in part.signals]
+    bounds = [
+        f"{n} = {low:g}" if low == high else f"{n} in [{low:g}, {high:g}]"
+        for n in part.signals
+        for low, high in [(ranges[n].low, ranges[n].high)]
+    ]
     because = f"as long as {listed(bounds)}" if bounds else "whatever happens"
     if part == problem.requirement.formula:
         what = "no trajectory in range violates it" if holds else "every trajectory in range violates it"
@@ -171,16 +169,15 @@ def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
             continue
         spare, kept = (other, one) if isinstance(part, And) else (one, other)
         because = "implies it" if isinstance(part, And) else "it implies"
-        text = f"it does not matter beside {kept}, which {because}"
-        kind: LintKind = "implied"
-        if isinstance(spare, Always | Eventually | Until) and _differ_in_window(spare, kept):
-            kind = "window"
-        yield LintFinding(name, kind, str(spare), text, "leave it out, or correct its window or threshold")
+        is_window = type(spare) is type(kept) and isinstance(spare, Always | Eventually | Until)
+        yield LintFinding(
+            name,
+            "window" if is_window and spare.children == kept.children else "implied",
+            str(spare),
+            f"it does not matter beside {kept}, which {because}",
+            "leave it out, or correct its window or threshold",
+        )
         return
-
-
-def _differ_in_window(one: Formula, other: Formula) -> bool:
-    return type(one) is type(other) and one.children == other.children
 
 
 def _repeated(group: Sequence[Problem]) -> Iterator[LintFinding]:
@@ -221,8 +218,8 @@ def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[Lin
     simulated = _simulated(group[0], simulations) if asked and simulations else []
     for problem in asked:
         signals = problem.requirement.formula.signals
-        moved = _moved(signals, simulated)
-        if moved or (not declared[problem.name] and len(simulated) < 2):
+        courses = {tuple(t[name].tobytes() for name in signals) for t in simulated}
+        if len(courses) > 1 or (not declared[problem.name] and len(simulated) < 2):
             continue
         measured = f"{listed(list(signals))} was the same in {counted(len(simulated), 'random simulation')}"
         if declared[problem.name]:
@@ -249,9 +246,9 @@ def _is_declared_independent(problem: Problem) -> bool:
 
 def _is_continuous(problem: Problem) -> bool:
     """Whether every effect on its signals shows: a discrete one may keep its value in all simulations."""
-    known: Mapping[str, tuple[str, str]] = {v.name: (v.kind, v.variability) for v in problem.info.variables}
-    signals = problem.requirement.formula.signals
-    return all(known.get(name) == ("real", "continuous") for name in signals)
+    variables = [problem.info[n] for n in problem.requirement.formula.signals if n in problem.info]
+    every = len(variables) == len(problem.requirement.formula.signals)
+    return every and all((v.kind, v.variability) == ("real", "continuous") for v in variables)
 
 
 def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:
@@ -260,8 +257,3 @@ def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:
     points = low + (high - low) * rng.random((simulations, len(low)))
     found = (evaluate(problem, problem.space.decode(point)).trajectory for point in points)
     return [trajectory for trajectory in found if trajectory is not None]
-
-
-def _moved(signals: Sequence[str], simulated: Sequence[Trajectory]) -> bool:
-    outcomes = {tuple(t[name].tobytes() for name in signals) for t in simulated}
-    return len(outcomes) > 1
