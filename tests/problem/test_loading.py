@@ -27,14 +27,6 @@ def test_at_is_bundled_with_its_ten_requirements() -> None:
     assert (at1.space.inputs[0].unit, at1.space.inputs[1].high) == ("%", 325)
 
 
-def test_profiles_change_the_parameterization() -> None:
-    inputs = load_problem("AT1", profile="instance2").space.inputs
-    assert [(r.control_points, r.interpolation, r.free) for r in inputs] == [
-        (7, "constant", None),
-        (3, "constant", None),
-    ]
-
-
 def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
     problem = load_problem("AT1", shortest_piece=2.5)
     assert {r.free for r in problem.space.inputs} == {Freedom(20, 2.5)}
@@ -43,15 +35,6 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         load_problem("AT1", parameterization="fixed", shortest_piece=2.5)
     with pytest.raises(SpecError, match=r"communication steps, 0\.01 s apart; give at least that"):
         load_problem("AT1", shortest_piece=1e-9)
-
-
-def test_what_the_spec_leaves_out_comes_from_the_fmu(folder: Path) -> None:
-    problem = load_problem(spec(folder, GOOD))
-    (throttle,) = problem.space.inputs
-    assert (throttle.low, throttle.high, throttle.unit) == (0, 100, "%")
-    assert (problem.experiment.stop_time, problem.experiment.output_interval) == (50, 0.01)
-    assert problem.parameters == {"brake": 0, "finalDrive": 3}
-    assert (problem.space.parameters[0].name, problem.space.parameters[0].nominal) == ("rollingLoad", 40)
 
 
 def test_problems_travel_between_processes(folder: Path) -> None:

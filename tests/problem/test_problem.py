@@ -1,17 +1,23 @@
 import math
 import pickle
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from falsifier.context.values import Context, Named
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment
 from falsifier.core.space import InputRange, SearchSpace
-from falsifier.errors import SpecError
+from falsifier.errors import FormulaError, SpecError
+from falsifier.problem.context import named_context, with_context
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.requirement import Requirement
+from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.shorthand import changes_from_options
+from falsifier.problem.source import ProblemSource
+from falsifier.problem.spec import parse_spec
 from falsifier.stl import parse
 from falsifier.testing import START, lag_problem
 
@@ -25,19 +31,6 @@ def test_a_problem_of_an_fmu_and_a_formula_remembers_how_it_was_made() -> None:
     assert problem.source is not None
     assert load_source(problem.source) == problem
     assert (problem.name, problem.info.name) == (problem.requirement.name, "ArchComp.AT")
-
-
-@pytest.mark.parametrize(
-    ("inputs", "named"),
-    [
-        ({"throttle": (0, 100, 4, "cubic")}, "cubic"),
-        ({"throttle": (0, 1, 2, "linear", 5)}, "inputs.throttle"),
-        ({"throtle": 1.0}, "'throttle'"),
-    ],
-)
-def test_inputs_that_cannot_be_understood_are_named(inputs: dict[str, object], named: str) -> None:
-    with pytest.raises(SpecError, match=named):
-        Problem.from_fmu(AT, "G[0,20] (speed <= 120)", inputs=inputs)  # type: ignore[arg-type]
 
 
 def test_the_fingerprint_is_of_everything_but_the_code() -> None:
@@ -93,3 +86,103 @@ def test_problems_that_are_simulated_otherwise_do_not_share_a_search() -> None:
 def test_parts_of_a_problem_that_do_not_fit_are_refused(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(SpecError, match=message):
         replace(lag_problem(), **wrong)
+
+
+CHANGED = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
+
+
+@pytest.mark.parametrize(
+    ("target", "name"),
+    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my")],
+)
+def test_its_name_is_the_targets_last_part(target: str, name: str) -> None:
+    assert ProblemSource(target=target).name == name
+
+
+def test_equal_sources_are_equal_keys() -> None:
+    again = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
+    assert len({CHANGED, again, ProblemSource(target="AT1")}) == 2
+
+
+def test_what_is_not_stated_stays_so_through_json() -> None:
+    read = ProblemSource.model_validate_json(CHANGED.model_dump_json())
+    assert read == CHANGED
+    assert "output_interval" not in CHANGED.model_dump_json()
+    problem, bundled = load_source(read), load_source(ProblemSource(target="AT1"))
+    assert problem.experiment.stop_time == 30.0
+    assert problem.experiment.output_interval == bundled.experiment.output_interval
+    assert (dict(problem.parameters), problem.space.inputs) == ({"brake": 0.0}, bundled.space.inputs[:1])
+
+
+INFO = lag_problem().info
+EXPERIMENT = Experiment(10.0, 0.1, ("x",))
+
+
+def test_outputs_and_inputs_may_be_named() -> None:
+    assert parse_requirement("G[0,10] (x <= u)", INFO, EXPERIMENT).signals == ("x", "u")
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        ("G[0,10] (xx <= 1)", "'x'"),  # the nearest signal
+        ("G[0,11] (x <= 1)", "11"),  # the window that reaches past the stop time
+        ("G[0,0.25] (x <= 1)", "0.25"),  # a bound between two samples
+        ("G[0,10] (x <= )", "x <= )"),  # where it cannot be read on
+    ],
+)
+def test_what_cannot_be_judged_names_the_place(text: str, named: str) -> None:
+    with pytest.raises(SpecError) as caught:
+        parse_requirement(text, INFO, EXPERIMENT)
+    assert named in str(caught.value)
+
+
+def test_a_requirement_has_a_name_and_a_formula_or_its_text() -> None:
+    low = Requirement("low", "G[0,10] (x < 1)", "stays low")
+    assert low == Requirement("low", parse("G[0,10] (x < 1)"), "stays low") == pickle.loads(pickle.dumps(low))
+    assert replace(low, name="other").formula == low.formula
+    with pytest.raises(SpecError, match="expected a name"):
+        Requirement(None, parse("G (x < 1)"))  # type: ignore[arg-type]
+    with pytest.raises(SpecError, match="requirement 'low': expected a formula or its text, got 3"):
+        Requirement("low", 3)  # type: ignore[arg-type]
+    with pytest.raises(FormulaError, match="ends too early"):
+        Requirement("low", "G (x <")
+
+
+def test_values_are_shown_short() -> None:
+    problem = lag_problem()
+    assert repr(problem.requirement) == "Requirement('LAG', 'G[0,10] (x <= 0.9)')"
+    assert repr(problem.requirement.formula) == "parse('G[0,10] (x <= 0.9)')"
+    assert repr(problem.space) == "<SearchSpace: u in [-1, 1]; 10 s>"
+    assert repr(problem) == "<Problem LAG of lag: G[0,10] (x <= 0.9), <SearchSpace: u in [-1, 1]; 10 s>>"
+
+
+SPEC = {
+    "model": {"fmu": "a.fmu"},
+    "context": {"files": ["plant.mo"], "fmu": True, "checked": ["plant.mo", "a.fmu: sources/a.c"]},
+    "requirements": {"R": {"formula": "G (y < 1)"}},
+}
+LIMP = bundled("fmus").parent / "modelica" / "Faults" / "HeaterLimpHome.mo"
+
+
+def test_the_spec_and_the_options_name_context(tmp_path: Path) -> None:
+    spec, path = parse_spec(SPEC, file="a.toml"), tmp_path / "a.toml"
+    plain = ProblemSource(target="a.toml")
+    inside = str(tmp_path / "plant.mo")
+    checked = (inside, "a.fmu: sources/a.c")
+    assert named_context(plain, spec, path) == Named((inside,), fmu=True, checked=checked)
+    more = plain.model_copy(update={"context": ("b.md", "b.md", "checked:b.md")})
+    assert named_context(more, spec, path) == Named((inside, "b.md"), fmu=True, checked=(*checked, "b.md"))
+    assert not named_context(plain.model_copy(update={"context": ("none",)}), spec, path)
+    assert named_context(plain.model_copy(update={"context": ("none", "fmu")}), spec, path) == Named(fmu=True)
+
+
+def test_files_are_read_only_when_asked_for() -> None:
+    problem = load_source(ProblemSource(target="HeaterLimpHome", context=("no such file",)))
+    assert problem.context == Context()
+    with pytest.raises(SpecError, match="context no such file: cannot be read"):
+        with_context(problem)
+    read = with_context(load_source(ProblemSource(target="HeaterLimpHome", context=(str(LIMP),))))
+    assert "disagreement > enterAbove (enterAbove = 6.8)" in read.context.of("disagreement")
+    # What was read once, or recorded, is not read again.
+    assert with_context(replace(problem, context=read.context)).context == read.context

@@ -7,7 +7,6 @@ import pytest
 from falsifier.errors import SpecError
 from falsifier.problem.sections import InputSection, ParameterSection
 from falsifier.problem.spec import overlay, parse_spec, read_spec
-from falsifier.problem.templates import Rise
 
 GOOD: dict[str, Any] = {
     "model": {"fmu": "a.fmu"},
@@ -99,14 +98,6 @@ def test_fixed_and_searched_replace_each_other() -> None:
     assert overlay(ParameterSection(value=2.0), ParameterSection(range=(0, 1))).value is None
 
 
-def test_layers_go_from_requirement_to_profile_to_the_profiles_requirement() -> None:
-    data = changed("profiles.coarse", {"stop_time": 2.0, "requirements": {"R": {"stop_time": 3.0}}})
-    data["requirements"]["R"]["stop_time"] = 1.0
-    spec = parse_spec(data, file="my.toml")
-    assert [layer.stop_time for layer in spec.changes("R", "coarse")] == [1.0, 2.0, 3.0]
-    assert [layer.stop_time for layer in spec.changes("R", None)] == [1.0]
-
-
 @pytest.mark.parametrize(
     ("requirement", "key"),
     [
@@ -123,10 +114,3 @@ def test_keys_are_those_of_the_file_whatever_kind_a_requirement_is(
     with pytest.raises(SpecError) as raised:
         parse_spec(data, file="my.toml")
     assert raised.value.key == f"requirements.<formula>x.{key}"
-
-
-def test_a_template_is_a_requirement_with_changes_of_its_own() -> None:
-    section = Rise.model_validate(
-        {"template": "rise", "signal": "y", "reference": 10, "time": 2, "stop_time": 5.0}
-    )
-    assert (section.signal, section.stop_time) == ("y", 5.0)
