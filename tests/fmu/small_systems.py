@@ -11,7 +11,6 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import Component, Connection, Coupling, System
 from falsifier.fmu.process import REGISTRY
-from falsifier.fmu.systems.system import _order
 from tests.fmu.fixtures import path
 from tests.patience import HANG
 
@@ -31,7 +30,7 @@ def system(
 
 def pids(model: System) -> list[int]:
     """The worker processes of a system."""
-    key = _order(model).key
+    key = model.order.key
     workers = [runner._worker for (own, _), runner in REGISTRY._runners.items() if own == key]
     return [worker.pid for worker in workers if worker is not None]
 

@@ -302,7 +302,7 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
         path: the ``.ssp`` file to write.
     """
     network = system.network
-    sources = {m.name: f"resources/{m.folder}_{m.path.name}" for m in network.members}
+    sources = {m.name: f"resources/{k}_{m.path.name}" for k, m in enumerate(network.members)}
     for short, name in (("ssd", "Description"), ("ssc", "Common")):
         ElementTree.register_namespace(short, _NAMESPACE + name)
     root = Element(f"{_SSD}SystemStructureDescription", {"version": "1.0", "name": system.name})

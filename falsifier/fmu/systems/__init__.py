@@ -2,6 +2,8 @@
 
 from falsifier.fmu.systems.network import (
     SYSTEM,
+    Component,
+    Connection,
     Coupling,
     Extrapolation,
     Frame,
@@ -14,8 +16,7 @@ from falsifier.fmu.systems.network import (
     Place,
 )
 from falsifier.fmu.systems.step_order import late_links
-from falsifier.fmu.systems.system import Component, System
-from falsifier.fmu.systems.wiring import Connection
+from falsifier.fmu.systems.system import System
 
 __all__ = [
     "SYSTEM",

@@ -1,16 +1,17 @@
 """A system of FMUs as its workers get it, with the description of the whole: all variables, by component."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import reduce
 from math import gcd
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
+from falsifier.core.arguments import one_of, positive
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
-from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.description import Description, Slot, file_hash
 
 Method = Literal["gauss-seidel", "jacobi"]
 Loops = Literal["refuse", "delay", "iterate"]
@@ -20,6 +21,53 @@ Isolation = Literal["together", "each"]
 _SHOWN_LINKS = 40
 # Largest denominator of steps like 1/30 s, which are written with many digits.
 _MAX_DENOMINATOR = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One FMU of a system.
+
+    Attributes:
+        fmu: path of the .fmu file.
+        step: step of its own in s, an integer multiple of the communication step; None for that step.
+        interface: ``co-simulation`` or ``model-exchange``; None: co-simulation if the FMU offers it.
+        sha256: hash of the file.
+
+    Raises:
+        ModelError: if the file cannot be read.
+        SpecError: if the step is not positive.
+    """
+
+    fmu: Path
+    step: float | None = None
+    interface: Interface | None = None
+    sha256: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fmu", Path(self.fmu).absolute())
+        if self.step is not None:
+            positive("step", self.step)
+        if self.interface is not None:
+            one_of("interface", self.interface, get_args(Interface))
+        object.__setattr__(self, "sha256", file_hash(self.fmu))
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """Where the values of an input come from.
+
+    Attributes:
+        source: the output, as ``component.variable``.
+        factor: factor of a conversion ``factor * value + offset``; with it, or with an offset, units are not
+            converted.
+        offset: offset of the conversion.
+        extrapolation: ``hold`` or ``linear``; None: that of the system.
+    """
+
+    source: str
+    factor: float | None = None
+    offset: float | None = None
+    extrapolation: Extrapolation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +130,6 @@ class Member:
         description: description of the FMU, with the component's name in place of the model's.
         step: step of its own in s; None for the communication step.
         interface: interface to simulate with.
-        folder: name of the folder to which it is extracted.
     """
 
     name: str
@@ -91,7 +138,6 @@ class Member:
     description: Description
     step: float | None
     interface: Interface
-    folder: str
 
 
 @dataclass(frozen=True, slots=True)

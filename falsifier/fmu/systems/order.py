@@ -40,7 +40,7 @@ class SystemOrder(Order):
             description=network.description,
             shown=network.name,
             key=(system, logging, rights),
-            archives={m.folder: (m.path, m.sha256) for m in network.members},
+            archives={str(k): (m.path, m.sha256) for k, m in enumerate(network.members)},
             kind=Request.LOAD_SYSTEM,
             logging=logging,
             rights=rights,
@@ -49,13 +49,13 @@ class SystemOrder(Order):
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""
-        members = [self.network.members[m] for m in self.network.order]
-        is_separate = self.network.coupling.isolation == "each"
-        parts = [
-            encoding.fmu(m.description, str(m.path), folder / m.folder, m.interface, logging=logging)
-            for m in members
-        ]
-        return encoding.integers(is_separate, len(members)) + b"".join(parts)
+        parts = [encoding.integers(self.network.coupling.isolation == "each", len(self.network.order))]
+        for k in self.network.order:
+            m = self.network.members[k]
+            parts.append(
+                encoding.fmu(m.description, str(m.path), folder / str(k), m.interface, logging=logging)
+            )
+        return b"".join(parts)
 
     def prepare(self, plan: Plan) -> bytes:
         """See Order."""

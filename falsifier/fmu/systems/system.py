@@ -8,44 +8,24 @@ from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import instance, one_of, positive, whole
-from falsifier.core.model import GRID_ROUNDING, Experiment, Interface, ModelInfo
+from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.description import file_hash
 from falsifier.fmu.process import Isolated, simulate
-from falsifier.fmu.systems.network import Coupling, Extrapolation, Frame, Isolation, Loops, Method, Network
+from falsifier.fmu.systems.network import (
+    Component,
+    Connection,
+    Coupling,
+    Extrapolation,
+    Frame,
+    Isolation,
+    Loops,
+    Method,
+    Network,
+)
 from falsifier.fmu.systems.order import SystemOrder
-from falsifier.fmu.systems.wiring import Connection, make_network
-
-
-@dataclass(frozen=True, slots=True)
-class Component:
-    """One FMU of a system.
-
-    Attributes:
-        fmu: path of the .fmu file.
-        step: step of its own in s, an integer multiple of the communication step; None for that step.
-        interface: ``co-simulation`` or ``model-exchange``; None: co-simulation if the FMU offers it.
-        sha256: hash of the file.
-
-    Raises:
-        ModelError: if the file cannot be read.
-        SpecError: if the step is not positive.
-    """
-
-    fmu: Path
-    step: float | None = None
-    interface: Interface | None = None
-    sha256: str = field(default="", init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "fmu", Path(self.fmu).absolute())
-        if self.step is not None:
-            positive("step", self.step)
-        if self.interface is not None:
-            one_of("interface", self.interface, get_args(Interface))
-        object.__setattr__(self, "sha256", file_hash(self.fmu))
+from falsifier.fmu.systems.wiring import make_network
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,11 +175,8 @@ def _order(system: System) -> SystemOrder:
 
 @lru_cache(maxsize=32)
 def _network(system: System) -> Network:
-    components = {
-        name: (each.fmu, each.sha256, each.step, each.interface) for name, each in system.parts.items()
-    }
     connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
-    return make_network(system.name, components, connections, system.coupling, system.frame)
+    return make_network(system.name, system.parts, connections, system.coupling, system.frame)
 
 
 def _check_coupling(coupling: Coupling) -> None:

@@ -1,15 +1,17 @@
 """Checking the components and connections of a system, before anything is simulated."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import get_args
 
 from falsifier.core.arguments import finite, one_of
-from falsifier.core.model import Interface, Variable
+from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.fmu.description import Structure, conversion, describe, read_structure
+from falsifier.fmu.description import Slot, Structure, conversion, describe, read_structure
 from falsifier.fmu.systems.network import (
     SYSTEM,
+    Component,
+    Connection,
     Coupling,
     Extrapolation,
     Frame,
@@ -17,34 +19,15 @@ from falsifier.fmu.systems.network import (
     Member,
     Network,
     Place,
+    full_name,
     merged,
 )
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 
-_EXTRAPOLATIONS = ("hold", "linear")
-
-
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """Where the values of an input come from.
-
-    Attributes:
-        source: the output, as ``component.variable``.
-        factor: factor of a conversion ``factor * value + offset``; with it, or with an offset, units are not
-            converted.
-        offset: offset of the conversion.
-        extrapolation: ``hold`` or ``linear``; None: that of the system.
-    """
-
-    source: str
-    factor: float | None = None
-    offset: float | None = None
-    extrapolation: Extrapolation | None = None
-
 
 def make_network(
     name: str,
-    components: Mapping[str, tuple[Path, str, float | None, Interface | None]],
+    components: Mapping[str, Component],
     connections: Mapping[str, Connection],
     coupling: Coupling,
     frame: Frame,
@@ -53,7 +36,7 @@ def make_network(
 
     Args:
         name: name of the system.
-        components: path and hash of the FMU, a step of its own in s, and the interface, by component.
+        components: the FMUs by name.
         connections: where the values of inputs come from, by input, as ``component.variable``.
         coupling: how the components exchange values.
         frame: what the system has as a whole.
@@ -62,7 +45,7 @@ def make_network(
         ModelError: if an FMU cannot be read.
         SpecError: naming both ends of a connection that does not fit, and the remedy.
     """
-    members = tuple(_member(k, each, *components[each]) for k, each in enumerate(components))
+    members = tuple(_member(each, component) for each, component in components.items())
     structures = [read_structure(m.path, m.sha256) for m in members]
     joiner = _Joiner(members, structures, coupling, frame)
     for target, connection in connections.items():
@@ -71,35 +54,36 @@ def make_network(
     dependencies = Dependencies(members, structures)
     loop = direct_loop(links, dependencies)
     if loop and coupling.loops == "refuse":
-        raise SpecError(_loop_text(loop, members), key="connections")
+        raise SpecError(_loop_text([full_name(members, place) for place in loop]), key="connections")
+    loops: tuple[tuple[int, int], ...] = ()
     if coupling.loops == "iterate":
         order, loops = iterated_order(len(members), links, dependencies)
-        _check_restorable(members, order, loops)
+        for first, last in loops:
+            _check_restorable([members[m] for m in order[first:last]])
     else:
-        order, loops = step_order(len(members), links, dependencies), ()
+        order = step_order(len(members), links, dependencies)
     late = links if coupling.method == "jacobi" else tuple(late_links(links, order, loops))
-    notes = [*_order_notes(members, order, late), *_loop_notes(members, order, loops), *joiner.notes]
-    description, places = merged(name, members, links, frame, notes)
+    names = [members[m].name for m in order]
+    notes = [_order_note(names, list(dict.fromkeys(full_name(members, link.target) for link in late)))]
+    notes += [_loop_note(names[first:last]) for first, last in loops]
+    description, places = merged(name, members, links, frame, [*notes, *joiner.notes])
     return Network(name, members, links, order, loops, coupling, description, places)
 
 
-def _member(
-    position: int, name: str, path: Path, sha256: str, step: float | None, interface: Interface | None
-) -> Member:
-    description = describe(path, sha256)
-    key = f"components.{name}"
+def _member(name: str, component: Component) -> Member:
+    path, key = component.fmu, f"components.{name}"
+    description = describe(path, component.sha256)
     offered = description.info.interfaces
     if not offered:
         raise SpecError(
             f"{path}: the FMU offers neither co-simulation nor model exchange; export it for one of them",
             key=key,
         )
-    if interface is not None and interface not in offered:
+    if component.interface is not None and component.interface not in offered:
         raise SpecError(
-            f"the FMU offers {' and '.join(offered)}, not {interface}; change or remove this key",
+            f"the FMU offers {' and '.join(offered)}, not {component.interface}; change or remove this key",
             key=f"{key}.interface",
         )
-    chosen = interface or ("co-simulation" if "co-simulation" in offered else offered[0])
     if description.major == 1:
         raise SpecError(
             f"{path}: an FMU of FMI 1 has no initialisation mode, in which connected components find their "
@@ -113,161 +97,154 @@ def _member(
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    return Member(name, path, sha256, named, step, chosen, str(position))
+    interface = component.interface or ("co-simulation" if "co-simulation" in offered else offered[0])
+    return Member(name, path, component.sha256, named, component.step, interface)
 
 
 class _Joiner:
     """Resolves connections one by one and collects their links."""
 
     def __init__(
-        self,
-        members: tuple[Member, ...],
-        structures: list[Structure],
-        coupling: Coupling,
-        frame: Frame,
+        self, members: Sequence[Member], structures: Sequence[Structure], coupling: Coupling, frame: Frame
     ) -> None:
         self._inputs = {v.name: v for v in frame.inputs}
         self._members, self._structures, self._coupling = members, structures, coupling
-        self._sources: dict[tuple[int, int, int], str] = {}
+        self._fed: dict[tuple[int, int, int], str] = {}
         self.links: list[Link] = []
         self.notes: list[str] = []
 
     def connect(self, target: str, connection: Connection) -> None:
         """Add the links of one connection: one, or one per element of an array."""
         title = f"{connection.source} -> {target}"
-        sources = self._scalars(connection.source, "output", title)
-        targets = self._scalars(target, "input", title)
-        if len(sources) != len(targets):
-            raise _misfit(
-                title,
-                f"{connection.source} has {len(sources)} elements, {target} has {len(targets)}; connect "
-                "arrays of equal size, or single elements such as NAME[1]",
-            )
-        for source, end in zip(sources, targets, strict=True):
-            self._link(source, end, connection, title)
+        try:
+            sources, targets = self._scalars(connection.source, "output"), self._scalars(target, "input")
+            if len(sources) != len(targets):
+                raise SpecError(
+                    f"{connection.source} has {len(sources)} elements, {target} has {len(targets)}; connect "
+                    "arrays of equal size, or single elements such as NAME[1]"
+                )
+            for source, end in zip(sources, targets, strict=True):
+                self._claim(end, title)
+                self.links.append(self._link(source, end, connection))
+                note = self._unit_note(source, end, self.links[-1])
+                # A conversion that the user states needs no note.
+                if note and connection.factor is None and connection.offset is None:
+                    self.notes.append(f"{title}: {note}")
+        except SpecError as error:
+            raise SpecError(f"{title}: {error.message}", key="connections") from None
 
-    def _scalars(self, name: str, role: str, title: str) -> list[Place]:
+    def _scalars(self, name: str, role: str) -> list[Place]:
         """Return the variable of this name; of an array, its elements."""
         if role == "output" and name in self._inputs:
             return [Place(SYSTEM, name)]
-        member, local = self._owner(name, title)
-        description = self._members[member].description
-        if local in description.slots:
-            found = [local]
-        else:
-            found = [
-                n for n, s in description.slots.items() if s.declared == local and n.startswith(f"{local}[")
-            ]
+        member, local = self._owner(name)
+        component, description = self._members[member].name, self._members[member].description
+        slots = description.slots
+        elements = (n for n in slots if n.startswith(f"{local}[") and slots[n].declared == local)
+        found = [local] if local in slots else list(elements)
+        of_role = [v.name for v in description.info.variables if v.causality == role]
         if not found:
-            of_role = [v.name for v in description.info.variables if v.causality == role]
-            raise _misfit(
-                title,
-                f"{self._members[member].name} has no {role} {local!r}; {did_you_mean(local, of_role)}",
-            )
-        variable = description.info[found[0]]
-        if variable.causality != role:
-            of_role = [v.name for v in description.info.variables if v.causality == role]
-            raise _misfit(
-                title,
-                f"{name} is not an {role}, its causality is {variable.causality}; the {role}s of "
-                f"{self._members[member].name} are: {', '.join(of_role) or 'none'}",
+            raise SpecError(f"{component} has no {role} {local!r}; {did_you_mean(local, of_role)}")
+        causality = description.info[found[0]].causality
+        if causality != role:
+            raise SpecError(
+                f"{name} is not an {role}, its causality is {causality}; the {role}s of {component} are: "
+                f"{', '.join(of_role) or 'none'}"
             )
         return [Place(member, each) for each in found]
 
-    def _owner(self, name: str, title: str) -> tuple[int, str]:
+    def _owner(self, name: str) -> tuple[int, str]:
         """Split a name into component and variable; both may contain dots."""
         owners = [k for k, m in enumerate(self._members) if name.startswith(f"{m.name}.")]
         if not owners:
-            raise _misfit(
-                title,
-                f"no component of the name in {name!r}, which is written as COMPONENT.VARIABLE; "
-                f"{did_you_mean(name.partition('.')[0], (m.name for m in self._members))}",
+            near = did_you_mean(name.partition(".")[0], (m.name for m in self._members))
+            raise SpecError(
+                f"no component of the name in {name!r}, which is written as COMPONENT.VARIABLE; {near}"
             )
         longest = max(owners, key=lambda k: len(self._members[k].name))
         return longest, name[len(self._members[longest].name) + 1 :]
+
+    def _claim(self, target: Place, title: str) -> None:
+        """Check that an input, by whichever of its names, has one source."""
+        slot = self._members[target.member].description.slots[target.name]
+        known = self._fed.setdefault((target.member, slot.reference, slot.offset), title)
+        if known != title:
+            raise SpecError(f"this input is already connected: {known}; remove one of the two")
 
     def _variable(self, place: Place) -> Variable:
         if place.member == SYSTEM:
             return self._inputs[place.name]
         return self._members[place.member].description.info[place.name]
 
-    def _link(self, source: Place, target: Place, connection: Connection, title: str) -> None:
+    def _link(self, source: Place, target: Place, connection: Connection) -> Link:
         a, b = self._variable(source), self._variable(target)
-        slot = self._members[target.member].description.slots[target.name]
-        known = self._sources.setdefault((target.member, slot.reference, slot.offset), title)
-        if known != title:
-            raise _misfit(title, f"this input is already connected: {known}; remove one of the two")
-        _check_types(a, b, title)
-        factor, offset = self._conversion(source, target, connection, title)
+        _check_types(a, b)
+        factor, offset = self._conversion(source, target, connection)
         if (factor, offset) != (1.0, 0.0) and b.kind != "real":
-            raise _misfit(title, f"values of type {b.kind} cannot be converted; remove factor and offset")
+            raise SpecError(f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
-        one_of(f"{title}: extrapolation", extrapolation, _EXTRAPOLATIONS)
+        one_of("extrapolation", extrapolation, get_args(Extrapolation))
         if connection.extrapolation == "linear" and not b.is_continuous:
-            raise _misfit(title, 'only continuous real inputs follow a line; use extrapolation = "hold"')
+            raise SpecError('only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
-        self.links.append(
-            Link(source, target, factor, offset, start, extrapolation == "linear" and b.is_continuous)
-        )
+        return Link(source, target, factor, offset, start, extrapolation == "linear" and b.is_continuous)
 
-    def _conversion(
-        self, source: Place, target: Place, connection: Connection, title: str
-    ) -> tuple[float, float]:
+    def _conversion(self, source: Place, target: Place, connection: Connection) -> tuple[float, float]:
         if connection.factor is not None or connection.offset is not None:
-            factor = 1.0 if connection.factor is None else finite(f"{title}: factor", connection.factor)
+            factor = 1.0 if connection.factor is None else finite("factor", connection.factor)
             if factor == 0.0:
-                raise _misfit(
-                    title, "factor = 0 passes nothing on; state another, or remove it and fix the input"
-                )
-            return factor, finite(f"{title}: offset", connection.offset or 0.0)
+                raise SpecError("factor = 0 passes nothing on; state another, or remove it and fix the input")
+            return factor, finite("offset", connection.offset or 0.0)
         a, b = self._variable(source), self._variable(target)
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
         found = conversion(a.unit, b.unit, known)
         if found is None:
-            raise _misfit(
-                title,
+            raise SpecError(
                 f"the output is in {a.unit}, the input in {b.unit}, and neither FMU defines how to convert "
                 f"one to the other; connect like units, or state the conversion: "
-                f'{{ from = "{connection.source}", factor = NUMBER, offset = NUMBER }}',
+                f'{{ from = "{connection.source}", factor = NUMBER, offset = NUMBER }}'
             )
-        if found != (1.0, 0.0):
-            shown = f" {found[1]:+.6g}" if found[1] else ""
-            self.notes.append(f"{title}: converted from {a.unit} to {b.unit}: * {found[0]:.6g}{shown}")
-        elif a.unit != b.unit and not (a.unit and b.unit):
-            silent, other = (
-                ("input", f"output is in {a.unit}") if a.unit else ("output", f"input is in {b.unit}")
-            )
-            self.notes.append(f"{title}: passes unchanged; the {silent} states no unit, the {other}")
         return found
 
+    def _unit_note(self, source: Place, target: Place, link: Link) -> str:
+        """Say how units are converted, or that one is missing; empty if neither."""
+        a, b = self._variable(source).unit, self._variable(target).unit
+        if (link.factor, link.offset) != (1.0, 0.0):
+            shown = f" {link.offset:+.6g}" if link.offset else ""
+            return f"converted from {a} to {b}: * {link.factor:.6g}{shown}"
+        if bool(a) == bool(b):
+            return ""
+        silent, other = ("input", f"output is in {a}") if a else ("output", f"input is in {b}")
+        return f"passes unchanged; the {silent} states no unit, the {other}"
 
-def _check_types(a: Variable, b: Variable, title: str) -> None:
+
+def _is_element(name: str, slot: Slot, array: str) -> bool:
+    return slot.declared == array and name.startswith(f"{array}[")
+
+
+def _check_types(a: Variable, b: Variable) -> None:
     if "string" in (a.kind, b.kind):
-        raise _misfit(title, "strings cannot be connected; connect numbers")
+        raise SpecError("strings cannot be connected; connect numbers")
     for variable in (a, b):
         if variable.is_clocked:
-            raise _misfit(title, f"{variable.name!r} belongs to a clock, which no system ticks")
+            raise SpecError(f"{variable.name!r} belongs to a clock, which no system ticks")
     if a.kind != b.kind and not (a.kind == "integer" and b.kind == "real"):
-        raise _misfit(
-            title,
+        raise SpecError(
             f"the output is of type {a.kind}, the input of type {b.kind}; export one of them with the type "
-            "of the other",
+            "of the other"
         )
     if a.literals and b.literals and dict(a.literals) != dict(b.literals):
-        raise _misfit(
-            title, f"the enumerations differ: {_items(a)} and {_items(b)}; export both with the same"
-        )
+        raise SpecError(f"the enumerations differ: {_items(a)} and {_items(b)}; export both with the same")
     limits, fits = a.limits, b.type_limits
     if a.kind == "integer" and fits is not None and a.type_limits is not None:
         low = a.type_limits[0] if limits[0] is None else limits[0]
         high = a.type_limits[1] if limits[1] is None else limits[1]
         if low < fits[0] or high > fits[1]:
-            raise _misfit(
-                title,
+            raise SpecError(
                 f"values from {low:g} to {high:g} do not fit the input, whose type {b.type} ranges from "
                 f"{fits[0]} to {fits[1]}; state min and max of the output, or export the input with a larger "
-                "type",
+                "type"
             )
 
 
@@ -275,55 +252,35 @@ def _items(variable: Variable) -> str:
     return ", ".join(f"{number} = {name}" for name, number in variable.literals.items())
 
 
-def _misfit(title: str, what: str) -> SpecError:
-    return SpecError(f"{title}: {what}", key="connections")
-
-
-def _loop_text(loop: list[Place], members: tuple[Member, ...]) -> str:
-    names = [f"{members[p.member].name}.{p.name}" for p in loop]
+def _loop_text(loop: Sequence[str]) -> str:
     return (
-        f"{' -> '.join([*names, names[0]])}: these depend directly on each other (an algebraic loop), as "
+        f"{' -> '.join([*loop, loop[0]])}: these depend directly on each other (an algebraic loop), as "
         "their FMUs declare; export one of the components without the direct dependency, for example with a "
         'delay, or accept a delay of one communication step: [coupling] loops = "delay"; or repeat their '
         'steps until they agree: loops = "iterate"'
     )
 
 
-def _check_restorable(
-    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
-) -> None:
-    for first, last in loops:
-        inside = [members[m] for m in order[first:last]]
-        fixed = [m.name for m in inside if m.interface not in m.description.saves_state]
-        if fixed:
-            raise SpecError(
-                f'loops = "iterate" repeats the steps of {", ".join(m.name for m in inside)}, but '
-                f"{', '.join(fixed)} cannot restore its state (canGetAndSetFMUState); export it with this "
-                'capability, or accept a delay of one communication step: loops = "delay"',
-                key="coupling.loops",
-            )
+def _check_restorable(loop: Sequence[Member]) -> None:
+    fixed = [m.name for m in loop if m.interface not in m.description.saves_state]
+    if fixed:
+        raise SpecError(
+            f'loops = "iterate" repeats the steps of {", ".join(m.name for m in loop)}, but '
+            f"{', '.join(fixed)} cannot restore its state (canGetAndSetFMUState); export it with this "
+            'capability, or accept a delay of one communication step: loops = "delay"',
+            key="coupling.loops",
+        )
 
 
-def _loop_notes(
-    members: tuple[Member, ...], order: tuple[int, ...], loops: tuple[tuple[int, int], ...]
-) -> Iterator[str]:
-    for first, last in loops:
-        names = ", ".join(members[m].name for m in order[first:last])
-        verb = "repeats its" if last - first == 1 else "repeat their"
-        yield f"{names} {verb} steps until the outputs no longer change"
+def _loop_note(names: Sequence[str]) -> str:
+    verb = "repeats its" if len(names) == 1 else "repeat their"
+    return f"{', '.join(names)} {verb} steps until the outputs no longer change"
 
 
-def _order_notes(
-    members: tuple[Member, ...], order: tuple[int, ...], late: tuple[Link, ...]
-) -> Iterator[str]:
-    names = ", ".join(members[m].name for m in order)
-    targets = list(dict.fromkeys(f"{members[n.target.member].name}.{n.target.name}" for n in late))
-    text = f"components step in the order {names}"
-    if targets:
-        use = "uses" if len(targets) == 1 else "use"
-        text += f"; {_few(targets)} {use} the values of the previous communication point"
-    yield text
-
-
-def _few(names: list[str], most: int = 10) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+def _order_note(names: Sequence[str], late: Sequence[str], most: int = 10) -> str:
+    text = f"components step in the order {', '.join(names)}"
+    if not late:
+        return text
+    few = ", ".join(late[:most]) + (f" and {len(late) - most} more" if len(late) > most else "")
+    verb = "uses" if len(late) == 1 else "use"
+    return f"{text}; {few} {verb} the values of the previous communication point"
