@@ -4,8 +4,8 @@ The meaning of connectors, transformations and parameter bindings is that of SSP
 no direction of their own, bindings of outer systems override those of inner ones, later ones earlier ones.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from falsifier.core.model import Interface, Variable
@@ -18,7 +18,7 @@ from falsifier.fmu.description import (
     read_description,
     read_structure,
 )
-from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, parse_structure
+from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, Wire, parse_structure
 from falsifier.fmu.ssp.package import SUFFIXES, Package
 from falsifier.fmu.ssp.parameters import Given, bound_values
 from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System
@@ -37,29 +37,8 @@ _MAX_ELEMENTS = 2_000
 
 # A connector: path of its element, joined by dots (empty: the whole), and its name.
 End = tuple[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """One connection, in the direction of the signal."""
-
-    source: End
-    transformation: Transformation
-
-
-@dataclass(slots=True)
-class _Flat:
-    """What the walk through nested systems collects."""
-
-    shown: str
-    elements: set[str] = field(default_factory=set)
-    fmus: dict[str, Path] = field(default_factory=dict)
-    interfaces: dict[str, Interface | None] = field(default_factory=dict)
-    descriptions: dict[str, Description] = field(default_factory=dict)
-    connectors: dict[End, Connector] = field(default_factory=dict)
-    steps: dict[End, _Step] = field(default_factory=dict)
-    units: dict[str, Unit] = field(default_factory=dict)
-    given: dict[str, Given] = field(default_factory=dict)
+# A conversion factor * value + offset that changes nothing.
+_UNCHANGED = (1.0, 0.0)
 
 
 def read_package(path: str | Path, *, coupling: Coupling | None = None) -> System:
@@ -73,38 +52,29 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
         SpecError: in one line, naming the file and what is wrong with it.
     """
     path = Path(path)
-    flat = _Flat(str(path))
+    reader = _Reader(str(path))
     try:
-        structure = _walk_file(Package(path, str(path)), "", flat, ())
+        structure = reader.walk_file(Package(path, str(path)), "", ())
     except RecursionError:
         raise SpecError(f"{path}: its systems are nested too deeply; flatten them") from None
-    _check_times(structure, flat.shown)
-    connections: dict[str, Connection | str] = {}
-    inputs: dict[End, list[End]] = {}
-    notes: list[str] = []
-    for end in _component_inputs(flat):
-        source, factor, offset = _traced(end, flat)
-        if source == end:
-            continue
-        if not _is_component(source, flat):
-            inputs.setdefault(source, []).append(end)
-        connections[_title(end)] = Connection(_title(source), factor, offset)
-        if (factor, offset) != (1.0, 0.0):
-            notes.append(
-                f"{_title(source)} -> {_title(end)}: * {factor:.6g} {offset:+.6g}, as the package says"
-            )
-    variables = tuple(_system_input(end, fed, flat) for end, fed in inputs.items())
-    values, unknown = _values(flat, variables, set(connections))
-    notes += unknown
-    if structure.start_time:
-        notes.append(f"the package starts at {structure.start_time:g} s; simulations start at 0")
-    frame = Frame(variables, tuple(_outputs(flat)), tuple(values.items()), structure.stop_time, tuple(notes))
+    start, stop = structure.start_time or 0.0, structure.stop_time
+    if stop is not None and stop <= max(start, 0.0):
+        raise SpecError(
+            f"{path}: DefaultExperiment: the stop time {stop:g} s must be after the start time {start:g} s, "
+            "and after 0, at which simulations start; correct the package, or leave the stop time out"
+        )
+    connections = reader.connections()
+    inputs = reader.system_inputs()
+    values = reader.values(inputs, connections.keys())
+    if start:
+        reader.notes.append(f"the package starts at {start:g} s; simulations start at 0")
+    outputs, notes = tuple(reader.outputs()), tuple(reader.notes)
     try:
         return System(
-            {name: Component(fmu, None, flat.interfaces[name]) for name, fmu in flat.fmus.items()},
+            {name: Component(fmu, None, reader.interfaces[name]) for name, fmu in reader.fmus.items()},
             connections,
             coupling=coupling or Coupling(),
-            frame=frame,
+            frame=Frame(inputs, outputs, tuple(values.items()), stop, notes),
             name=structure.root.name or path.stem,
             package=path,
         )
@@ -112,112 +82,268 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
         raise SpecError(f"{path}: {error}") from None
 
 
-def _check_times(structure: Structure, shown: str) -> None:
-    """Refuse a default experiment that ends before it starts, or before 0, where simulations start."""
-    start, stop = structure.start_time or 0.0, structure.stop_time
-    if stop is not None and stop <= max(start, 0.0):
-        raise SpecError(
-            f"{shown}: DefaultExperiment: the stop time {stop:g} s must be after the start time {start:g} s, "
-            "and after 0, at which simulations start; correct the package, or leave the stop time out"
-        )
-
-
 def is_package(path: str | Path) -> bool:
     """Whether a path has the name of an SSP package or of a system description."""
     return Path(path).suffix in SUFFIXES
 
 
-def _walk_file(package: Package, at: str, flat: _Flat, above: tuple[str, ...]) -> Structure:
-    if package.key in above:
-        raise SpecError(f"{package.shown}: the system contains itself, at {at}; remove one of the references")
-    structure = parse_structure(package.structure(), f"{package.shown}: {package.description}")
-    flat.units |= structure.units
-    _walk(structure.root, at, package, flat, (*above, package.key))
-    return structure
+class _Reader:
+    """What a walk through nested systems collects, and what follows from it.
 
+    Args:
+        shown: name of the package in messages.
 
-def _walk(part: Part, at: str, package: Package, flat: _Flat, above: tuple[str, ...]) -> None:
-    own = _declare(part, at, flat)
-    inner: dict[str, dict[str, Connector]] = {}
-    for child in part.parts:
-        path = f"{at}.{child.name}" if at else child.name
-        if path in flat.elements:
-            raise SpecError(f"{flat.shown}: two elements are named {path!r}; rename one of them")
-        flat.elements.add(path)
-        if len(flat.elements) > _MAX_ELEMENTS:
-            raise SpecError(f"{flat.shown}: the system has more than {_MAX_ELEMENTS} elements; split it")
-        inner[child.name] = {c.name: c for c in child.connectors}
-        if not child.source:
-            _walk(child, path, package, flat, above)
-        elif child.type in _NESTED_TYPES:
-            _declare(child, path, flat)
-            _walk_file(package.nested(child.source), path, flat, above)
-            _bind(child, path, package, flat)
-        else:
-            _component(child, path, package, flat)
-    for wire in part.wires:
-        _wire(wire.start, wire.end, wire.transformation, at, own, inner, flat)
-    _bind(part, at, package, flat)
+    Attributes:
+        fmus: path of the FMU of each component.
+        interfaces: interface that the package states for it.
+        notes: what the user should know, one sentence each.
+    """
 
+    def __init__(self, shown: str) -> None:
+        self._shown = shown
+        self.fmus: dict[str, Path] = {}
+        self.interfaces: dict[str, Interface | None] = {}
+        self.notes: list[str] = []
+        self._elements: set[str] = set()
+        self._descriptions: dict[str, Description] = {}
+        self._connectors: dict[End, Connector] = {}
+        # Where the value of a connector comes from, in the direction of the signal.
+        self._steps: dict[End, tuple[End, Transformation]] = {}
+        self._units: dict[str, Unit] = {}
+        self._given: dict[str, Given] = {}
 
-def _declare(part: Part, at: str, flat: _Flat) -> dict[str, Connector]:
-    for connector in part.connectors:
-        if connector.kind not in _KINDS:
-            known = ", ".join(_KINDS)
+    def walk_file(self, package: Package, at: str, above: tuple[str, ...]) -> Structure:
+        """Collect the elements of a system description that stands for the element at a path."""
+        if package.key in above:
             raise SpecError(
-                f"{flat.shown}: the connector {_title((at, connector.name))} is of kind {connector.kind!r}; "
-                f"expected one of {known}"
+                f"{package.shown}: the system contains itself, at {at}; remove one of the references"
             )
-        flat.connectors[at, connector.name] = connector
-    return {c.name: c for c in part.connectors}
+        structure = parse_structure(package.structure(), f"{package.shown}: {package.description}")
+        self._units |= structure.units
+        self._walk(structure.root, at, package, (*above, package.key))
+        return structure
 
+    def connections(self) -> dict[str, Connection | str]:
+        """Return where the inputs of components get their values."""
+        found: dict[str, Connection | str] = {}
+        for end, source, (factor, offset) in self._fed_inputs():
+            found[_title(end)] = Connection(_title(source), factor, offset)
+            if (factor, offset) != _UNCHANGED:
+                shown = f"* {factor:.6g} {offset:+.6g}"
+                self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
+        return found
 
-def _component(part: Part, at: str, package: Package, flat: _Flat) -> None:
-    if part.type != _FMU_TYPE:
-        raise SpecError(f"{flat.shown}: the component {at} is of type {part.type}; only FMUs are supported")
-    if part.implementation not in _INTERFACES:
-        known = ", ".join(_INTERFACES)
-        raise SpecError(
-            f"{flat.shown}: the implementation of {at} is {part.implementation!r}; expected one of {known}"
-        )
-    flat.fmus[at] = package.file(part.source)
-    flat.interfaces[at] = _INTERFACES[part.implementation]
-    try:
-        description = flat.descriptions[at] = read_description(flat.fmus[at])
-    except ModelError as error:
-        raise SpecError(f"{flat.shown}: {part.source}: {error}") from None
-    flat.units = {**read_structure(flat.fmus[at], file_hash(flat.fmus[at])).units, **flat.units}
-    variables = {v.name: v for v in description.info.variables}
-    for connector in part.connectors:
-        _check_connector(connector, variables.get(connector.name), at, variables, flat)
-    _declare(part, at, flat)
-    _bind(part, at, package, flat)
+    def system_inputs(self) -> tuple[Variable, ...]:
+        """Return the inputs of the whole: each as its first target, with the connector's own unit."""
+        found: dict[End, Variable] = {}
+        for target, end, (factor, offset) in self._fed_inputs():
+            if end in found or self._is_component(end):
+                continue
+            first = self._descriptions[target[0]].info[target[1]]
+            limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
+            low, high = limits if factor > 0 else limits[::-1]
+            start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
+            unit = self._unit(end) or first.unit
+            found[end] = replace(
+                first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of=""
+            )
+        return tuple(found.values())
 
+    def outputs(self) -> Iterator[tuple[str, str]]:
+        """Yield the outputs of the whole that pass an output of a component unchanged, with its name."""
+        for end, connector in self._connectors.items():
+            if end[0] == "" and connector.kind == "output":
+                source, found = self._traced(end)
+                if found == _UNCHANGED and self._is_component(source):
+                    yield end[1], _title(source)
 
-def _check_connector(
-    connector: Connector, variable: Variable | None, at: str, known: dict[str, Variable], flat: _Flat
-) -> None:
-    title = _title((at, connector.name))
-    if variable is None:
-        near = did_you_mean(connector.name, known)
-        raise SpecError(f"{flat.shown}: the FMU of {at} has no variable for the connector {title}; {near}")
-    if variable.causality != connector.kind:
-        raise SpecError(
-            f"{flat.shown}: the connector {title} is of kind {connector.kind}, but the FMU's variable has "
-            f"the causality {variable.causality}; use the FMU's"
-        )
-    if connector.type and _kind(connector.type) != (
-        "integer" if variable.kind == "enumeration" else variable.kind
-    ):
-        raise SpecError(
-            f"{flat.shown}: the connector {title} is of type {connector.type}, but the FMU's variable of "
-            f"type {variable.type or variable.kind}; state the FMU's type"
-        )
-    if connector.unit and variable.unit and connector.unit != variable.unit:
-        raise SpecError(
-            f"{flat.shown}: the connector {title} is in {connector.unit}, but the FMU's variable in "
-            f"{variable.unit}; state the FMU's unit"
-        )
+    def values(self, inputs: tuple[Variable, ...], connected: Collection[str]) -> dict[str, float | str]:
+        """Return the values of variables; those that name nothing are noted."""
+        found: dict[str, float | str] = {}
+        own = {v.name: v for v in inputs}
+        for name, given in self._given.items():
+            targets = list(self._targets(name))
+            if name in own:
+                found[name] = given.number(own[name], self._shown)
+            elif not targets:
+                self.notes.append(f"the parameter {name} of the package names nothing that can be set")
+            for end in targets:
+                description = self._descriptions[end[0]]
+                if _title(end) in connected:
+                    continue
+                if refusal := description.slots[end[1]].refusal:
+                    raise self._wrong(f"the parameter {_title(end)} cannot be set: {refusal}")
+                found[_title(end)] = given.number(description.info[end[1]], self._shown)
+        return found
+
+    def _wrong(self, what: str) -> SpecError:
+        return SpecError(f"{self._shown}: {what}")
+
+    def _walk(self, part: Part, at: str, package: Package, above: tuple[str, ...]) -> None:
+        self._declare(part, at)
+        for child in part.parts:
+            path = f"{at}.{child.name}" if at else child.name
+            if path in self._elements:
+                raise self._wrong(f"two elements are named {path!r}; rename one of them")
+            self._elements.add(path)
+            if len(self._elements) > _MAX_ELEMENTS:
+                raise self._wrong(f"the system has more than {_MAX_ELEMENTS} elements; split it")
+            if not child.source:
+                self._walk(child, path, package, above)
+            elif child.type in _NESTED_TYPES:
+                self._declare(child, path)
+                self.walk_file(package.nested(child.source), path, above)
+                self._bind(child, path, package)
+            else:
+                self._component(child, path, package)
+        for wire in part.wires:
+            self._wire(wire, part, at)
+        self._bind(part, at, package)
+
+    def _declare(self, part: Part, at: str) -> None:
+        for connector in part.connectors:
+            if connector.kind not in _KINDS:
+                raise self._wrong(
+                    f"the connector {_title((at, connector.name))} is of kind {connector.kind!r}; expected "
+                    f"one of {', '.join(_KINDS)}"
+                )
+            self._connectors[at, connector.name] = connector
+
+    def _component(self, part: Part, at: str, package: Package) -> None:
+        if part.type != _FMU_TYPE:
+            raise self._wrong(f"the component {at} is of type {part.type}; only FMUs are supported")
+        if part.implementation not in _INTERFACES:
+            known = ", ".join(_INTERFACES)
+            raise self._wrong(
+                f"the implementation of {at} is {part.implementation!r}; expected one of {known}"
+            )
+        fmu = self.fmus[at] = package.file(part.source)
+        self.interfaces[at] = _INTERFACES[part.implementation]
+        try:
+            description = self._descriptions[at] = read_description(fmu)
+        except ModelError as error:
+            raise self._wrong(f"{part.source}: {error}") from None
+        self._units = {**read_structure(fmu, file_hash(fmu)).units, **self._units}
+        variables = {v.name: v for v in description.info.variables}
+        for connector in part.connectors:
+            if connector.name not in variables:
+                title, near = _title((at, connector.name)), did_you_mean(connector.name, variables)
+                raise self._wrong(f"the FMU of {at} has no variable for the connector {title}; {near}")
+            self._check_connector(connector, variables[connector.name], at)
+        self._declare(part, at)
+        self._bind(part, at, package)
+
+    def _check_connector(self, connector: Connector, variable: Variable, at: str) -> None:
+        title = f"the connector {_title((at, connector.name))}"
+        if variable.causality != connector.kind:
+            raise self._wrong(
+                f"{title} is of kind {connector.kind}, but the FMU's variable has the causality "
+                f"{variable.causality}; use the FMU's"
+            )
+        kind = "integer" if variable.kind == "enumeration" else variable.kind
+        if connector.type and _kind(connector.type) != kind:
+            raise self._wrong(
+                f"{title} is of type {connector.type}, but the FMU's variable of type "
+                f"{variable.type or variable.kind}; state the FMU's type"
+            )
+        if connector.unit and variable.unit and connector.unit != variable.unit:
+            raise self._wrong(
+                f"{title} is in {connector.unit}, but the FMU's variable in {variable.unit}; state the "
+                "FMU's unit"
+            )
+
+    def _wire(self, wire: Wire, system: Part, at: str) -> None:
+        """Note which end feeds the other; an input connector is a source inside of its own system."""
+        shown = [f"{element}.{name}" if element else name for element, name in (wire.start, wire.end)]
+        text = f"the connection {' - '.join(shown)}"
+        sources: list[End] = []
+        sinks: list[End] = []
+        for (element, name), title in zip((wire.start, wire.end), shown, strict=True):
+            path = at if element is None else f"{at}.{element}" if at else element
+            if element is not None and path not in self._elements:
+                near = did_you_mean(element, (child.name for child in system.parts))
+                raise self._wrong(f"{text} names the unknown element {element!r}; {near}")
+            connector = self._connectors.get((path, name))
+            if connector is None:
+                near = did_you_mean(name, (local for place, local in self._connectors if place == path))
+                raise self._wrong(f"{text} names the unknown connector {title!r}; {near}")
+            is_source = connector.kind in (_SINKS if element is None else _SOURCES)
+            (sources if is_source else sinks).append((path, name))
+        if len(sources) != 1:
+            both = "outputs" if sources else "inputs"
+            raise self._wrong(f"{text} joins two {both}; connect an output to an input")
+        (source,), (sink,) = sources, sinks
+        if self._connectors[source].kind == "calculatedParameter":
+            raise self._wrong(
+                f"{text} passes on a calculated parameter, which is not supported; set the parameter in a "
+                "parameter set"
+            )
+        if sink in self._steps:
+            known = _title(self._steps[sink][0])
+            raise self._wrong(
+                f"{_title(sink)} is fed by {known} and by {_title(source)}; remove one of the connections"
+            )
+        self._steps[sink] = source, wire.transformation
+
+    def _bind(self, part: Part, at: str, package: Package) -> None:
+        """Add the values of an element's bindings; called from the inside out, so that outer ones win."""
+        for name, value in bound_values(part.bindings, package, self._units).items():
+            self._given[f"{at}.{name}" if at else name] = value
+
+    def _is_component(self, end: End) -> bool:
+        return end[0] in self.fmus
+
+    def _fed_inputs(self) -> Iterator[tuple[End, End, tuple[float, float]]]:
+        """Yield the inputs of components that are connected, where each begins, and the conversion."""
+        for end, connector in self._connectors.items():
+            if connector.kind == "input" and self._is_component(end) and end in self._steps:
+                yield end, *self._traced(end)
+
+    def _traced(self, end: End) -> tuple[End, tuple[float, float]]:
+        """Follow the connections back from a connector; return where they begin, and the conversion."""
+        chain: list[tuple[End, Transformation]] = []
+        at = end
+        while at in self._steps:
+            source, transformation = self._steps[at]
+            chain.append((at, transformation))
+            at = source
+            if any(at == passed for passed, _ in chain):
+                circle = " -> ".join(_title(passed) for passed, _ in chain)
+                raise self._wrong(f"connectors feed each other in a circle: {circle}; remove one")
+        factor, offset, unit, before = 1.0, 0.0, self._unit(at), at
+        for target, transformation in reversed(chain):
+            wanted = self._unit(target)
+            if not transformation.suppress:
+                found = conversion(unit, wanted, (self._units, self._units))
+                if found is None:
+                    raise self._wrong(
+                        f"{_title(before)} is in {unit}, {_title(target)} in {wanted}; the package defines "
+                        "no conversion; define both units, or suppress the conversion"
+                    )
+                factor, offset = found[0] * factor, found[0] * offset + found[1]
+            factor = transformation.factor * factor
+            offset = transformation.factor * offset + transformation.offset
+            unit, before = wanted or unit, target
+        return at, (factor, offset)
+
+    def _unit(self, end: End) -> str:
+        connector = self._connectors[end]
+        if connector.unit or not self._is_component(end):
+            return connector.unit
+        return self._descriptions[end[0]].info[end[1]].unit
+
+    def _targets(self, name: str) -> Iterator[End]:
+        """Yield the variables that a name means: one of a component, or what a parameter connector feeds."""
+        for element in sorted(self.fmus, key=len, reverse=True):
+            local = name.removeprefix(f"{element}.")
+            if local != name and local in self._descriptions[element].slots:
+                yield element, local
+                return
+        for end in self._steps:
+            if self._is_component(end) and self._connectors[end].kind == "parameter":
+                source, found = self._traced(end)
+                if _title(source) == name and found == _UNCHANGED:
+                    yield end
 
 
 def _kind(type_name: str) -> str:
@@ -225,158 +351,6 @@ def _kind(type_name: str) -> str:
     if type_name in ("Real", "Float32", "Float64"):
         return "real"
     return type_name.lower() if type_name in ("Boolean", "String") else "integer"
-
-
-def _wire(
-    start: tuple[str | None, str],
-    end: tuple[str | None, str],
-    transformation: Transformation,
-    at: str,
-    own: dict[str, Connector],
-    inner: dict[str, dict[str, Connector]],
-    flat: _Flat,
-) -> None:
-    """Note which end of a connection feeds the other; inside its system, an input connector is a source."""
-    text = f"{_shown(start)} - {_shown(end)}"
-    sources: list[End] = []
-    sinks: list[End] = []
-    for element, name in (start, end):
-        of = own if element is None else inner.get(element)
-        if of is None or name not in of:
-            near = did_you_mean(element or name, inner) if of is None else did_you_mean(name, of)
-            what = f"element {element!r}" if of is None else f"connector {_shown((element, name))!r}"
-            raise SpecError(f"{flat.shown}: the connection {text} names the unknown {what}; {near}")
-        is_source = of[name].kind in (_SINKS if element is None else _SOURCES)
-        path = at if element is None else f"{at}.{element}" if at else element
-        (sources if is_source else sinks).append((path, name))
-    if len(sources) != 1:
-        both = "outputs" if sources else "inputs"
-        raise SpecError(
-            f"{flat.shown}: the connection {text} joins two {both}; connect an output to an input"
-        )
-    if flat.connectors[sources[0]].kind == "calculatedParameter":
-        raise SpecError(
-            f"{flat.shown}: the connection {text} passes on a calculated parameter, which is not supported; "
-            "set the parameter in a parameter set"
-        )
-    known = flat.steps.get(sinks[0])
-    if known is not None:
-        raise SpecError(
-            f"{flat.shown}: {_title(sinks[0])} is fed by {_title(known.source)} and by {_title(sources[0])}; "
-            "remove one of the connections"
-        )
-    flat.steps[sinks[0]] = _Step(sources[0], transformation)
-
-
-def _shown(end: tuple[str | None, str]) -> str:
-    return f"{end[0]}.{end[1]}" if end[0] else end[1]
-
-
-def _bind(part: Part, at: str, package: Package, flat: _Flat) -> None:
-    """Add the values of an element's bindings; it is called from the inside out, so that outer ones win."""
-    for name, value in bound_values(part.bindings, package, flat.units).items():
-        flat.given[f"{at}.{name}" if at else name] = value
-
-
-def _component_inputs(flat: _Flat) -> Iterator[End]:
-    for end, connector in flat.connectors.items():
-        if connector.kind == "input" and _is_component(end, flat):
-            yield end
-
-
-def _is_component(end: End, flat: _Flat) -> bool:
-    return end[0] in flat.fmus
-
-
-def _traced(end: End, flat: _Flat) -> tuple[End, float, float]:
-    """Follow the connections back from a connector; return where they begin, and the conversion."""
-    chain: list[tuple[End, _Step]] = []
-    at = end
-    while (step := flat.steps.get(at)) is not None:
-        chain.append((at, step))
-        at = step.source
-        if any(at == passed for passed, _ in chain):
-            circle = " -> ".join(_title(passed) for passed, _ in chain)
-            raise SpecError(f"{flat.shown}: connectors feed each other in a circle: {circle}; remove one")
-    factor, offset, unit = 1.0, 0.0, _unit(at, flat)
-    for target, step in reversed(chain):
-        wanted, transformation = _unit(target, flat), step.transformation
-        if not transformation.suppress:
-            found = conversion(unit, wanted, (flat.units, flat.units))
-            if found is None:
-                raise SpecError(
-                    f"{flat.shown}: {_title(step.source)} is in {unit}, {_title(target)} in {wanted}; the "
-                    "package defines no conversion; define both units, or suppress the conversion"
-                )
-            factor, offset = found[0] * factor, found[0] * offset + found[1]
-        factor = transformation.factor * factor
-        offset = transformation.factor * offset + transformation.offset
-        unit = wanted or unit
-    return at, factor, offset
-
-
-def _unit(end: End, flat: _Flat) -> str:
-    connector = flat.connectors[end]
-    if connector.unit or not _is_component(end, flat):
-        return connector.unit
-    return flat.descriptions[end[0]].info[end[1]].unit
-
-
-def _system_input(end: End, fed: list[End], flat: _Flat) -> Variable:
-    """Return an input of the whole: as its first target, with the connector's own unit."""
-    first = flat.descriptions[fed[0][0]].info[fed[0][1]]
-    _, factor, offset = _traced(fed[0], flat)
-    limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
-    low, high = limits if factor > 0 else limits[::-1]
-    start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
-    unit = _unit(end, flat) or first.unit
-    return replace(first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of="")
-
-
-def _outputs(flat: _Flat) -> Iterator[tuple[str, str]]:
-    """Yield the outputs of the whole that pass an output of a component unchanged, with its name."""
-    for end, connector in flat.connectors.items():
-        if end[0] == "" and connector.kind == "output":
-            source, factor, offset = _traced(end, flat)
-            if (factor, offset) == (1.0, 0.0) and _is_component(source, flat):
-                yield end[1], _title(source)
-
-
-def _values(
-    flat: _Flat, inputs: tuple[Variable, ...], connected: set[str]
-) -> tuple[dict[str, float | str], list[str]]:
-    """Return the values of variables, and notes on those that name nothing."""
-    found: dict[str, float | str] = {}
-    notes: list[str] = []
-    own = {v.name: v for v in inputs}
-    for name, given in flat.given.items():
-        targets = list(_targets(name, flat))
-        if name in own:
-            found[name] = given.number(own[name], flat.shown)
-        for element, local in targets:
-            title, description = _title((element, local)), flat.descriptions[element]
-            if title in connected:
-                continue
-            slot = description.slots[local]
-            if slot.refusal:
-                raise SpecError(f"{flat.shown}: the parameter {title} cannot be set: {slot.refusal}")
-            found[title] = given.number(description.info[local], flat.shown)
-        if not targets and name not in own:
-            notes.append(f"the parameter {name} of the package names nothing that can be set")
-    return found, notes
-
-
-def _targets(name: str, flat: _Flat) -> Iterator[End]:
-    """Yield the variables that a name means: one of a component, or what a parameter connector feeds."""
-    for element in sorted(flat.fmus, key=len, reverse=True):
-        if name.startswith(f"{element}.") and name[len(element) + 1 :] in flat.descriptions[element].slots:
-            yield element, name[len(element) + 1 :]
-            return
-    for end in flat.steps:
-        if _is_component(end, flat) and flat.connectors[end].kind == "parameter":
-            source, factor, offset = _traced(end, flat)
-            if _title(source) == name and (factor, offset) == (1.0, 0.0):
-                yield end
 
 
 def _title(end: End) -> str:
