@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import cast
 from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Interface, ModelInfo, Variable
@@ -29,7 +28,8 @@ _INTERFACE_TAGS: Mapping[str, Interface] = {
     "CoSimulation": "co-simulation",
     "ModelExchange": "model-exchange",
 }
-
+# FMI 2 and FMI 3 write it differently.
+_SAVING = ("canGetAndSetFMUstate", "canGetAndSetFMUState")
 _NO_LIBRARIES = Libraries({}, {}, {}, ())
 # Maximum number of names in one note.
 _SHOWN_NAMES = 10
@@ -150,13 +150,14 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
 
 def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Description:
     major = int(version[0])
-    identifiers, needs_tool = _interfaces(root, major)
-    for name in (root.attrib["modelName"], *identifiers.values(), root.get("generationTool", "")):
+    interfaces = _interfaces(root, major)
+    identifiers = {interface: stated["modelIdentifier"] for interface, stated in interfaces.items()}
+    needs_tool = tuple(i for i, stated in interfaces.items() if is_true(stated.get("needsExecutionTool")))
+    tool = root.get("generationTool", "")
+    for name in (root.attrib["modelName"], *identifiers.values(), tool):
         check_length(name)
     variables, slots, arrays = read_variables(root, major)
-    experiment = _child(root, "DefaultExperiment")
-    co_simulation = root.find("CoSimulation")
-    start_time, tool = finite(experiment.get("startTime")), root.get("generationTool", "")
+    experiment = {k: v for element in root.findall("DefaultExperiment") for k, v in element.attrib.items()}
     info = ModelInfo(
         name=root.attrib["modelName"],
         description=root.get("description", ""),
@@ -164,12 +165,12 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         interfaces=tuple(identifiers),
         platforms=platforms,
         tool=tool,
-        start_time=start_time,
+        start_time=finite(experiment.get("startTime")),
         stop_time=_positive(experiment.get("stopTime")),
         step_size=_positive(experiment.get("stepSize")),
         tolerance=_positive(experiment.get("tolerance")),
         variables=variables,
-        notes=_notes(root, variables, start_time=start_time, tool=tool, needs_tool=needs_tool),
+        notes=_notes(root, variables, experiment, tool=tool, needs_tool=needs_tool),
     )
     return Description(
         info=info,
@@ -179,9 +180,11 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         arrays=arrays,
         states=_number_of_states(root, major),
         indicators=int(root.get("numberOfEventIndicators", "0")),
-        event_mode=co_simulation is not None and is_true(co_simulation.get("hasEventMode")),
+        event_mode=is_true(interfaces.get("co-simulation", {}).get("hasEventMode")),
         needs_tool=needs_tool,
-        saves_state=_saving(root),
+        saves_state=tuple(
+            i for i, stated in interfaces.items() if any(is_true(stated.get(name)) for name in _SAVING)
+        ),
     )
 
 
@@ -191,35 +194,17 @@ def _number_of_states(root: Element, major: int) -> int:
     return len(root.findall("ModelStructure/Derivatives/Unknown"))
 
 
-def _interfaces(root: Element, major: int) -> tuple[dict[Interface, str], tuple[Interface, ...]]:
-    if major == 1:
-        implementation = root.find("Implementation")
-        interface: Interface = "model-exchange" if implementation is None else "co-simulation"
-        tool = implementation is not None and implementation.find("CoSimulation_Tool") is not None
-        return {interface: root.attrib["modelIdentifier"]}, (interface,) if tool else ()
-    found: dict[Interface, str] = {}
-    needs_tool: list[Interface] = []
-    for tag, interface in _INTERFACE_TAGS.items():
-        element = root.find(tag)
-        if element is not None:
-            found[interface] = element.attrib["modelIdentifier"]
-            if is_true(element.get("needsExecutionTool")):
-                needs_tool.append(interface)
-    return found, tuple(needs_tool)
-
-
-def _saving(root: Element) -> tuple[Interface, ...]:
-    attributes = ("canGetAndSetFMUstate", "canGetAndSetFMUState")
-    return tuple(
-        interface
-        for tag, interface in _INTERFACE_TAGS.items()
-        if (element := root.find(tag)) is not None and any(is_true(element.get(name)) for name in attributes)
-    )
-
-
-def _child(root: Element, tag: str) -> Mapping[str, str]:
-    element = root.find(tag)
-    return {} if element is None else cast(Mapping[str, str], element.attrib)
+def _interfaces(root: Element, major: int) -> dict[Interface, Mapping[str, str]]:
+    """Return the attributes of the interfaces that an FMU offers."""
+    if major > 1:
+        found = {interface: root.find(tag) for tag, interface in _INTERFACE_TAGS.items()}
+        return {interface: dict(e.attrib) for interface, e in found.items() if e is not None}
+    own = {"modelIdentifier": root.attrib["modelIdentifier"]}
+    implementation = root.find("Implementation")
+    if implementation is None:
+        return {"model-exchange": own}
+    needs_tool = implementation.find("CoSimulation_Tool") is not None
+    return {"co-simulation": {**own, "needsExecutionTool": str(needs_tool).lower()}}
 
 
 def _positive(text: str | None) -> float | None:
@@ -231,19 +216,20 @@ def _positive(text: str | None) -> float | None:
 def _notes(
     root: Element,
     variables: Sequence[Variable],
+    experiment: Mapping[str, str],
     *,
-    start_time: float | None,
     tool: str,
     needs_tool: Sequence[Interface],
 ) -> tuple[str, ...]:
     """Return what the user should know about an FMU, one sentence each."""
     said = []
-    if start_time:
+    if start_time := finite(experiment.get("startTime")):
         said.append(
             f"the default experiment starts at {start_time:g} s; here simulations start at 0 s and end at "
             "the stop time"
         )
-    if unusable := _not_positive(root):
+    times = {k: experiment[k] for k in ("stopTime", "stepSize", "tolerance") if k in experiment}
+    if unusable := [f"{k} = {v}" for k, v in times.items() if float(v) <= 0.0]:
         said.append(f"ignored in the default experiment, as not greater than 0: {_listed(unusable)}")
     if needs_tool:
         said.append(needed_tool_text(tool, needs_tool))
@@ -256,12 +242,6 @@ def _notes(
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
         said.append(f"two names of one input: {_listed(aliases)}; use the second")
     return tuple(said)
-
-
-def _not_positive(root: Element) -> list[str]:
-    stated = {k: v for e in root.findall("DefaultExperiment") for k, v in e.attrib.items()}
-    times = {k: stated[k] for k in ("stopTime", "stepSize", "tolerance") if k in stated}
-    return [f"{k} = {v}" for k, v in times.items() if float(v) <= 0.0]
 
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:

@@ -17,12 +17,8 @@ _MAX_DEPTH = 400
 _MAX_SIGNS = 6_000_000
 
 
-class _RefusedError(ValueError):
-    """The document has something that is not read."""
-
-
-class _BegunError(Exception):
-    """The first element begins."""
+class _SeenError(Exception):
+    """What comes before the first element has been seen."""
 
 
 def read_xml(text: bytes, shown: str, wrong: type[ModelError] | type[SpecError]) -> Element:
@@ -37,48 +33,42 @@ def read_xml(text: bytes, shown: str, wrong: type[ModelError] | type[SpecError])
     Raises:
         ModelError, SpecError: the one that was given.
     """
+    refused = f"{shown}: refused because it"
+    if text.count(b"<") > _MAX_SIGNS:
+        raise wrong(f"{refused} has more than {_MAX_SIGNS:,} tags; export a smaller model")
+    if (declared := _document_type(text)) is not None:
+        raise wrong(
+            f"{refused} declares a document type ({declared}), which can define entities; remove the "
+            "declaration"
+        )
     try:
-        _refuse_size(text)
-        _refuse_document_type(text)
         root = ElementTree.fromstring(text)
-        _refuse_depth(root)
-    except _RefusedError as error:
-        raise wrong(f"{shown}: refused because {error}") from None
     except (ElementTree.ParseError, LookupError, ValueError) as error:  # also an unknown encoding
         raise wrong(f"{shown}: not well-formed XML ({error}); export or save it again") from None
-    return root
-
-
-def _refuse_size(text: bytes) -> None:
-    if text.count(b"<") > _MAX_SIGNS:
-        raise _RefusedError(f"it has more than {_MAX_SIGNS:,} tags; export a smaller model")
-
-
-def _refuse_document_type(text: bytes) -> None:
-    """Look at what stands before the first element, before any entity is read."""
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler = _declared
-    parser.StartElementHandler = _begun
-    # In one piece: in several, a long tag or comment would be looked at from its beginning with each of them.
-    # A fault is reported when the tree is built.
-    with suppress(_BegunError, expat.ExpatError, LookupError):
-        parser.Parse(text, True)  # noqa: FBT003
-
-
-def _declared(name: str, *_: object) -> None:
-    raise _RefusedError(
-        f"it declares a document type ({name}), which can define entities; remove the declaration"
-    )
-
-
-def _begun(_name: str, _attributes: object) -> None:
-    raise _BegunError
-
-
-def _refuse_depth(root: Element) -> None:
     level = [root]
     for _ in range(_MAX_DEPTH):
         level = [child for element in level for child in element]
         if not level:
-            return
-    raise _RefusedError(f"its elements are nested more than {_MAX_DEPTH} deep; export it again")
+            return root
+    raise wrong(f"{refused} has elements nested more than {_MAX_DEPTH} deep; export it again")
+
+
+def _document_type(text: bytes) -> str | None:
+    """Return the document type that is declared before the first element; no entity is read for that."""
+    found: list[str] = []
+
+    def declared(name: str, *_: object) -> None:
+        found.append(name)
+        raise _SeenError
+
+    def begun(*_: object) -> None:
+        raise _SeenError
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = declared
+    parser.StartElementHandler = begun
+    # In one piece: in several, a long tag or comment would be looked at from its beginning with each of them.
+    # A fault is reported when the tree is built.
+    with suppress(_SeenError, expat.ExpatError, LookupError, ValueError):
+        parser.Parse(text, True)  # noqa: FBT003
+    return found[0] if found else None
