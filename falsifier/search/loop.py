@@ -152,16 +152,11 @@ class RequirementState:
         return improved
 
     def findings(self, levels: tuple[RefineLevel, ...]) -> tuple[Finding, ...]:
-        """Return what the search could not show about a requirement that it did not falsify."""
-        if self.best is None:
+        """Return what the search could not show about a requirement, if it did not falsify it."""
+        if self.best is None or self.counterexample is not None:
             return ()
         limits = inexpressible(self.problem, levels, len(self.evaluations))
         return (*self.vacuity.findings(), *([limits] if limits else []))
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What the engine says of how it worked."""
-        return self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else ()
 
 
 # A candidate that is being simulated, or will be when it is waited for, and whose engine suggested it.
@@ -326,29 +321,6 @@ class _Loop:
         # Also against the one whose engine proposed it, because a resumed run needs that verdict.
         judges = standing if asked in standing else [asked, *standing]
         judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
-        self.note(asked, evaluation, judged)
-        for state, seen in judged:
-            state.untold.append(seen)
-            self.consider(state, seen)
-
-    def tell(self, standing: Sequence[RequirementState]) -> None:
-        """Tell the engines what was simulated since they were told last."""
-        for state in standing:
-            evaluations, state.untold = state.untold, []
-            if evaluations:
-                self.think(self.steps.tell(state.engine, evaluations))
-
-    def think(self, seconds: float) -> None:
-        """Add to the time spent in engines."""
-        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
-
-    def note(
-        self,
-        asked: RequirementState,
-        evaluation: Evaluation,
-        judged: Sequence[tuple[RequirementState, Evaluation]],
-    ) -> None:
-        """Count and announce one simulation, judged against each requirement not yet falsified."""
         improved = [state.note(seen) for state, seen in judged]
         failed = all(seen.status != "ok" for _, seen in judged)
         self.last_error = evaluation.reason if failed else self.last_error
@@ -371,11 +343,24 @@ class _Loop:
             )
         )
         self.count += 1
+        for state, seen in judged:
+            state.untold.append(seen)
+            if seen.violated and state.counterexample is None:
+                self.consider(state, seen)
+
+    def tell(self, standing: Sequence[RequirementState]) -> None:
+        """Tell the engines what was simulated since they were told last."""
+        for state in standing:
+            evaluations, state.untold = state.untold, []
+            if evaluations:
+                self.think(self.steps.tell(state.engine, evaluations))
+
+    def think(self, seconds: float) -> None:
+        """Add to the time spent in engines."""
+        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
 
     def consider(self, state: RequirementState, evaluation: Evaluation) -> None:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
-        if not evaluation.violated or state.counterexample is not None:
-            return
         confirmation = self.steps.confirm(state.problem, evaluation, self.count - 1)
         spent = self.clock()
         if confirmation.outcome == "confirmed":
@@ -441,7 +426,7 @@ class _Loop:
             spent=state.spent or self.clock(),
             searched=reached(self.levels, len(state.evaluations))[-1].space,
             levels=self.levels if len(self.levels) > 1 else (),
-            findings=() if found is not None else state.findings(self.levels),
+            findings=state.findings(self.levels),
             directory=self.directory,
-            remarks=state.remarks,
+            remarks=state.engine.remarks(state.evaluations) if isinstance(state.engine, HasRemarks) else (),
         )
