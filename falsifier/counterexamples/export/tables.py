@@ -2,11 +2,10 @@
 
 import json
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import TypeVar
 from xml.etree import ElementTree
 
 import numpy as np
@@ -25,8 +24,6 @@ _MATLAB_KEYWORDS = (
     "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global",
     "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
 )  # fmt: skip
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,9 +100,13 @@ def _without_repetition(table: InputTable) -> InputTable:
 
 def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.float64]]]:
     """Return the columns of input.csv after the time: of each input its elements, shape (rows,) each."""
-    return by_declaration(
-        model, table.columns, lambda name: np.full(table.times.shape, start_of(model, name))
-    )
+    constant = np.ones(table.times.shape)
+    return {
+        declared: [
+            table.columns[e] if e in table.columns else constant * _start_of(model, e) for e in elements
+        ]
+        for declared, elements in _by_declaration(model, table.columns).items()
+    }
 
 
 def write_csv(table: InputTable, path: Path, model: Model) -> Path:
@@ -121,14 +122,13 @@ def write_csv(table: InputTable, path: Path, model: Model) -> Path:
     return path
 
 
-def write_json(start: Mapping[str, float | str], path: Path, model: Model | None = None) -> Path:
+def write_json(start: Mapping[str, float | str], path: Path, model: Model) -> Path:
     """Write the start values as one JSON object; arrays of the FMU are lists of all elements."""
-    shown: dict[str, object] = dict(start)
-    if model is not None:
-        numbers = {name: value for name, value in start.items() if not isinstance(value, str)}
-        grouped = by_declaration(model, numbers, lambda name: start_of(model, name))
-        shown = {name: values if len(values) > 1 else values[0] for name, values in grouped.items()}
-        shown |= {name: value for name, value in start.items() if isinstance(value, str)}
+    texts = {name: value for name, value in start.items() if isinstance(value, str)}
+    shown: dict[str, object] = {**texts}
+    for declared, elements in _by_declaration(model, [n for n in start if n not in texts]).items():
+        values = [start[e] if e in start else _start_of(model, e) for e in elements]
+        shown[declared] = values if len(values) > 1 else values[0]
     path.write_text(json.dumps(shown, indent=2) + "\n", encoding="utf-8")
     return path
 
@@ -191,26 +191,15 @@ def matlab_names(names: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def by_declaration(model: Model, scalars: Mapping[str, T], other: Callable[[str], T]) -> dict[str, list[T]]:
-    """Return the values of all elements of each declared variable of which a scalar is given.
-
-    Args:
-        model: the model; without an FMU, every scalar is declared as it is.
-        scalars: values by name.
-        other: returns the value of an element that is not given, by its name.
-    """
+def _by_declaration(model: Model, names: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return all elements of each variable, as the FMU declares it, of which an element is named."""
     if not isinstance(model, FmuModel):
-        return {name: [value] for name, value in scalars.items()}
-    found: dict[str, list[T]] = {}
-    for name in scalars:
-        declared, _ = model.place(name)
-        if declared not in found:
-            elements = model.elements(declared)
-            found[declared] = [scalars[e] if e in scalars else other(e) for e in elements]
-    return found
+        return {name: (name,) for name in names}
+    declared = dict.fromkeys(model.place(name)[0] for name in names)
+    return {name: model.elements(name) for name in declared}
 
 
-def start_of(model: Model, name: str) -> float:
+def _start_of(model: Model, name: str) -> float:
     """Return the model's own start value; 0 if it states none."""
     start = model.info[name].start
     return float(start) if isinstance(start, int | float) else 0.0

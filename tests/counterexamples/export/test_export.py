@@ -24,7 +24,7 @@ def by_fmpy(problem: Problem, candidate: Candidate, directory: Path, interface: 
     from fmpy.util import read_csv
 
     table = input_table(problem, candidate)
-    start = write_json(start_values(problem, candidate), directory / "start_values.json")
+    start = write_json(start_values(problem, candidate), directory / "start_values.json", problem.model)
     return fmpy.simulate_fmu(
         str(problem.model.path),  # type: ignore[attr-defined]
         validate=False,
