@@ -104,21 +104,18 @@ class _Systems:
     shown: str
 
     def system(self, node: Node, path: str = "") -> BlockSystem:
-        where = path or "the model"
         nodes = [block for block in node.children if block.kind in ("Block", "Reference")]
         names = {block.get("SID"): _in_one_line(block.get("Name")) for block in nodes if block.get("SID")}
-        known = {_in_one_line(block.get("Name")) for block in nodes}
         blocks = tuple(self._block(block, path) for block in nodes)
-        wires = []
-        for line in node.all("Line"):
-            wire = _wire(line, names)
-            for end in (wire.source, *wire.targets):
-                if end is not None and end.block not in known:
-                    raise SpecError(
-                        f"{self.shown}: a line of {where} ends at {end.block!r}, which is no block there"
-                    )
-            wires.append(wire)
-        return BlockSystem(blocks, tuple(wires))
+        wires = tuple(_wire(line, names) for line in node.all("Line"))
+        known = {block.name for block in blocks}
+        for end in (end for wire in wires for end in (wire.source, *wire.targets)):
+            if end is not None and end.block not in known:
+                where = path or "the model"
+                raise SpecError(
+                    f"{self.shown}: a line of {where} ends at {end.block!r}, which is no block there"
+                )
+        return BlockSystem(blocks, wires)
 
     def _block(self, node: Node, path: str) -> Block:
         kind = node.get("BlockType") or ("Reference" if node.kind == "Reference" else "")

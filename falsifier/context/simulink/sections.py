@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import count
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
@@ -27,8 +26,6 @@ _SETTINGS = "simulink/configset"
 _MAX_PART_BYTES = 64 << 20
 # Only these are read; a package also contains pictures, histories and caches.
 _READ = (_DIAGRAM, _DEFAULTS, _STATEFLOW, _CHARTS, _SETTINGS, "simulink/systems/")
-# Sections that only group what is within them.
-_GROUPS = ("Children",)
 _MAX_NESTING = 200
 # Far more than models have. Parts that refer twice to the next one could stand for billions of sections.
 _MAX_SECTIONS = 2_000_000
@@ -72,11 +69,36 @@ class Node:
 
 @dataclass(slots=True)
 class _Section:
+    """A section of text that is being read; a value may go on in lines of their own."""
+
     kind: str
     line: int
-    values: dict[str, list[str]] = field(default_factory=dict)  # pieces of each
+    values: dict[str, list[str]] = field(default_factory=dict)
     children: list[Node] = field(default_factory=list)
     last: str = ""
+
+    def add(self, line: str) -> bool:
+        """Add a value, or the next piece of the last one; return whether the line is either."""
+        piece = _STRING.match(line)
+        if piece is not None and self.last:
+            self.values[self.last].append(_unescaped(piece[1]))
+            return True
+        found = _VALUE.match(line)
+        if found is None:
+            return False
+        name, value = found[1], found[2].strip()
+        text = _STRING.match(value)
+        if value.startswith('"') and text is None:
+            return False
+        self.values[name] = [_unescaped(text[1]) if text else value]
+        self.last = name if text else ""
+        return True
+
+    def node(self) -> Node:
+        """Return the section as it was read."""
+        return Node(
+            self.kind, {n: "".join(pieces) for n, pieces in self.values.items()}, tuple(self.children)
+        )
 
 
 def parse_mdl(text: str, shown: str) -> Node:
@@ -86,7 +108,9 @@ def parse_mdl(text: str, shown: str) -> Node:
         SpecError: naming the file and the line that cannot be read.
     """
     stack = [_Section("file", 0)]
-    for number, line in _lines(text):
+    for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
+        if not line or line.startswith("#"):
+            continue
         if opening := _OPENING.match(line):
             if len(stack) > _MAX_DEPTH:
                 raise SpecError(f"{shown}: line {number}: sections are nested more than {_MAX_DEPTH} deep")
@@ -95,19 +119,14 @@ def parse_mdl(text: str, shown: str) -> Node:
             if len(stack) == 1:
                 raise SpecError(f"{shown}: line {number}: a section is closed that was not opened")
             closed = stack.pop()
-            stack[-1].children.append(_node(closed))
-        elif not _add(stack[-1], line):
+            stack[-1].children.append(closed.node())
+        elif not stack[-1].add(line):
             raise SpecError(f"{shown}: line {number}: expected NAME VALUE, NAME {{ or }}, got {line[:60]!r}")
     if len(stack) > 1:
         raise SpecError(
             f"{shown}: the section {stack[-1].kind} of line {stack[-1].line} is not closed; it ends too early"
         )
-    return _node(stack[0])
-
-
-def _node(closed: _Section) -> Node:
-    values = {name: "".join(pieces) for name, pieces in closed.values.items()}
-    return Node(closed.kind, values, tuple(closed.children))
+    return stack[0].node()
 
 
 def is_text_package(text: str) -> bool:
@@ -128,33 +147,6 @@ def text_parts(text: str) -> dict[str, bytes]:
         elif inside is not None:
             inside.append(line)
     return {name: "\n".join(lines).encode() for name, lines in parts.items()}
-
-
-def _lines(text: str) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(text.splitlines(), start=1):
-        stripped = line.strip()
-        if stripped and not stripped.startswith("#"):
-            yield number, stripped
-
-
-def _add(section: _Section, line: str) -> bool:
-    """Add a value, or the next piece of the last one; return whether the line is either."""
-    if line.startswith('"'):
-        piece = _STRING.match(line)
-        if piece is None or not section.last:
-            return False
-        section.values[section.last].append(_unescaped(piece[1]))
-        return True
-    found = _VALUE.match(line)
-    if found is None:
-        return False
-    name, value = found[1], found[2].strip()
-    quoted = _STRING.match(value)
-    if value.startswith('"') and quoted is None:
-        return False
-    section.values[name] = [_unescaped(quoted[1]) if quoted else value]
-    section.last = name if quoted else ""
-    return True
 
 
 def _unescaped(text: str) -> str:
@@ -196,75 +188,64 @@ def as_tree(parts: Mapping[str, bytes], shown: str) -> Node:
     Raises:
         SpecError: naming the part that is missing or cannot be read.
     """
-    lowered = {name.lower(): text for name, text in parts.items()}
-    stems = {PurePosixPath(name).stem: name for name in reversed(lowered)}
-    package = _Package(lowered, shown, stems)
-    found = [*package.root(_DIAGRAM).children]
-    found += [
-        child for name in (_DEFAULTS, _STATEFLOW) if name in package.parts for child in package.of(name)
-    ]
-    found += [child for name in package.settings for child in package.of(name)]
-    reached = {node.get("id") for top in found for node in top.walk() if node.kind == "chart"}
-    found += [c for name in package.charts for c in package.of(name) if c.get("id") not in reached]
-    return Node("file", {}, tuple(found))
+    return _Package(parts, shown).tree()
 
 
-@dataclass(frozen=True, slots=True)
 class _Package:
-    parts: Mapping[str, bytes]
-    shown: str
-    stems: Mapping[str, str]
-    sections: Iterator[int] = field(default_factory=lambda: count(1))
-    references: Iterator[int] = field(default_factory=lambda: count(1))
+    """The parts of a package, by their names in small letters."""
 
-    @property
-    def settings(self) -> list[str]:
-        return sorted(name for name in self.parts if name.startswith(_SETTINGS))
+    def __init__(self, parts: Mapping[str, bytes], shown: str) -> None:
+        self._parts = {name.lower(): text for name, text in parts.items()}
+        self._stems = {PurePosixPath(name).stem: name for name in reversed(self._parts)}
+        self._shown = shown
+        self._sections = self._references = 0
 
-    @property
-    def charts(self) -> list[str]:
-        return sorted(name for name in self.parts if name.startswith(f"{_CHARTS}chart"))
+    def tree(self) -> Node:
+        """Return the sections of the model, then those of parts that nothing refers to."""
+        found = [*self._root(_DIAGRAM).children]
+        beside = [name for name in (_DEFAULTS, _STATEFLOW) if name in self._parts]
+        for name in (*beside, *sorted(name for name in self._parts if name.startswith(_SETTINGS))):
+            root = self._root(name)
+            is_group = root.kind in ("BlockDiagramDefaults", "ModelInformation")
+            found += root.children if is_group else (root,)
+        reached = {node.get("id") for top in found for node in top.walk() if node.kind == "chart"}
+        charts = (self._root(name) for name in sorted(self._parts) if name.startswith(f"{_CHARTS}chart"))
+        return Node("file", {}, (*found, *(chart for chart in charts if chart.get("id") not in reached)))
 
-    def root(self, name: str, within: tuple[str, ...] = ()) -> Node:
+    def _root(self, name: str, within: tuple[str, ...] = ()) -> Node:
         """Return the root section of a part with all that it refers to."""
-        if name not in self.parts:
-            raise SpecError(f"{self.shown}: the part {name} is missing; save the model again")
-        element = read_xml(self.parts[name], f"{self.shown}: {name}", SpecError)
+        if name not in self._parts:
+            raise SpecError(f"{self._shown}: the part {name} is missing; save the model again")
+        element = read_xml(self._parts[name], f"{self._shown}: {name}", SpecError)
         return self._node(element, (*within, name))
 
-    def of(self, name: str) -> tuple[Node, ...]:
-        """Return the root section of a part, or what is in it if it only groups."""
-        root = self.root(name)
-        return root.children if root.kind in ("BlockDiagramDefaults", "ModelInformation") else (root,)
-
     def _node(self, element: Element, within: tuple[str, ...]) -> Node:
-        if next(self.sections) > _MAX_SECTIONS:
-            raise SpecError(f"{self.shown}: its parts have more than {_MAX_SECTIONS:,} sections together")
+        self._sections += 1
+        if self._sections > _MAX_SECTIONS:
+            raise SpecError(f"{self._shown}: its parts have more than {_MAX_SECTIONS:,} sections together")
         values = dict(element.attrib)
         children: list[Node] = []
         for child in _ungrouped(element):
             if child.tag == "P":
                 values[child.get("Name", "")] = "".join(child.itertext())
             elif "Ref" in child.attrib and not len(child):
-                children.append(self._referenced(child, within))
+                children.append(self._referenced(child.attrib["Ref"].lower(), within))
             else:
                 children.append(self._node(child, within))
         return Node(element.tag, values, tuple(children))
 
-    def _referenced(self, element: Element, within: tuple[str, ...]) -> Node:
-        """Return the root section of the part that an element stands for."""
-        stem = element.attrib["Ref"].lower()
-        name = self.stems.get(stem, f"{stem}.xml")
+    def _referenced(self, stem: str, within: tuple[str, ...]) -> Node:
+        """Return the root section of the part that a reference stands for."""
+        self._references += 1
+        name = self._stems.get(stem, f"{stem}.xml")
         if name in within or len(within) > _MAX_NESTING:
-            raise SpecError(f"{self.shown}: {within[-1]}: refers to {name}, which contains it")
-        if next(self.references) > _MAX_REFERENCES:
-            raise SpecError(f"{self.shown}: its parts refer to others more than {_MAX_REFERENCES:,} times")
-        return self.root(name, within)
+            raise SpecError(f"{self._shown}: {within[-1]}: refers to {name}, which contains it")
+        if self._references > _MAX_REFERENCES:
+            raise SpecError(f"{self._shown}: its parts refer to others more than {_MAX_REFERENCES:,} times")
+        return self._root(name, within)
 
 
 def _ungrouped(element: Element) -> Iterator[Element]:
+    """Return what is within an element; some elements only group others."""
     for child in element:
-        if child.tag in _GROUPS:
-            yield from child
-        else:
-            yield child
+        yield from child if child.tag == "Children" else (child,)
