@@ -114,13 +114,12 @@ class Briefing:
         """Return a predicted verdict in words, limited to what the variant shows of samples."""
         return predicted(self.variant, self._hidden_verdict(verdict))
 
-    def form(self, count: int, *, reasoned: bool = True, keepable: int = 0) -> ReplyForm:
+    def form(self, count: int, *, reasoned: bool = True) -> ReplyForm:
         """Return the form of replies with up to ``count`` candidates.
 
         Args:
             count: maximum number of candidates.
             reasoned: whether the LLM says why, and what it learnt; predictions need neither.
-            keepable: number of earlier candidates on which it may insist.
         """
         return ReplyForm(
             self.view.space,
@@ -130,7 +129,6 @@ class Briefing:
             count=count,
             reasoned=reasoned,
             lessons=reasoned and self._reply == "json" and self.variant.has("lessons"),
-            keepable=keepable,
         )
 
     def tool(self, what_if: WhatIf) -> PredictionTool:
@@ -163,21 +161,18 @@ class Briefing:
         # What is told of a sample takes longer than some simulations; it is made when a question needs it.
         self._untold = _thinned([*self._untold, *told])
 
-    def question(
-        self, count: int, notes: Sequence[str] = (), *, foreseen: Sequence[Hashable] = ()
-    ) -> tuple[Message, ...]:
+    def question(self, count: int, notes: Sequence[str] = ()) -> tuple[Message, ...]:
         """Return the messages of the next question.
 
         Args:
             count: maximum number of candidates.
             notes: lines to add to the question, after problem and history.
-            foreseen: keys of pending candidates of which the notes say what is known.
         """
         questions = self._caught_up()
         return questions.ask(
             count,
             simulations=self.simulations,
-            pending=[c for c in self.pending if c.key not in foreseen],
+            pending=self.pending,
             notes=notes,
             lessons=self.lessons,
         )

@@ -8,7 +8,7 @@ A later answer has several candidates. The surrogate predicts them before any is
 starts of its own search; the best predicted one is simulated if that is worth it. One that is the same
 experiment as an earlier sample is not simulated on untested predictions, and the LLM is told so. Before it
 answers, the LLM is told why the surrogate chose its samples and what it would do next, and may request
-predictions; if it does not, it is told them afterwards and may revise its candidates once, or insist on some.
+predictions.
 """
 
 import logging
@@ -32,7 +32,6 @@ from falsifier.llm.conversation import NoValidReplyError, OnExchange
 from falsifier.llm.messages import Chat
 from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
-from falsifier.stl import Verdict
 
 _LOG = logging.getLogger(__name__)
 # Answers of the LLM, the first of which knows nothing of the system, before it must have helped.
@@ -40,7 +39,7 @@ _TRIAL = 2
 # Factor of the surrogate's turns for each further answer that did not help, so that an LLM that does not help
 # has few of the simulations.
 _GROWTH = 4
-# A new best counts if it lowers the best robustness by at least this share; else a half that creeps downwards
+# An answer helps if it lowers the best robustness by at least this share; else an LLM that creeps downwards
 # would keep its turns for ever.
 _NOTABLE = 0.1
 # A candidate is the same experiment as a sample if it is within this share of each range of it at all times.
@@ -83,20 +82,18 @@ class Turns:
     """What each half has brought, and who is next.
 
     The LLM answers the first and the third time: two turns on trial. Each turn after that which does not help
-    multiplies the number of turns that the surrogate gets before the LLM is asked again, and then these must
-    have brought nothing new either. After an answer that helped, it is asked again at once.
+    multiplies the number of turns that the surrogate gets before the LLM is asked again. After an answer that
+    helped, it is asked again at once.
 
     Attributes:
         answers: number of answers of the LLM.
         useless: number of answers since the last one that helped.
         waited: number of the surrogate's simulations since the last answer.
-        dry: number of the surrogate's simulations since the last one that helped.
     """
 
     answers: int = 0
     useless: int = 0
     waited: int = 0
-    dry: int = 0
 
     def answered(self, *, helped: bool) -> None:
         """Note an answer of the LLM."""
@@ -104,21 +101,10 @@ class Turns:
         self.useless = 0 if helped else self.useless + 1
         self.waited = 0
 
-    def simulated(self, *, helped: bool) -> None:
-        """Note a simulation of the surrogate's."""
-        self.waited += 1
-        self.dry = 0 if helped else self.dry + 1
-
-    @property
-    def is_on_trial(self) -> bool:
-        """Whether the LLM need not have helped yet."""
-        return self.answers < _TRIAL
-
     @property
     def is_llm_next(self) -> bool:
         """Whether the LLM has the next turn."""
-        patience = _GROWTH ** (self.useless - 1) if self.useless else 0
-        return (self.waited if self.is_on_trial else min(self.waited, self.dry)) >= patience
+        return self.waited >= (_GROWTH ** (self.useless - 1) if self.useless else 0)
 
 
 class Hybrid:
@@ -146,12 +132,10 @@ class Hybrid:
         self._awaited: object = None
         self._own: set[object] = set()
         self._next: Candidate | None = None
-        self._insisted: set[object] = set()
         # What the LLM will be told: why the surrogate chose its samples, and what repeats a sample.
         self._reasons: list[str] = []
         self._repeats: list[str] = []
         self._unanswered: list[str] = []
-        self._unrevised: list[str] = []
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the adviser, which has the chat, to a run."""
@@ -182,15 +166,13 @@ class Hybrid:
             self._note(evaluation)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
-        """Return how many questions had no valid answer, or answers no revision, and why."""
+        """Return how many questions had no valid answer, and why."""
+        if not self._unanswered:
+            return ()
         questions = counted(self.turns.answers, "question")
-        return tuple(
-            f"{len(errors)} of {questions} {what}: {shorten(errors[-1], _LONGEST_REASON, placeholder=' ...')}"
-            for errors, what in (
-                (self._unanswered, "had no valid answer, and the surrogate continued"),
-                (self._unrevised, "had no revised answer, and the first one was used"),
-            )
-            if errors
+        why = shorten(self._unanswered[-1], _LONGEST_REASON, placeholder=" ...")
+        return (
+            f"{len(self._unanswered)} of {questions} had no valid answer, and the surrogate continued: {why}",
         )
 
     def _note(self, evaluation: Evaluation) -> None:
@@ -204,7 +186,7 @@ class Hybrid:
             self._best, self._since_best = (robustness, evaluation.candidate), 0
         if key in self._own:
             self._own.discard(key)
-            self.turns.simulated(helped=helped)
+            self.turns.waited += 1
             self._reasons.append(f"Sample {len(self._points)}: {evaluation.candidate.rationale}")
             del self._reasons[:-_MOST_REASONS]
         if key == self._awaited:
@@ -229,7 +211,7 @@ class Hybrid:
         is_first = self.turns.answers == 0
         found: list[Candidate] = []
         try:
-            found = self.adviser.propose(1).candidates if is_first else self._advised()
+            found = self.adviser.propose(1) if is_first else self._advised()
         except ChatError as error:
             # The search does not need advice to continue; the LLM is asked again much later.
             if isinstance(error, NoValidReplyError):
@@ -242,42 +224,30 @@ class Hybrid:
 
     def _advised(self) -> list[Candidate]:
         """Ask for several candidates; return them, the most promising one first."""
-        settings = self.settings
         notes = [*self._standing(), *self._repeats, *self._reasons_told()]
         self._repeats.clear()
-        advice = self.adviser.propose(settings.count, notes, what_if=self._offer(), dispensable=True)
-        candidates = advice.candidates
-        predictions = self._trusted_predictions(candidates)
-        if not advice.foresaw and predictions and min(p.robustness for p in predictions) >= 0:
-            heard = self._predictions_told(candidates, predictions)
-            try:
-                revised = self.adviser.propose(
-                    settings.count, [*notes, *heard], predicted=candidates, dispensable=True
-                )
-            except ChatError as error:  # the first answer has been paid for
-                revised = advice
-                self._unrevised.append(str(error))
-            candidates = list({c.key: c for c in (*candidates, *revised.candidates)}.values())
-            predictions = self._trusted_predictions(candidates)
-            self._insisted = {c.key for c in revised.kept}
+        calls = self.settings.what_if_calls if self._is_trusted else 0
+        candidates = self.adviser.propose(
+            self.settings.count,
+            notes,
+            what_if=WhatIf(self.surrogate, calls) if calls else None,
+            dispensable=True,
+        )
         self.surrogate.suggest(candidates)
-        if predictions:
-            order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
-            candidates = [_ranked(candidates[i], predictions[i].robustness) for i in order]
-        else:
-            candidates = sorted(candidates, key=lambda c: self._repeated(c) is not None)
-        return sorted(candidates, key=lambda c: c.key not in self._insisted)
+        predictions = self.surrogate.foresee(candidates) if self._is_trusted else []
+        if not predictions:
+            return sorted(candidates, key=lambda c: self._repeated(c) is not None)
+        order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
+        return [_ranked(candidates[i], predictions[i].robustness) for i in order]
 
     def _is_worth_simulating(self, candidate: Candidate) -> bool:
         """Whether a candidate of a later answer is simulated; of one that repeats a sample, the LLM is told.
 
         Predictions that have not been tested do not tell a right answer from a useless one.
         """
-        if candidate.key in self._insisted:
-            return True
         repeated, is_promising = self._repeated(candidate), self._is_promising(candidate)
         if repeated is None:
-            return is_promising or self.turns.is_on_trial or not self._is_trusted
+            return is_promising or self.turns.answers < _TRIAL or not self._is_trusted
         if is_promising and self._is_trusted:
             return True
         self._repeats.append(
@@ -315,15 +285,6 @@ class Hybrid:
     def _is_trusted(self) -> bool:
         """Whether recent predictions were good."""
         return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
-
-    def _offer(self) -> WhatIf | None:
-        """Return the permission to request predictions; None if they are disabled or not trusted."""
-        calls = self.settings.what_if_calls
-        return WhatIf(self.surrogate, calls) if calls and self._is_trusted else None
-
-    def _trusted_predictions(self, candidates: Sequence[Candidate]) -> list[Verdict]:
-        """Return the predicted verdicts on candidates; none if recent predictions were poor."""
-        return self.surrogate.foresee(candidates) if self._is_trusted else []
 
     def _standing(self) -> list[str]:
         """Return how the search stands, in the words that the LLM is told."""
@@ -371,20 +332,6 @@ class Hybrid:
                 "usual spread."
             )
         return lines
-
-    def _predictions_told(self, candidates: Sequence[Candidate], predictions: Sequence[Verdict]) -> list[str]:
-        """Return the predictions of the LLM's candidates, one line each, in words for the LLM."""
-        briefing = self.adviser.briefing
-        lines = [
-            f"Your candidate {i} ({briefing.describe(c)}) was not simulated; the optimiser's model of "
-            f"the samples says: {briefing.foretold(p)}."
-            for i, (c, p) in enumerate(zip(candidates, predictions, strict=True), start=1)
-        ]
-        return [
-            *lines,
-            "None is predicted to violate the requirement: revise them, or insist on some as they are by "
-            'adding their numbers to your reply, such as "keep": [1], and say why.',
-        ]
 
 
 def helps(robustness: float, best: float) -> bool:

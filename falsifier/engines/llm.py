@@ -3,7 +3,7 @@
 import logging
 from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from textwrap import shorten
 
 import numpy as np
@@ -33,21 +33,6 @@ _LONGEST_REASON = 240
 _SHARE = 0.3
 _DEVIATION = 0.25
 _LOG = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """Answer to one question of an engine that leads the search.
-
-    Attributes:
-        candidates: new ones, at most as many as requested; none if earlier ones are kept.
-        foresaw: whether the LLM requested and received predictions before it answered.
-        kept: earlier candidates on which it insists, although their predictions are poor.
-    """
-
-    candidates: list[Candidate]
-    foresaw: bool = False
-    kept: list[Candidate] = field(default_factory=list)
 
 
 class LLMEngine:
@@ -143,7 +128,7 @@ class LLMEngine:
                 self._stand_ins |= dict.fromkeys((c.key for c in found), _named(self._fallback))
                 return candidates + found
             try:
-                candidates += self.propose(wanted, dispensable=self._fallback is not None).candidates
+                candidates += self.propose(wanted, dispensable=self._fallback is not None)
                 self._without_answer = 0
             except ChatError as error:
                 candidates += self._instead(error)
@@ -155,18 +140,15 @@ class LLMEngine:
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
-        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
-    ) -> Advice:
-        """Ask one question of an engine that leads the search.
+    ) -> list[Candidate]:
+        """Ask one question of an engine that leads the search; return new candidates, at least one.
 
         Args:
             count: maximum number of candidates.
             notes: lines to add to the question, after problem and history.
             what_if: permission to request predictions before answering; ignored if the LLM does not support
                 tools.
-            predicted: earlier candidates whose predictions are among the notes, and on which the LLM may
-                insist.
             dispensable: whether the search continues without an answer. A missing answer is then recorded, so
                 that a resumed run continues in the same way.
 
@@ -174,10 +156,9 @@ class LLMEngine:
             ChatError: if the LLM cannot be reached or gives no valid reply.
         """
         briefing = self.briefing
-        earlier = [briefing.hidden(c).key for c in predicted]
-        messages = briefing.question(count, notes, foreseen=earlier)
+        messages = briefing.question(count, notes)
         tool = None if what_if is None else briefing.tool(what_if)
-        form = briefing.form(count, keepable=len(predicted))
+        form = briefing.form(count)
         request = ChatRequest(
             messages=messages,
             reply_schema=None if form.points else form.schema(),
@@ -185,14 +166,14 @@ class LLMEngine:
             sample=self._sample,
         )
 
-        def read(text: str) -> tuple[list[Candidate], list[int]]:
+        def read(text: str) -> list[Candidate]:
             answer = form.read(text, origin=self.name)
-            new, kept = self._sorted_out(answer, earlier)
+            new = self._new(answer)
             briefing.lessons = answer.lessons or briefing.lessons
-            return new[:count], kept
+            return new[:count]
 
         try:
-            found, kept = converse(
+            found = converse(
                 self._chat, request, read, self._on_exchange, respond=None if tool is None else tool.respond
             )
         except NoValidReplyError:
@@ -203,11 +184,7 @@ class LLMEngine:
             raise
         briefing.rationales |= {c.key: c.rationale for c in found}
         briefing.pending += found
-        return Advice(
-            [briefing.revealed(c) for c in found],
-            foresaw=tool is not None and tool.answered > 0,
-            kept=[predicted[n] for n in kept],
-        )
+        return [briefing.revealed(c) for c in found]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, including those of other engines' candidates."""
@@ -246,25 +223,22 @@ class LLMEngine:
         _LOG.warning("%s. Continuing with %s.", error, what or source)
         self._reasons.setdefault(source, shorten(str(error), _LONGEST_REASON, placeholder=" ..."))
 
-    def _sorted_out(self, answer: Answer, predicted: Sequence[Hashable]) -> tuple[list[Candidate], list[int]]:
-        """Return the new candidates of an answer, and the places of predicted ones that it keeps or repeats.
+    def _new(self, answer: Answer) -> list[Candidate]:
+        """Return the new candidates of an answer.
 
         Raises:
-            RejectedReplyError: if there is none of either.
+            RejectedReplyError: if there is none.
         """
         briefing = self.briefing
         candidates = [briefing.canonical(c) for c in answer.candidates]
-        kept = {n - 1 for n in answer.kept} | {
-            predicted.index(c.key) for c in candidates if c.key in predicted
-        }
         seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in briefing.numbers.items()}
         seen |= {c.key: "one that was proposed already" for c in briefing.pending}
         new = {c.key: c for c in candidates if c.key not in seen}
-        if not new and not kept:
+        if not new:
             # The published prompts number only the samples that they show.
             which = "an earlier sample" if briefing.variant.is_published else seen[candidates[0].key]
             raise RejectedReplyError(f"it repeats {which}")
-        return list(new.values()), sorted(kept)
+        return list(new.values())
 
 
 def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int, ...]) -> Candidate:

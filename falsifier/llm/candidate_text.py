@@ -28,11 +28,10 @@ _LONGEST_RATIONALE = 2000
 _MOST_CANDIDATES = 1000
 # Characters before the place where JSON breaks off that are told, and keys.
 _SHOWN_BEFORE, _SHOWN_KEYS = 24, 10
-# Keys of a candidate, of what stands beside candidates, and of the parts of a candidate.
+# Keys of a candidate, and of what stands beside it and in its parts.
 _PARTS = frozenset({"signals", "parameters", "point"})
-_BESIDE = frozenset({"lessons", "keep"})
-_KEYS = _PARTS | _BESIDE | {"candidates", "rationale"}
-_KEYS |= {"name", "values", "value", "times", "points", "interpolation"}
+_KEYS = _PARTS | frozenset(("lessons", "candidates", "rationale", "name", "values", "value", "times"))
+_KEYS |= {"points", "interpolation"}
 
 
 def _unrolled(found: Any) -> Any:
@@ -157,20 +156,9 @@ def candidates_in(text: str, *, points: bool, count: int) -> list[WrittenCandida
 
 def lessons_in(text: str) -> str:
     """What an LLM wrote down for its next question; empty if it did not."""
-    return printable(str(_beside(text).get("lessons") or "")[:_LONGEST_RATIONALE])
-
-
-def kept_in(text: str) -> list[int]:
-    """Numbers of the earlier candidates on which an LLM insists."""
-    found = _beside(text).get("keep")
-    numbers = found if isinstance(found, list) else []
-    return [int(n) for n in numbers if isinstance(n, int | float) and isfinite(n) and n == int(n)]
-
-
-def _beside(text: str) -> dict[str, Any]:
-    """What a reply says beside its candidates."""
     objects = (_plain_keys(one) for one in objects_in(text) if isinstance(one, dict))
-    return next((one for one in objects if _BESIDE & one.keys()), {})
+    lessons = next((one["lessons"] for one in objects if "lessons" in one), "")
+    return printable(str(lessons or "")[:_LONGEST_RATIONALE])
 
 
 def _objects(text: str) -> list[dict[str, Any]]:

@@ -18,7 +18,6 @@ from falsifier.llm.candidate_text import (
     WrittenCandidate,
     WrittenSignal,
     candidates_in,
-    kept_in,
     lessons_in,
     quoted,
 )
@@ -40,12 +39,10 @@ class Answer:
     Attributes:
         candidates: the valid ones, in order.
         lessons: what the LLM wrote down for its next question.
-        kept: numbers, from 1, of its earlier candidates on which it insists.
     """
 
     candidates: tuple[Candidate, ...]
     lessons: str = ""
-    kept: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +57,6 @@ class ReplyForm:
         count: number of candidates.
         reasoned: whether each candidate comes with a rationale.
         lessons: whether the LLM may write down what it is to be told again.
-        keepable: number of earlier candidates on which it may insist.
     """
 
     space: SearchSpace
@@ -70,7 +66,6 @@ class ReplyForm:
     count: int = 1
     reasoned: bool = True
     lessons: bool = False
-    keepable: int = 0
 
     @property
     def is_free(self) -> bool:
@@ -91,11 +86,9 @@ class ReplyForm:
             size = len(self.space.dimensions)
             candidate["point"] = schema_of_list({"type": "number"}, size, size)
         if self.count > 1:
-            least = 0 if self.keepable else 1
-            candidate = {"candidates": schema_of_list(schema_of_object(**candidate), least, self.count)}
+            candidate = {"candidates": schema_of_list(schema_of_object(**candidate), 1, self.count)}
         before = {"lessons": _TEXT} if self.lessons else {}
-        keep = schema_of_list({"type": "integer"}, 0, self.keepable)
-        return schema_of_object(**before, **candidate, **({"keep": keep} if self.keepable else {}))
+        return schema_of_object(**before, **candidate)
 
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}
@@ -121,22 +114,16 @@ class ReplyForm:
         """Read the valid candidates of a reply, and what it says beside them.
 
         Raises:
-            RejectedReplyError: if none is valid and none is kept; states what is wrong with each.
+            RejectedReplyError: if none is valid; states what is wrong with each.
         """
-        kept = tuple(n for n in kept_in(text) if 1 <= n <= self.keepable) if self.keepable else ()
-        try:
-            found = self.read_each(text, origin=origin)
-        except RejectedReplyError:
-            if not kept:
-                raise
-            found = []
+        found = self.read_each(text, origin=origin)
         candidates = [one for one in found if isinstance(one, Candidate)]
-        if not candidates and not kept:
+        if not candidates:
             numbered = len(found) > 1
             raise RejectedReplyError(
                 "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
             )
-        return Answer(tuple(candidates), lessons_in(text) if self.lessons else "", kept)
+        return Answer(tuple(candidates), lessons_in(text) if self.lessons else "")
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
         """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.

@@ -13,7 +13,7 @@ from falsifier.core.signals import Signal
 from falsifier.engines import make_engine
 from falsifier.engines.briefing import Briefing
 from falsifier.engines.hybrid import Hybrid, Settings, Turns, helps
-from falsifier.engines.llm import Advice, LLMEngine
+from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
@@ -52,14 +52,13 @@ class Script(LLMEngine):
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
-        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
-    ) -> Advice:
+    ) -> list[Candidate]:
         self.notes.append(tuple(notes))
         answer = self.answers[min(len(self.notes), len(self.answers)) - 1]
         if isinstance(answer, Exception):
             raise answer
-        return Advice([self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]])
+        return [self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]]
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         self.on_exchange = on_exchange
@@ -74,23 +73,22 @@ class Script(LLMEngine):
         return self.problem.space.admit(candidate)
 
 
-def turns_taken(count: int, *, llm: str = "", surrogate: str = "") -> str:
-    """Who has each turn, L or S; the strings say which turns of a half help: ``+``, otherwise ``-``."""
+def turns_taken(count: int, *, llm: str = "") -> str:
+    """Who has each turn, L or S; the string says which answers of the LLM help: ``+``, otherwise ``-``."""
     turns, course = Turns(), ""
     for _ in range(count):
-        who, outcomes = ("L", llm) if turns.is_llm_next else ("S", surrogate)
-        had = course.count(who)
-        note = turns.answered if who == "L" else turns.simulated
-        note(helped=outcomes[had : had + 1] == "+")
-        course += who
+        if turns.is_llm_next:
+            turns.answered(helped=llm[turns.answers : turns.answers + 1] == "+")
+            course += "L"
+        else:
+            turns.waited += 1
+            course += "S"
     return course
 
 
-def test_turns_follow_what_each_half_brings() -> None:
+def test_turns_follow_what_the_llm_brings() -> None:
     assert turns_taken(26) == "LSL" + 4 * "S" + "L" + 16 * "S" + "L" + "S", "ever more rarely"
     assert turns_taken(8, llm="-+++-") == "LSLLLLSL", "as long as its answers help"
-    assert turns_taken(13, surrogate="-+---+----") == "LSL" + 9 * "S" + "L"
-    assert turns_taken(3, surrogate="+++") == "LSL", "the trial does not depend on what the surrogate brings"
 
 
 def test_a_best_that_is_only_a_little_lower_does_not_count() -> None:
@@ -164,24 +162,6 @@ def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_d
     assert len(script.notes) > 2, "it was asked again"
 
 
-def test_an_answer_on_which_the_model_insists_is_simulated_although_predictions_are_poor() -> None:
-    class Insists(Script):
-        def propose(
-            self, count: int, notes: Sequence[str] = (), *, predicted: Sequence[Candidate] = (), **_: Any
-        ) -> Advice:
-            if predicted:
-                assert any('"keep": [1]' in note for note in notes)
-                return Advice([], kept=[predicted[0]])
-            return super().propose(count, notes)
-
-    problem = wide_problem()
-    script = Insists([[-1.0], [0.0], [-0.5]], problem)
-    engine = Hybrid(problem, seed=0, adviser=script, surrogate_settings=SETTINGS)
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=40)
-    assert course(asked).count("L") > 2
-    assert any(c.signals["u"].values[0] == pytest.approx(-0.5, abs=0.01) for c in asked)
-
-
 def test_after_the_trial_an_answer_is_simulated_while_predictions_are_not_trusted() -> None:
     problem = wide_problem()
     script = Script([[-1.0], [0.0], [-0.5]], problem)
@@ -218,7 +198,7 @@ def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> No
     engine, _ = hybrid(problem, [[0.1]])
 
     class Agrees(Script):
-        def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> Advice:
+        def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> list[Candidate]:
             told = engine._next
             if told is None:
                 return super().propose(count, notes)
@@ -226,7 +206,7 @@ def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> No
                 name: replace(s, values=tuple(v * (1 - rounding) for v in s.values))
                 for name, s in told.signals.items()
             }
-            return Advice([replace(told, signals=signals, origin=self.name)])
+            return [replace(told, signals=signals, origin=self.name)]
 
     engine.adviser = Agrees([[0.1]], problem)
     asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=8)
@@ -328,19 +308,18 @@ class Kind(Script):
         notes: Sequence[str] = (),
         *,
         what_if: WhatIf | None = None,
-        predicted: Sequence[Candidate] = (),
         dispensable: bool = False,
-    ) -> Advice:
+    ) -> list[Candidate]:
         self.notes.append(tuple(notes))
         knows = {"second": len(self.notes) > 1, "never": False, "steps": self.has_seen_steps}[self.kind]
         level = -0.3 + 0.2 * float(np.random.default_rng((self.seed, len(self.notes))).random())
         signal = RIGHT[id(self.problem)] if knows else Signal((0.0,), (level,), "constant")
         signals = {r.name: signal for r in self.problem.space.inputs}
-        return Advice([self.problem.space.admit(Candidate(signals, {}, self.name, self.kind))])
+        return [self.problem.space.admit(Candidate(signals, {}, self.name, self.kind))]
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Lead a search alone."""
-        return self.propose(n).candidates
+        return self.propose(n)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         self.has_seen_steps |= any(s.switches > 3 for e in evaluations for s in e.candidate.signals.values())

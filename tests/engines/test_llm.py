@@ -445,29 +445,9 @@ def test_lessons_and_the_reason_are_told_back() -> None:
     assert third.startswith(second[: chat.requests[1].messages[1].stable])
 
 
-def test_an_llm_insists_by_number_or_by_repeating_a_candidate_that_was_predicted() -> None:
-    problem = lag_problem()
-
-    def candidates(*levels: float, **more: object) -> str:
-        found = [{"rationale": "", "signals": [{"name": "u", "values": [v] * 4}]} for v in levels]
-        return json.dumps({"lessons": "", "candidates": found, **more})
-
-    for insisting, kept in (
-        (json.dumps({"lessons": "", "candidates": [], "keep": [2]}), [1]),
-        (candidates(0.1), [0]),
-        (candidates(0.5, keep=[1, 9]), [0]),
-    ):
-        chat = ScriptedChat([candidates(0.1, 0.2), insisting])
-        engine = LLMEngine(problem, chat)
-        first = engine.propose(3).candidates
-        advice = engine.propose(3, ["they are poor"], predicted=first)
-        assert [c.key for c in advice.kept] == [first[k].key for k in kept]
-        assert len(advice.candidates) == (1 if "0.5" in insisting else 0)
-        asked = chat.requests[-1]
-        assert "Proposed and not simulated" not in asked.messages[1].content
-        assert asked.reply_schema is not None and "keep" in asked.reply_schema["properties"]
-    chat = ScriptedChat([candidates(0.1, 0.2), candidates(0.1), candidates(0.3)])
-    engine = LLMEngine(problem, chat)
-    engine.propose(3)
-    engine.propose(3)
-    assert len(chat.requests) == 3, "without predictions, a repetition is rejected"
+def test_what_was_proposed_already_is_rejected() -> None:
+    chat = ScriptedChat([reply([level] * 4) for level in (0.1, 0.1, 0.3)])
+    engine = LLMEngine(lag_problem(), chat)
+    first, second = (engine.propose(3) for _ in range(2))
+    assert [c.signals["u"].values[0] for c in (*first, *second)] == [0.1, 0.3]
+    assert len(chat.requests) == 3

@@ -100,7 +100,6 @@ def test_it_calls_twice_and_then_answers() -> None:
     assert "by x <= 9" in third[0]
     assert "2 more calls can be answered" in third[0] and "1 more call can be answered" in third[1]
     assert any(re.fullmatch(r"best \[predicted robustness 7\.\d+\]", r) for r in rationales)
-    assert not any("was not simulated" in m.content for r in chat.requests for m in r.messages)
 
 
 def test_the_limit_of_calls() -> None:
@@ -133,35 +132,6 @@ def test_wrong_arguments_are_told_and_can_be_corrected() -> None:
     assert "input 'u': 7 is outside its range [-2, 2]" in told[0]
     assert "unknown input 'u9'" in told[1]
     assert [bool(e.problem) for e in exchanges if e.reply and e.reply.tool_calls][:2] == [True, True]
-    # It heard no prediction by itself, so it is told some.
-    assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
-
-
-def test_who_does_not_call_is_told_afterwards() -> None:
-    def script(request: ChatRequest) -> Line:
-        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
-
-    chat = ScriptedChat(script)
-    run(hybrid(chat))
-    at = first_offer(chat.requests)
-    assert (
-        "was not simulated; the optimiser's model of the samples says: predicted robustness"
-        in chat.requests[at + 1].messages[-1].content
-    )
-    assert not chat.requests[at + 1].tools
-
-
-def test_a_revision_that_fails_costs_the_first_answer_nothing_and_is_told() -> None:
-    def script(request: ChatRequest) -> Line:
-        if "was not simulated" in request.messages[-1].content:
-            return ChatError("quota used up")
-        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
-
-    chat = ScriptedChat(script)
-    engine = hybrid(chat)
-    run(engine)
-    (remark,) = engine.remarks([])
-    assert "had no revised answer, and the first one was used: quota used up" in remark
 
 
 def test_no_tool_where_no_call_is_allowed() -> None:
@@ -170,11 +140,10 @@ def test_no_tool_where_no_call_is_allowed() -> None:
 
     chat = ScriptedChat(script)
     run(hybrid(chat, settings=Settings(promising=-9.0, what_if_calls=0)))
-    assert not any(r.tools for r in chat.requests)
-    assert any("was not simulated" in m.content for r in chat.requests for m in r.messages)
+    assert len(chat.requests) > 2 and not any(r.tools for r in chat.requests)
 
 
-def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
+def test_a_server_that_refuses_tools_is_asked_without() -> None:
     refusal = Step(status=400, message="this model does not support tools")
     with serving() as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
@@ -191,7 +160,6 @@ def test_a_server_that_refuses_tools_gets_the_second_round() -> None:
             refused += [r for r in server.received[before:] if "tools" in r.body]
     assert len(refused) == 1, "once refused, tools are not offered again"
     later = server.received[server.received.index(refused[0]) + 1 :]
-    assert "was not simulated" in later[1].texts[-1]
     assert "response_format" in later[0].body
 
 
