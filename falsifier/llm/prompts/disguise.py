@@ -30,7 +30,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace, nearest_value
-from falsifier.core.trajectory import Trajectory, is_discrete
+from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.observations import monitor_for
@@ -119,16 +119,12 @@ class Disguise:
         names: neutral names by real name.
         derived: predicates that are told as derived signals, with what stands for the real names of these.
         scales: how everything is scaled, by real name.
-        whole: names of real signals that had few whole values in a trajectory.
-        fractional: names of real signals that had other values in a trajectory.
     """
 
     real: View
     names: Mapping[str, str]
     derived: Mapping[Predicate, str]
     scales: Mapping[str, Scale]
-    whole: frozenset[str] = frozenset()
-    fractional: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, view: View, start: Mapping[str, tuple[float, float]] | None = None) -> "Disguise":
@@ -156,7 +152,7 @@ class Disguise:
         }
         known: dict[str, list[float]] = {
             **{name: [*_compared_numbers(formula, name), *start.get(name, ())] for name in others},
-            **{name: _known_margins(p, start) for p, name in derived.items()},
+            **{name: [0.0] for name in derived.values()},
         }
         scales = {name: Scale.of(numbers, _declared(view, name)) for name, numbers in known.items()}
         for r in searched:
@@ -169,12 +165,12 @@ class Disguise:
         """The view that prompts are built from."""
         real, names, space = self.real, self.names, self.real.space
         hidden = {*self._searched, *self.derived.values()}
-        kinds = {name: self._kind(name) for name in names if name not in hidden}
+        kinds = {name: real.kind(name) for name in names if name not in hidden}
         variables = [Variable(names[name], kind=kind) for name, kind in kinds.items() if kind != "string"]
         for predicate, name in self.derived.items():
             of = dict.fromkeys(_signals(predicate))
             # Integer if all of them are discrete, so that it is told as changes, too.
-            kind: Kind = "real" if "real" in map(self._kind, of) else "integer"
+            kind: Kind = "real" if "real" in map(real.kind, of) else "integer"
             description = f"derived from {listed([names[n] for n in of])}"
             variables.append(Variable(names[name], kind=kind, description=description))
         # What is searched runs from 0 to 1, and from 0 to 0 if there is no choice.
@@ -211,19 +207,11 @@ class Disguise:
         )
 
     def fitted(self, evaluations: Sequence[Evaluation]) -> "Disguise":
-        """The disguise with the scales and levels that trajectories determine; known scales stay."""
-        found = self
+        """The disguise with the scales that trajectories determine; known scales stay."""
+        scales = dict(self.scales)
         for trajectory in (e.trajectory for e in evaluations if e.trajectory is not None):
-            columns = self._columns(trajectory)
-            whole = {n for n, column in columns.items() if is_discrete(column, kind="real")}
-            steady = {n for n, c in columns.items() if np.ptp(c) == 0 and c[0] == np.round(c[0])}
-            found = replace(
-                found,
-                scales={**found.scales, **{n: found.scales[n].fitted(c) for n, c in columns.items()}},
-                whole=found.whole | whole,
-                fractional=found.fractional | (columns.keys() - whole - steady),
-            )
-        return found
+            scales |= {n: scales[n].fitted(c) for n, c in self._columns(trajectory).items()}
+        return replace(self, scales=scales)
 
     def hidden(self, evaluation: Evaluation) -> Evaluation:
         """Return an evaluation under neutral names and scales, without the model's messages."""
@@ -342,11 +330,6 @@ class Disguise:
             return _hidden_value(self._searched[name], value)
         return self.scales[name].number(value)
 
-    def _kind(self, name: str) -> Kind:
-        """Type of a signal; integer if its values are whole, which scaled ones do not show."""
-        kind = self.real.kind(name)
-        return "integer" if kind == "real" and name in self.whole - self.fractional else kind
-
     def _columns(self, trajectory: Trajectory) -> dict[str, Array]:
         """Columns by what has a scale, derived ones included, before they are scaled."""
         columns = {n: c for n, c in trajectory.columns.items() if n in self.names}
@@ -357,16 +340,6 @@ def _declared(view: View, name: str) -> tuple[float, float] | None:
     """Smallest and largest value that the model declares; None unless it declares both."""
     low, high = view.info[name].limits if name in view.info else (None, None)
     return None if low is None or high is None else (float(low), float(high))
-
-
-def _known_margins(predicate: Predicate, start: Mapping[str, tuple[float, float]]) -> list[float]:
-    """What is known of left minus right side before a simulation, so that 0 is in the middle."""
-    names = set(_signals(predicate))
-    if not names <= start.keys() or any(low != high for low, high in (start[n] for n in names)):
-        return [0.0]
-    found = _margin(predicate, {n: np.array([start[n][0]]) for n in names})
-    size = float(np.abs(found).max())
-    return [-size, size]
 
 
 def _hidden_value(ranged: Ranged, value: float) -> float:

@@ -5,14 +5,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
-from falsifier.core.trajectory import Trajectory
 from falsifier.engines.briefing import preview
 from falsifier.engines.llm import LLMEngine
 from falsifier.evaluation.confirm import Confirmation
@@ -20,7 +17,6 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate, start_values
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.disguise import Disguise
-from falsifier.llm.prompts.observations import monitor_for
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
@@ -197,26 +193,6 @@ def test_scales_do_not_change() -> None:
     gear = Disguise.of(View.of(load_problem("AT51"))).view
     assert (gear.kind("z1"), gear.description("z1")) == ("integer", "derived from y1")
     assert disguise.view.info["z2"].description == "derived from y3 and y1"
-
-
-def test_signals_that_take_whole_values_are_told_by_their_changes() -> None:
-    problem = lag_problem("G[0,10] (x <= 4)")
-    times = problem.experiment.times
-    candidate = problem.space.decode([0.0] * 4)
-
-    def sample(x: NDArray[np.float64]) -> Evaluation:
-        trajectory = Trajectory(times, {"x": x, "u": 0 * times})
-        verdict = monitor_for(View.of(problem)).evaluate(trajectory)
-        return Evaluation(candidate, "ok", verdict, "", trajectory)
-
-    steps = sample(np.where(times < 4.05, 1.0, 2.0))
-    anonymous = preview(problem, evaluations=[steps], anonymous=True)[1].content
-    assert re.search(r"y1: 0\.\d+, then 0\.\d+ from 4\.1 s", anonymous)
-    still = sample(np.full(len(times), 3.0))
-    assert disguised(problem).fitted([steps, still]).view.kind("y1") == "integer"
-    assert disguised(problem).fitted([still]).view.kind("y1") == "real", "it may take other values yet"
-    fractional = sample(np.sin(times))
-    assert disguised(problem).fitted([steps, fractional]).view.kind("y1") == "real"
 
 
 def test_integers_become_levels() -> None:
