@@ -29,10 +29,6 @@ WANTED = {"throttle": (1.0, 2.0, 3.0), "brake": (0.0, 5.0)}
 def odd_replies() -> Iterator[tuple[str, ChatReply]]:
     """A name for the mistake, and the reply with it."""
     by_name = {"throttle": [1, 2, 3], "brake": [0, 5]}
-    yaml = (
-        "signals:\n- name: throttle\n  values: [1, 2, 3]\n- name: brake\n  values: [0, 5]\n"
-        "parameters:\n  mass: 950\n"
-    )
     texts = {
         "trailing comma": TEXT.replace("[1, 2, 3]", "[1, 2, 3,]"),
         "comment": TEXT.replace('"signals"', '// the inputs\n"signals"'),
@@ -50,7 +46,6 @@ def odd_replies() -> Iterator[tuple[str, ChatReply]]:
         "fence and prose": f"Here it is:\n```json\n{TEXT}\n```\nGood luck!",
         "thought before": f'<think>maybe {{"signals": []}}</think>{TEXT}',
         "draft before": f'{{"signals": [], "rationale": "draft"}} and finally {TEXT}',
-        "YAML": yaml,
         "signals by name": json.dumps(GOOD | {"signals": by_name}),
         "parameters by name": json.dumps(GOOD | {"parameters": {"mass": 950}}),
         "bare list of signals": json.dumps([*SIGNALS]),

@@ -1,7 +1,7 @@
 """Whether a language model can be used: a few short requests, and what was found on what runs need."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,15 +106,17 @@ def check_llm(
         return replies[-1]
 
     answer = ask(_request(_ASKED, schema=_SCHEMA))
-    features = [_on_answer(answer), *_on_effort(chat, answer, effort)]
+    features = [Feature("answer", *_on_answer(answer))]
+    if effort is not None:
+        features.append(Feature("effort", *_on_effort(chat, answer)))
     for name, request, judge in (
         ("tools", _request("How warm is it in Paris? Measure it.", tools=(_TOOL,)), _on_tools),
         ("length", _request("Count from 1 to 100 in words.", most=_CUT), _on_length),
     ):
         try:
-            features.append(judge(ask(request)))
+            features.append(Feature(name, *judge(ask(request))))
         except ChatError as error:
-            features.append(_fails(name, str(error)))
+            features.append(Feature(name, works=False, said=str(error)))
     listed = Price(0.0, 0.0) if is_model_file(llm) else listed_price(llm, api_base=api_base)
     usage = sum((reply.usage for reply in replies[1:]), replies[0].usage)
     return LLMCheck(llm, key_variable(llm), price or listed, tuple(features), usage)
@@ -127,70 +129,53 @@ def _request(
     return ChatRequest(messages=(message,), reply_schema=schema, tools=tools, max_tokens=most)
 
 
-def _on_answer(reply: ChatReply) -> Feature:
+def _on_answer(reply: ChatReply) -> tuple[bool, str]:
     mode = str(reply.parameters.get("mode", MODES[-1]))
     how = _HOW.get(mode, mode)
     if reply.finish_reason == "refusal":
-        return _fails("answer", f"refused: {_shown(reply.text)}")
+        return False, f"refused: {_shown(reply.text)}"
     if reply.finish_reason == UNREADABLE:
-        return _fails("answer", "the server could not parse what the LLM wrote")
+        return False, "the server could not parse what the LLM wrote"
     text = without_thoughts(reply.text or reply.reasoning)
     if not text.strip():
-        why = (
-            "the token limit went into reasoning; lower the effort"
-            if reply.finish_reason == "length"
-            else "null"
-        )
-        return _fails("answer", f"empty ({why})")
+        is_cut = reply.finish_reason == "length"
+        why = "the token limit went into reasoning; lower the effort" if is_cut else "null"
+        return False, f"empty ({why})"
     found = (one.get("values") for one in objects_in(text) if isinstance(one, dict))
     values = next((one for one in found if isinstance(one, list)), None)
     if values is None:
-        return _fails("answer", f"not the JSON that was asked for {how}: {_shown(text)}")
+        return False, f"not the JSON that was asked for {how}: {_shown(text)}"
     place = "" if reply.text.strip() else ", in the reasoning instead of the content"
-    if len(values) != 3:
-        return _works("answer", f"JSON asked for {how}{place}, but {len(values)} values instead of 3")
-    return _works("answer", f"JSON asked for {how}{place}")
+    count = "" if len(values) == 3 else f", but {len(values)} values instead of 3"
+    return True, f"JSON asked for {how}{place}{count}"
 
 
-def _on_effort(chat: Chat, reply: ChatReply, effort: str | None) -> Iterator[Feature]:
-    if effort is None:
-        return
-    dropped = "effort" in reply.parameters.get("dropped", ())
-    reasoned = reply.usage.reasoning_tokens
-    said = (
-        f"not taken by {chat.llm}, left out" if dropped else f"sent; {reasoned} tokens of reasoning reported"
-    )
-    yield (_fails if dropped else _works)("effort", said)
+def _on_effort(chat: Chat, reply: ChatReply) -> tuple[bool, str]:
+    if "effort" in reply.parameters.get("dropped", ()):
+        return False, f"not taken by {chat.llm}, left out"
+    return True, f"sent; {reply.usage.reasoning_tokens} tokens of reasoning reported"
 
 
-def _on_tools(reply: ChatReply) -> Feature:
+def _on_tools(reply: ChatReply) -> tuple[bool, str]:
     if not reply.parameters.get("tools"):
-        return _fails("tools", "refused by the server; the hybrid engine tells predictions afterwards")
+        return False, "refused by the server; the hybrid engine tells predictions afterwards"
     if not reply.tool_calls:
-        return _fails("tools", "offered, but not called")
+        return False, "offered, but not called"
     try:
         given = json.loads(reply.tool_calls[0].arguments)
     except ValueError:
         given = None
     if not isinstance(given, dict) or "place" not in given:
-        return _fails("tools", f"called with wrong arguments: {_shown(reply.tool_calls[0].arguments)}")
-    return _works("tools", "called with the arguments that were asked for")
+        return False, f"called with wrong arguments: {_shown(reply.tool_calls[0].arguments)}"
+    return True, "called with the arguments that were asked for"
 
 
-def _on_length(reply: ChatReply) -> Feature:
+def _on_length(reply: ChatReply) -> tuple[bool, str]:
     if reply.finish_reason == "length":
-        return _works("length", "a reply that is cut off says so")
-    return _fails("length", f"a limit of {_CUT} tokens was not kept or not told ({reply.finish_reason})")
+        return True, "a reply that is cut off says so"
+    return False, f"a limit of {_CUT} tokens was not kept or not told ({reply.finish_reason})"
 
 
 def _shown(text: str) -> str:
     text = " ".join(text.split())
     return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]} ...")
-
-
-def _works(name: str, said: str) -> Feature:
-    return Feature(name, works=True, said=said)
-
-
-def _fails(name: str, said: str) -> Feature:
-    return Feature(name, works=False, said=said)

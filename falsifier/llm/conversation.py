@@ -71,6 +71,7 @@ def converse(
         ChatError: if there was no reply.
     """
     problems: list[str] = []
+    offered = {tool.name for tool in request.tools} if respond is not None else set()
     while len(problems) <= reasks:
         try:
             reply = cleaned(chat.complete(request))
@@ -83,13 +84,16 @@ def converse(
         values: list[T] = []
         problem = None
         try:
-            if respond is not None and _calls_a_tool(request, reply):
+            # Some servers deliver the answer itself as a call of a tool that nobody offered.
+            if respond is not None and any(call.name in offered for call in reply.tool_calls):
                 following, problem = _called(request, reply, respond)
             else:
                 try:
                     values.append(read(_usable_text(reply)))
                 except RejectedReplyError as rejection:
-                    problem = _explained(reply, str(rejection))
+                    problem = str(rejection)
+                    if reply.finish_reason == "length":
+                        problem = f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
                 following = _asked_again(request, reply, problem or "")
         except Exception as error:
             # A defect, but the reply has been paid for: it is recorded first.
@@ -132,25 +136,12 @@ def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[C
         except RejectedReplyError as rejection:
             problems.append(str(rejection))
             answers.append(f"That call cannot be answered: {rejection}.")
-    following = request.model_copy(
-        update={
-            "messages": (
-                *request.messages,
-                Message(role="assistant", content=reply.text, tool_calls=reply.tool_calls, echo=reply.echo),
-                *(
-                    Message(role="tool", content=answer, tool_call_id=call.id)
-                    for call, answer in zip(reply.tool_calls, answers, strict=True)
-                ),
-            )
-        }
+    calls = Message(role="assistant", content=reply.text, tool_calls=reply.tool_calls, echo=reply.echo)
+    told = (
+        Message(role="tool", content=answer, tool_call_id=call.id)
+        for call, answer in zip(reply.tool_calls, answers, strict=True)
     )
-    return following, problems[0] if len(problems) == len(answers) else None
-
-
-def _calls_a_tool(request: ChatRequest, reply: ChatReply) -> bool:
-    """Whether a reply calls a tool that it was offered; some servers deliver the answer itself as a call."""
-    offered = {tool.name for tool in request.tools}
-    return any(call.name in offered for call in reply.tool_calls)
+    return _followed(request, calls, *told), problems[0] if len(problems) == len(answers) else None
 
 
 def _usable_text(reply: ChatReply) -> str:
@@ -171,29 +162,21 @@ def _usable_text(reply: ChatReply) -> str:
     return text
 
 
-def _explained(reply: ChatReply, problem: str) -> str:
-    if reply.finish_reason == "length":
-        return f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
-    return problem
-
-
 def _asked_again(request: ChatRequest, reply: ChatReply, problem: str) -> ChatRequest:
     quoted = reply.text.strip() or "(empty)"
     if len(quoted) > _LONGEST_QUOTE:
         quoted = f"{quoted[:_LONGEST_QUOTE]} ..."
-    return request.model_copy(
-        update={
-            "messages": (
-                *request.messages,
-                Message(role="assistant", content=quoted),
-                Message(
-                    role="user",
-                    content=f"That reply cannot be used: {problem}.\nReply again in the required form.",
-                ),
-            ),
-            "max_tokens": _more_tokens(reply) if reply.finish_reason == "length" else request.max_tokens,
-        }
+    again = f"That reply cannot be used: {problem}.\nReply again in the required form."
+    following = _followed(
+        request, Message(role="assistant", content=quoted), Message(role="user", content=again)
     )
+    if reply.finish_reason == "length":
+        following = following.model_copy(update={"max_tokens": _more_tokens(reply)})
+    return following
+
+
+def _followed(request: ChatRequest, *messages: Message) -> ChatRequest:
+    return request.model_copy(update={"messages": (*request.messages, *messages)})
 
 
 def _more_tokens(reply: ChatReply) -> int:

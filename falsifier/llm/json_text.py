@@ -1,7 +1,7 @@
 """JSON that a language model is asked for, as schemas, and JSON in what it wrote.
 
 Objects are read as they stand, else with mistakes that are unambiguous. A reply has been paid for, so a
-trailing comma, a comment, quotes of another kind or YAML do not cost another one. What could mean several
+trailing comma, a comment or quotes of another kind do not cost another one. What could mean several
 things is left to be rejected: objects that are cut off, omissions such as ``...``, and arithmetic.
 """
 
@@ -104,23 +104,16 @@ def repaired(text: str) -> Any:
     fences = [fence.end() for fence in _FENCE.finditer(text)]
     if len(fences) >= 2:
         text = text[fences[-2] : fences[-1]].rstrip("`\n ")
-    begin = min((at for at in (text.find("{"), text.find("[")) if at >= 0), default=-1)
-    end = max(text.rfind("}"), text.rfind("]"))
-    try:
-        found = _from_yaml(text)
-        if found is None and 0 <= begin < end:
-            found = _from_json(text[begin : end + 1])
-    except (ValueError, RecursionError):
-        return None
-    return found
-
-
-def _from_json(text: str) -> Any:
-    if not _is_clear(text):
+    begin = min((at for at in (text.find("{"), text.find("[")) if at >= 0), default=len(text))
+    text = text[begin : max(text.rfind("}"), text.rfind("]")) + 1]
+    if not text or not _is_clear(text):
         return None
     from json_repair import loads
 
-    return loads(text, skip_json_loads=False)
+    try:
+        return loads(text, skip_json_loads=False)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _is_clear(text: str) -> bool:
@@ -130,17 +123,3 @@ def _is_clear(text: str) -> bool:
         return False
     words = (word for inner in _INNER_LIST.findall(text) for word in re.split(r"[\s,]+", inner) if word)
     return all(_LIST_WORD.fullmatch(word) for word in words)
-
-
-def _from_yaml(text: str) -> Any:
-    """A YAML mapping without braces at its beginning; prose around it makes it unreadable."""
-    lines = text.strip("\n")
-    if not re.match(r"\w+ *:", lines) or not _is_clear(lines):
-        return None
-    import yaml
-
-    try:
-        found = yaml.safe_load(lines)
-    except yaml.YAMLError:
-        return None
-    return found if isinstance(found, dict) else None

@@ -87,21 +87,27 @@ class PredictionTool:
         if all(isinstance(one, RejectedReplyError) for one in found):
             raise RejectedReplyError(f"the arguments are wrong: {found[0]}")
         self.answered += 1
-        lines = self._lines(found[:MOST_CANDIDATES])
-        if len(found) > MOST_CANDIDATES:
-            lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted; send fewer per call")
-        left = self.what_if.calls - self.answered
-        return _answer(lines, error=self.what_if.predictor.recent_error, left=left)
-
-    def _lines(self, found: Sequence[Candidate | RejectedReplyError]) -> list[str]:
-        valid = [self.reveal(one) for one in found if isinstance(one, Candidate)]
-        verdicts = iter(self.what_if.predictor.foresee(valid) if valid else ())
-        return [
+        told, predictor = found[:MOST_CANDIDATES], self.what_if.predictor
+        valid = [self.reveal(one) for one in told if isinstance(one, Candidate)]
+        verdicts = iter(predictor.foresee(valid) if valid else ())
+        lines = [
             predicted(self.variant, self.hide(next(verdicts)))
             if isinstance(one, Candidate)
             else f"not predicted: {one}"
-            for one in found
+            for one in told
         ]
+        if len(found) > MOST_CANDIDATES:
+            lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted; send fewer per call")
+        left = self.what_if.calls - self.answered
+        more = f"{counted(left, 'more call')} can be answered" if left else "This was the last call"
+        error = 100 * predictor.recent_error
+        return "\n".join(
+            (
+                *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
+                f"Root mean square error of recent predictions: {error:.2g} % of the signals' usual spread.",
+                f"{more}; then reply with your candidates.",
+            )
+        )
 
 
 def what_if_tool(parameters: dict[str, Any], *, calls: int) -> Tool:
@@ -131,22 +137,3 @@ def predicted(variant: Variant, verdict: Verdict) -> str:
         by = f" by {verdict.predicate}" if variant.has("requirement") and verdict.predicate else ""
         parts.append(f"decided at about t = {number(verdict.critical_time, 4)} s{by}")
     return ", ".join(parts)
-
-
-def _answer(lines: Sequence[str], *, error: float, left: int) -> str:
-    """Answer one call.
-
-    Args:
-        lines: one line per candidate.
-        error: error of recent predictions as a share of the spread of the predicted signals.
-        left: number of calls that remain.
-    """
-    more = f"{counted(left, 'more call')} can be answered" if left else "This was the last call"
-    return "\n".join(
-        (
-            *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
-            f"Root mean square error of recent predictions: {100 * error:.2g} % of the signals' usual "
-            "spread.",
-            f"{more}; then reply with your candidates.",
-        )
-    )
