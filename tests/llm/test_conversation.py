@@ -24,15 +24,18 @@ def asked(*script: str | ChatReply | Exception) -> tuple[int, ScriptedChat, list
     return converse(chat, QUESTION, number, exchanges.append), chat, exchanges
 
 
-def test_first_valid_reply() -> None:
-    value, chat, exchanges = asked("7")
-    assert value == 7
-    assert len(chat.requests) == 1
-    assert exchanges[0].problem is None
-
-
-def test_a_value_that_is_false_is_still_a_value() -> None:
-    assert asked("0")[0] == 0
+@pytest.mark.parametrize(
+    "reply",
+    [
+        ChatReply(text="0"),
+        ChatReply(text="0", finish_reason="length"),
+        ChatReply(text="", reasoning="0"),
+        ChatReply(text="", tool_calls=(ToolCall(id="1", name="json", arguments="0"),)),
+    ],
+)
+def test_a_complete_answer_is_read_wherever_it_stands(reply: ChatReply) -> None:
+    value, chat, (exchange,) = asked(reply)
+    assert value == 0 and exchange.problem is None and len(chat.requests) == 1
 
 
 def test_a_rejected_reply_goes_back_with_its_problem() -> None:
@@ -63,6 +66,7 @@ def test_two_reasks_at_most() -> None:
         (ChatReply(text=" \n"), "empty"),
         (ChatReply(text="", finish_reason="length"), "cut off"),
         (ChatReply(text="sev", finish_reason="length"), "cut off"),
+        (ChatReply(text="", reasoning="7", finish_reason="length"), "cut off"),
         (ChatReply(text="no", finish_reason="refusal"), "refuses"),
         (ChatReply(text="", finish_reason="content_filter"), "content filter"),
     ],
@@ -85,19 +89,6 @@ def test_a_reply_that_was_cut_off_gets_more_room_once() -> None:
         asked(cut, cut, cut)
 
 
-def test_an_answer_only_in_the_reasoning_or_in_a_call_that_nobody_offered_is_read() -> None:
-    assert asked(ChatReply(text="", reasoning="7"))[0] == 7
-    assert asked(ChatReply(text="", tool_calls=(ToolCall(id="1", name="json", arguments="7"),)))[0] == 7
-    with pytest.raises(NoValidReplyError, match="cut off"):
-        asked(*[ChatReply(text="", reasoning="7", finish_reason="length")] * 3)
-
-
-def test_cut_off_but_complete_is_valid() -> None:
-    value, chat, _ = asked(ChatReply(text="7", finish_reason="length"))
-    assert value == 7
-    assert len(chat.requests) == 1
-
-
 def test_a_runaway_reply_is_not_quoted_in_full() -> None:
     _, chat, _ = asked("x" * 100_000, "7")
     assert len(chat.requests[1].messages[1].content) < 5000
@@ -116,12 +107,6 @@ def test_a_question_that_outgrows_the_context_when_asked_again_has_no_valid_repl
         asked("x", ContextExceededError("too long"))
     with pytest.raises(ContextExceededError):
         asked(ContextExceededError("too long"))
-
-
-def test_exchanges_go_through_json() -> None:
-    _, _, exchanges = asked("seven", "7")
-    assert [e.problem is None for e in exchanges] == [False, True]
-    assert [Exchange.model_validate_json(e.model_dump_json()) for e in exchanges] == exchanges
 
 
 class TestTools:
@@ -154,10 +139,5 @@ class TestTools:
     def test_a_rejected_answer_after_a_call_keeps_what_was_said(self) -> None:
         value, chat, _ = ask_with_tools(calling(1, 2), "", "3")
         assert value == "3"
-        assert [m.role for m in chat.requests[2].messages] == [
-            "user",
-            "assistant",
-            "tool",
-            "assistant",
-            "user",
-        ]
+        roles = [m.role for m in chat.requests[2].messages]
+        assert roles == ["user", "assistant", "tool", "assistant", "user"]

@@ -6,18 +6,12 @@ from falsifier.llm.messages import LONGEST_REPLY, ChatReply, Exchange, ToolCall,
 from tests.llm.support import PLAIN, ask_with_tools, calling
 
 
-class TestRecords:
-    """Nothing changes for those that know no tools."""
-
-    def test_without_tools_no_field_of_theirs_is_written(self) -> None:
-        exchange = Exchange(llm="m", messages=PLAIN.messages, reply=ChatReply(text="3"))
-        assert "tool" not in exchange.model_dump_json() + PLAIN.model_dump_json()
-        assert "echo" not in exchange.model_dump_json()
-
-    def test_exchanges_with_calls_come_back_whole(self) -> None:
-        _, _, exchanges = ask_with_tools(calling(1, 2), "3")
-        assert [bool(e.reply and e.reply.tool_calls) for e in exchanges] == [True, False]
-        assert [Exchange.model_validate_json(e.model_dump_json()) for e in exchanges] == exchanges
+def test_exchanges_come_back_whole_and_without_calls_no_field_of_theirs_is_written() -> None:
+    _, _, exchanges = ask_with_tools(calling(1, 2), "3")
+    assert [bool(e.reply and e.reply.tool_calls) for e in exchanges] == [True, False]
+    assert [Exchange.model_validate_json(e.model_dump_json()) for e in exchanges] == exchanges
+    plain = Exchange(llm="m", messages=PLAIN.messages, reply=ChatReply(text="3")).model_dump_json()
+    assert "tool" not in plain and "echo" not in plain
 
 
 KEY = "an-ordinary-looking-key"
@@ -30,12 +24,8 @@ def reply_with(text: str) -> ChatReply:
     )
 
 
-def test_a_given_secret_is_removed_from_every_part() -> None:
-    clean = cleaned(reply_with(f"your key is {KEY}"), [KEY])
-    assert clean == reply_with("your key is [redacted]")
-
-
-def test_a_secret_of_the_environment_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_secrets_are_removed_from_every_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert cleaned(reply_with(f"your key is {KEY}"), [KEY]) == reply_with("your key is [redacted]")
     monkeypatch.setenv("MISTRAL_API_KEY", KEY)
     assert KEY not in cleaned(reply_with(f"({KEY})")).model_dump_json()
 

@@ -60,20 +60,15 @@ def changed(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("reply", "problem"),
     [
-        ("nothing to see", "no JSON object with a candidate"),
         ('{"answer": 42}', "no JSON object with a candidate"),
         ("<point>1, 2, 3</point>", "expected 6 numbers, got 3"),
         ("<point>1, two, 3, 4, 5, 6</point>", "'two'"),
         ("<point>0 0 0 0 0 2000</point>", r"'mass': 2000 is outside its range \[900, 1100\]"),
-        ("<point>0 0 0 0 0 nan</point>", "'nan'"),
         ("<point>0 0 0 0 0 1e999</point>", "finite number"),
         (
             "<point>-1 0 101 0 0 2000</point>",
             r"'throttle' at t = 0, 10 s: -1, 101 are outside .*; parameter 'mass'",
         ),
-        (changed(signals=GOOD["signals"][:1]), "'brake' is missing"),
-        (changed(signals=[*GOOD["signals"], {"name": "clutch", "values": [1]}]), "unknown input 'clutch'"),
-        (changed(signals=[*GOOD["signals"], GOOD["signals"][0]]), "'throttle' is given twice"),
         (
             changed(signals=[{"name": "throttle", "values": [1, 2]}, GOOD["signals"][1]]),
             "expected 3 evenly spaced control points with linear interpolation, got 2",
@@ -87,10 +82,8 @@ def changed(**changes: Any) -> dict[str, Any]:
             r"input 'throttle': 101 is outside its range \[0, 100\]$",
         ),
         (changed(signals=[{"name": "throttle", "values": []}, GOOD["signals"][1]]), "has no values"),
-        (changed(signals=[{"name": "throttle", "value": 3}]), r"signals\.0\.values: Field required"),
         (changed(signals=[{"name": "throttle", "values": ["lots"]}]), "'lots' is neither a number nor a run"),
         (changed(parameters=[{"name": "mass", "value": float("nan")}]), "finite"),
-        (changed(parameters=[]), "'mass' is missing"),
         (changed(parameters=[{"name": "mass", "value": v} for v in (950, 1050)]), "'mass' is given twice"),
     ],
 )
@@ -99,38 +92,27 @@ def test_what_is_wrong_is_told(reply: Any, problem: str) -> None:
         read(reply)
 
 
-def test_rounding_beyond_a_bound_is_clipped() -> None:
-    clipped = read("<point>100.00001 0 0 0 325 1000</point>")
-    assert clipped.signals["throttle"].values[0] == 100.0
-
-
 def throttle(**signal: Any) -> dict[str, Any]:
     return changed(signals=[{"name": "throttle", **signal}, GOOD["signals"][1]])
 
 
 class TestFreeParameterization:
-    def read(self, **signal: Any) -> Signal:
-        found = read(throttle(**signal), free=True).signals["throttle"]
-        assert isinstance(found, Signal)
-        return found
-
-    def test_more_points_and_another_interpolation(self) -> None:
-        signal = self.read(interpolation="constant", times=[], values=[1, 2, 3, 4])
-        assert signal == Signal((0, 2.5, 5, 7.5), (1, 2, 3, 4), "constant", 0.05)
-
-    def test_times(self) -> None:
-        signal = self.read(interpolation="constant", times=[0, 2, 2.25], values=[0, 100, 0])
-        assert signal == Signal((0, 2, 2.25), (0, 100, 0), "constant", 0.05)
-
-    def test_pairs(self) -> None:
-        pairs = [[0, 100], [2.5, 0]]
-        expected = Signal((0, 2.5), (100, 0), "constant", 0.05)
-        assert self.read(interpolation="constant", values=pairs) == expected
-        assert self.read(interpolation="constant", points=pairs) == expected
-
-    def test_runs(self) -> None:
-        signal = self.read(interpolation="constant", values=["0 x 97", 100, "50*2"])
-        assert signal.values == (0,) * 97 + (100, 50, 50)
+    @pytest.mark.parametrize(
+        ("signal", "expected"),
+        [
+            ({"times": [], "values": [1, 2, 3, 4]}, Signal((0, 2.5, 5, 7.5), (1, 2, 3, 4), "constant", 0.05)),
+            (
+                {"times": [0, 2, 2.25], "values": [0, 100, 0]},
+                Signal((0, 2, 2.25), (0, 100, 0), "constant", 0.05),
+            ),
+            ({"values": [[0, 100], [2.5, 0]]}, Signal((0, 2.5), (100, 0), "constant", 0.05)),
+            ({"points": [[0, 100], [2.5, 0]]}, Signal((0, 2.5), (100, 0), "constant", 0.05)),
+            ({"values": ["0 x 2", 100, "50*1"]}, Signal((0, 2.5, 5, 7.5), (0, 0, 100, 50), "constant", 0.05)),
+        ],
+    )
+    def test_points_times_pairs_and_runs(self, signal: dict[str, Any], expected: Signal) -> None:
+        found = read(throttle(interpolation="constant", **signal), free=True)
+        assert found.signals["throttle"] == expected
 
     @pytest.mark.parametrize(
         ("signal", "problem"),
@@ -146,7 +128,7 @@ class TestFreeParameterization:
     )
     def test_limits(self, signal: dict[str, Any], problem: str) -> None:
         with pytest.raises(RejectedReplyError, match=problem):
-            self.read(**signal)
+            read(throttle(**signal), free=True)
 
     def test_not_where_it_was_not_offered(self) -> None:
         with pytest.raises(RejectedReplyError, match="expected 3 evenly spaced"):
@@ -177,39 +159,35 @@ def test_schema_is_in_the_strict_subset(named: bool, free: bool, count: int) -> 
     strict_subset(schema)
 
 
-def test_schema_offers_only_the_interpolations_that_are_possible() -> None:
+def test_interpolations_are_those_that_are_possible() -> None:
     free = Freedom(50, 0.1)
     smooth, gear = InputRange("u", 0.0, 1.0, free=free), InputRange("g", 1.0, 4.0, free=free, kind="integer")
 
-    def items(*inputs: InputRange) -> dict[str, Any]:
-        schema = ReplyForm(SearchSpace(inputs, (), 10.0), free=True).schema()
+    def form(*inputs: InputRange) -> ReplyForm:
+        return ReplyForm(SearchSpace(inputs, (), 10.0), free=True)
+
+    def offered(form: ReplyForm) -> list[str]:
+        schema = form.schema()
         strict_subset(schema)
-        found: dict[str, Any] = schema["properties"]["signals"]["items"]
+        found: list[str] = schema["properties"]["signals"]["items"]["properties"]["interpolation"]["enum"]
         return found
 
-    assert items(gear)["properties"]["interpolation"]["enum"] == ["constant"]
-    both = items(smooth, gear)["properties"]
-    assert both["name"]["enum"] == ["u", "g"]
-    assert len(both["interpolation"]["enum"]) == 3
-
-
-def test_an_interpolation_that_only_another_input_can_have_is_rejected() -> None:
-    free = Freedom(50, 0.1)
-    smooth, gear = InputRange("u", 0.0, 1.0, free=free), InputRange("g", 1.0, 4.0, free=free, kind="integer")
-    form = ReplyForm(SearchSpace((smooth, gear), (), 10.0), free=True)
+    assert offered(form(gear)) == ["constant"]
+    assert len(offered(form(smooth, gear))) == 3
     signals = [
         {"name": name, "interpolation": "linear", "times": [0, 5], "values": [1, last]}
         for name, last in (("u", 0), ("g", 2))
     ]
     with pytest.raises(RejectedReplyError, match=r"'g'.*constant"):
-        form.read(json.dumps({"rationale": "", "signals": signals})).candidates
+        form(smooth, gear).read(json.dumps({"rationale": "", "signals": signals}))
 
 
 def test_schema_without_inputs_or_without_parameters() -> None:
-    only_parameters = ReplyForm(SearchSpace((), SPACE.parameters, 10.0)).schema()
-    assert list(only_parameters["properties"]) == ["rationale", "parameters"]
-    only_inputs = ReplyForm(SearchSpace(SPACE.inputs, (), 10.0)).schema()
-    assert list(only_inputs["properties"]) == ["rationale", "signals"]
+    for space, part in (
+        (SearchSpace((), SPACE.parameters, 10.0), "parameters"),
+        (SearchSpace(SPACE.inputs, (), 10.0), "signals"),
+    ):
+        assert list(ReplyForm(space).schema()["properties"]) == ["rationale", part]
 
 
 def test_several_candidates() -> None:
@@ -223,10 +201,13 @@ def test_several_candidates() -> None:
 
 
 def test_one_bad_candidate_among_several_costs_nothing_but_itself() -> None:
-    bad = changed(parameters=[{"name": "mass", "value": 1}])
-    assert len(ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, GOOD]})).candidates) == 1
-    with pytest.raises(RejectedReplyError, match="'mass': 1 is outside"):
-        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [bad, bad]})).candidates
+    bad = [changed(parameters=[{"name": "mass", "value": v}]) for v in (1, 2)]
+    form = ReplyForm(SPACE, count=2)
+    assert len(form.read(json.dumps({"candidates": [bad[0], GOOD]})).candidates) == 1
+    with pytest.raises(
+        RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
+    ):
+        form.read(json.dumps({"candidates": bad}))
 
 
 def test_a_rationale_is_something_that_a_file_can_hold() -> None:
@@ -246,27 +227,26 @@ anything = st.recursive(
 )
 
 
-@settings(max_examples=100)
-@given(st.dictionaries(keys, anything, max_size=4), st.booleans())
-@example({"point": ["0\x1f"]}, False)
-def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
+def reads_or_tells(form: ReplyForm, text: str) -> None:
     try:
-        found = ReplyForm(SPACE, free=free).read(json.dumps(reply)).candidates
+        found = form.read(text).candidates
     except RejectedReplyError as rejection:
         assert str(rejection)
     else:
         assert found and all(SPACE.admit(c).key == c.key for c in found)
+
+
+@settings(max_examples=100)
+@given(st.dictionaries(keys, anything, max_size=4), st.booleans())
+@example({"point": ["0\x1f"]}, False)
+def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
+    reads_or_tells(ReplyForm(SPACE, free=free), json.dumps(reply))
 
 
 @settings(max_examples=100)
 @given(st.text(alphabet='{}[]":,0123456789.-+eEx <>/pointsignalk`\n\\', max_size=60))
 def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
-    try:
-        found = ReplyForm(SPACE).read(f"{text}<point>{text}</point>").candidates
-    except RejectedReplyError as rejection:
-        assert str(rejection)
-    else:
-        assert found and all(SPACE.admit(c).key == c.key for c in found)
+    reads_or_tells(ReplyForm(SPACE), f"{text}<point>{text}</point>")
 
 
 def test_a_value_beyond_its_range_by_a_rounding_is_clamped_and_by_more_is_told_with_the_range() -> None:
@@ -331,14 +311,6 @@ class TestPoints:
     def test_a_tool_takes_the_same_numbers(self) -> None:
         schema = ReplyForm(SPACE, named=False, points=True, reasoned=False).schema()
         assert list(schema["properties"]) == ["point"]
-
-
-def test_each_of_several_bad_candidates_is_told() -> None:
-    bad = [changed(parameters=[{"name": "mass", "value": v}]) for v in (1, 2)]
-    with pytest.raises(
-        RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
-    ):
-        ReplyForm(SPACE, count=2).read(json.dumps({"candidates": bad})).candidates
 
 
 ROWS = re.findall(

@@ -21,45 +21,31 @@ def asked(chat: ScriptedChat, gate: Gate, *, attempts: int = 7, within: float | 
     return retried(lambda: chat.complete(QUESTION), gate, attempts=attempts, seconds_left=lambda: within)
 
 
-class Naps:
-    """A clock that does not wait."""
-
-    def __init__(self) -> None:
-        self.taken: list[float] = []
-
-    def __call__(self, seconds: float) -> None:
-        self.taken.append(seconds)
-
-
 def test_waits_longer_each_time_and_counts_attempts() -> None:
-    naps = Naps()
+    naps: list[float] = []
     passing = TransientChatError("busy")
-    reply = asked(ScriptedChat([passing, passing, passing, "done"]), Gate(sleep=naps))
+    reply = asked(ScriptedChat([passing, passing, passing, "done"]), Gate(sleep=naps.append))
     assert reply.text == "done"
     assert reply.attempts == 4
-    assert [round(n) for n in naps.taken] == sorted(round(n) for n in naps.taken)
-    assert 0.75 <= naps.taken[0] <= 1.25
-    assert 3 <= naps.taken[2] <= 5
+    assert [round(n) for n in naps] == sorted(round(n) for n in naps)
+    assert 0.75 <= naps[0] <= 1.25
+    assert 3 <= naps[2] <= 5
 
 
-def test_gives_up_and_says_so() -> None:
-    chat = ScriptedChat(lambda _: TransientChatError("busy"))
-    with pytest.raises(ChatError, match="3 attempts failed, the last one so: busy") as caught:
-        asked(chat, Gate(sleep=Naps()), attempts=3)
+@pytest.mark.parametrize(
+    ("failure", "said", "asked_for"),
+    [
+        (TransientChatError("busy"), "3 attempts failed, the last one so: busy", 3),
+        (ChatError("no such model"), "no such model", 1),
+        (TransientChatError("limit", retry_after=3600.0), "3600 s", 1),
+    ],
+)
+def test_it_ends_where_waiting_does_not_help(failure: ChatError, said: str, asked_for: int) -> None:
+    chat = ScriptedChat(lambda _: failure)
+    with pytest.raises(ChatError, match=said) as caught:
+        asked(chat, Gate(sleep=lambda _: None), attempts=3)
     assert not isinstance(caught.value, TransientChatError)
-
-
-def test_does_not_repeat_what_waiting_does_not_cure() -> None:
-    inner = ScriptedChat([ChatError("no such model"), "never"])
-    with pytest.raises(ChatError, match="no such model"):
-        asked(inner, Gate(sleep=Naps()))
-    assert len(inner.requests) == 1
-
-
-def test_ends_when_the_server_asks_for_too_long_a_wait() -> None:
-    inner = ScriptedChat([TransientChatError("limit", retry_after=3600.0), "never"])
-    with pytest.raises(ChatError, match="3600 s"):
-        asked(inner, Gate(sleep=Naps()))
+    assert len(chat.requests) == asked_for
 
 
 @pytest.mark.parametrize(("for_all", "held_up"), [(True, 30.0), (False, 0.0)])
@@ -79,21 +65,6 @@ def test_a_rate_limit_holds_up_all_runs_of_a_gate(
     assert asked(ScriptedChat([limit, "a"]), gate).text == "a"
     assert others == [held_up]
     assert now == 130.0
-
-
-def test_who_comes_during_a_pause_waits_for_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 0.0
-
-    def sleep(seconds: float) -> None:
-        nonlocal now
-        now += seconds
-
-    monkeypatch.setattr("falsifier.llm.retry.time", SimpleNamespace(monotonic=lambda: now))
-    gate = Gate(sleep=sleep)
-    gate.pause(12.0)
-    gate.pause(5.0)
-    assert asked(ScriptedChat(["b"]), gate).attempts == 1
-    assert now == 12.0
 
 
 def test_concurrency_is_limited() -> None:
@@ -128,22 +99,19 @@ def test_server_restarts_while_asked() -> None:
     assert len(server.received) == 4
 
 
-def test_no_slot_within_the_limit_is_an_error() -> None:
-    gate = Gate(concurrency=1)
+def test_a_slot_and_the_end_of_a_pause_are_waited_for_only_so_long() -> None:
+    gate = Gate(concurrency=1, sleep=lambda _: None)
     with (
         gate.passage(),
         pytest.raises(ChatError, match=r"other requests .* are still waiting"),
         gate.passage(0.0),
     ):
         pass
-
-
-def test_a_pause_longer_than_the_limit_is_an_error_and_leaves_the_slot_free() -> None:
-    gate = Gate(concurrency=1, sleep=Naps())
     gate.pause(100.0)
+    gate.pause(5.0)
     with pytest.raises(ChatError, match="pause for another 100 s"), gate.passage(10.0):
         pass
-    assert gate._slots.acquire(blocking=False)
+    assert gate._slots.acquire(blocking=False), "the slot is free"
 
 
 def test_any_limit_can_be_waited_for() -> None:
@@ -165,11 +133,11 @@ def test_any_limit_can_be_waited_for() -> None:
 
 
 def test_a_wait_beyond_the_deadline_is_not_begun() -> None:
-    naps = Naps()
+    naps: list[float] = []
     chat = ScriptedChat([TransientChatError("busy", retry_after=50.0), "late"])
     with pytest.raises(ChatError, match=r"no time is left to ask again\. busy"):
-        asked(chat, Gate(sleep=naps), within=20.0)
-    assert naps.taken == []
+        asked(chat, Gate(sleep=naps.append), within=20.0)
+    assert naps == []
 
 
 def test_requests_that_timed_out_are_counted_as_paid() -> None:
