@@ -15,7 +15,7 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
 from falsifier.llm.messages import ChatRequest, Message
 from falsifier.llm.providers import first_mode
-from falsifier.llm.usage import Price, count_tokens
+from falsifier.llm.usage import Price
 from tests.llm.server import Received, Server, Step, serving
 
 SCHEMA = {
@@ -87,11 +87,6 @@ WIRES = [
         {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
         header=("authorization", "Bearer hf_secret_token"),
         absent=("max_retries",),
-    ),
-    Wire(
-        "huggingface/openai/gpt-oss-120b:cerebras",
-        {"model": "openai/gpt-oss-120b:cerebras", "reasoning_effort": "low"},
-        header=("authorization", "Bearer hf_secret_token"),
     ),
     Wire(
         "ollama_chat/gpt-oss:20b",
@@ -184,15 +179,17 @@ def test_effective_parameters_name_what_was_dropped() -> None:
 
 
 def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
-    with serving(Step("a"), Step("b"), Step("c"), Step("d")) as server:
+    uncounted = Step(usage={"prompt_tokens": 0, "completion_tokens": 0})
+    with serving(*map(Step, "abcd"), uncounted) as server:
         foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).send(REQUEST)
         hosted = LiteLLMChat("huggingface/openai/gpt-oss-20b", api_base=server.url).send(REQUEST)
         local = LiteLLMChat("ollama_chat/qwen3", api_base=server.root).send(REQUEST)
         priced = LiteLLMChat(
             "openai/gpt-5-mini", api_base=server.url, price=Price(prompt=0.25, completion=2.0)
         ).send(REQUEST)
-    assert foreign.usage.cost is None
-    assert hosted.usage.cost is None
+        estimated = LiteLLMChat("hosted_vllm/x", api_base=server.url).send(REQUEST)
+    assert [r.usage.cost for r in (foreign, hosted, estimated)] == [None] * 3
+    assert estimated.usage.estimated and estimated.usage.completion_tokens > 5
     assert local.usage.cost == 0
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
@@ -205,17 +202,6 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
     assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
     assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
     assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
-
-
-def test_missing_counts_are_estimated_and_cost_is_unknown() -> None:
-    with serving(Step("x" * 400, usage=None)) as server:
-        usage = LiteLLMChat("ollama_chat/x", api_base=server.root).send(REQUEST).usage
-        assert not usage.estimated  # Ollama always counts
-    with serving(Step("x" * 400, usage={"prompt_tokens": 0, "completion_tokens": 0})) as server:
-        usage = LiteLLMChat("hosted_vllm/x", api_base=server.url).send(REQUEST).usage
-    assert usage.estimated
-    assert usage.completion_tokens == count_tokens("x" * 400) > 40
-    assert usage.cost is None
 
 
 @pytest.mark.usefixtures("keys")
@@ -328,12 +314,6 @@ def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> No
         reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).send(REQUEST)
         (asked,) = server.received
     assert (asked.body.get("reasoning_effort") == effort) != ("effort" in reply.parameters.get("dropped", []))
-
-
-def test_a_timeout_longer_than_a_socket_can_wait() -> None:
-    with serving(Step("ok")) as server:
-        chat = LiteLLMChat("openai/some-model", api_base=server.url, timeout=1e12)
-        assert chat.send(REQUEST).text == "ok"
 
 
 KEPT = ChatRequest(

@@ -76,17 +76,10 @@ def test_numbers_of_values_are_enforced(server: str) -> None:
             assert len(one["parameters"]) == 1
 
 
-def test_a_json_object_is_enforced(server: str) -> None:
-    reply = chat(server, "json_object", seed=1).complete(PLAIN)
-    assert isinstance(json.loads(reply.text), dict)
-
-
-def test_words_come_as_they_are(server: str) -> None:
-    reply = chat(server, "prompt").complete(PLAIN)
-    assert reply.text and reply.finish_reason in ("stop", "length")
-
-
-def test_a_reply_that_is_too_long_says_so(server: str) -> None:
+def test_plainer_ways_and_replies_that_are_too_long(server: str) -> None:
+    assert isinstance(json.loads(chat(server, "json_object", seed=1).complete(PLAIN).text), dict)
+    words = chat(server, "prompt").complete(PLAIN)
+    assert words.text and words.finish_reason in ("stop", "length")
     assert chat(server, max_tokens=3).complete(PLAIN).finish_reason == "length"
 
 

@@ -23,18 +23,12 @@ def usage(response: Any, *, price: Price | None = None, reported: float | None =
     return usage_of(response, llm="", request=REQUEST, text="y" * 41, price=price, reported_cost=reported)
 
 
-def test_counts_and_cost_are_the_providers() -> None:
+def test_counts_and_cost_are_the_providers_unless_there_is_a_price_of_ones_own() -> None:
     found = usage(COUNTED, reported=0.5)
     assert (found.prompt_tokens, found.completion_tokens, found.reasoning_tokens) == (100, 20, 12)
     assert (found.cost, found.estimated) == (0.5, False)
-
-
-def test_a_price_of_ones_own_goes_before_what_is_reported() -> None:
     assert usage(COUNTED, price=PRICE, reported=0.5).cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
-
-
-def test_an_unknown_price_is_none_and_never_zero() -> None:
-    assert usage(COUNTED).cost is None
+    assert usage(COUNTED).cost is None, "an unknown price is never zero"
 
 
 @pytest.mark.parametrize(

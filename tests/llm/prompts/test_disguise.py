@@ -21,8 +21,6 @@ from falsifier.llm.prompts.standing import standing
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.stl import parse
-from falsifier.stl.formula import renamed
 from falsifier.testing import FREE, START, lag_problem
 
 WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|integer"
@@ -228,16 +226,6 @@ def test_doubts_and_start_values_are_scaled() -> None:
     sent = text_of(chat.requests)
     assert "a second simulation gave robustness +0.135. " in sent
     assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
-
-
-def test_every_form_of_formula_is_renamed() -> None:
-    formula = parse(
-        "(G[0,1] (a > 0) -> F[0,2] (abs(b) + 2*a^2 <= max(a, -b))) "
-        "and not (a < b) U[0,3] (X (b >= 1) or a == 2)"
-    )
-    swapped = renamed(formula, {"a": "first", "b": "second"})
-    assert set(swapped.signals) == {"first", "second"}
-    assert renamed(swapped, {"first": "a", "second": "b"}) == formula
 
 
 def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_back() -> None:

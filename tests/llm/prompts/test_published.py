@@ -3,9 +3,7 @@ from dataclasses import replace
 
 import pytest
 
-from falsifier.core.candidate import Candidate
-from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange
+from falsifier.core.space import ParameterRange
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.prompts import View
 from falsifier.llm.prompts.disguise import Disguise
@@ -27,13 +25,6 @@ def test_published_variants_tell_the_ten_most_recent_in_order() -> None:
     ]
     assert "13" not in changing
     assert "diverged" not in changing
-
-
-def test_free_samples_are_told_at_the_fixed_times_by_published_variants() -> None:
-    problem = lag_problem(free=Freedom(50, 0.1))
-    candidate = problem.space.admit(Candidate({"u": Signal((0.0, 5.0), (0.25, -0.75), "constant")}))
-    _, changing = told(problem, "MP4", [evaluate(problem, candidate)])
-    assert "u = [0.25, 0.25, -0.75, -0.75]" in changing
 
 
 def test_mp1_is_numbers_and_robustness() -> None:
@@ -118,18 +109,14 @@ def test_what_is_compared_is_told_of_outputs() -> None:
     _, changing = told(problem, "MP4", [evaluate(problem, problem.space.decode([0, 1, 0, 1]))])
     assert "\n  abs(x - u): 0.0 at 0.0 s, " in changing and "with abs(x - u) = " in changing
     assert "\n  x:" not in changing
+    problem, evaluation = transmission("AT51")
+    assert "\n  gear: 1.0 at 0.0 s, " in told(problem, "MP3", [evaluation])[1]
 
 
-def test_an_input_with_one_control_point_is_one_value() -> None:
-    problem = lag_problem()
-    (u,) = problem.space.inputs
-    space = replace(problem.space, inputs=(replace(u, control_points=1),))
-    standing, _ = told(replace(problem, space=space), "MP2")
-    assert "u: one value for the whole time" in standing
-
-
-def test_parameters_alone_are_told_with_the_outputs_at_the_beginning_and_the_end() -> None:
+def test_one_control_point_and_parameters_alone_have_no_times() -> None:
     problem = lag_problem(parameters=[ParameterRange("x0", -0.5, 0.5)])
+    once = replace(problem.space, inputs=tuple(replace(r, control_points=1) for r in problem.space.inputs))
+    assert "u: one value for the whole time" in told(replace(problem, space=once), "MP2")[0]
     problem = replace(problem, space=replace(problem.space, inputs=()))
     evaluation = evaluate(problem, problem.space.decode([0.25]))
     standing, changing = told(problem, "MP3", [evaluation])
@@ -145,11 +132,6 @@ def test_a_critical_time_has_the_decimals_of_the_times_in_the_formula(formula: s
     other = replace(problem, requirement=Requirement("R", parse(formula)))
     decided = replace(evaluation, verdict=replace(evaluation.verdict, critical_time=0.456))
     assert f"decided at t = {time} s with x = " in told(other, "MP4", [decided])[1]
-
-
-def test_outputs_that_are_compared_alone_are_told_by_themselves() -> None:
-    problem, evaluation = transmission("AT51")
-    assert "\n  gear: 1.0 at 0.0 s, " in told(problem, "MP3", [evaluation])[1]
 
 
 def test_scaled_signals_get_more_digits() -> None:

@@ -10,12 +10,10 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, Questions, View
-from falsifier.llm.prompts.observations import monitor_for
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem
@@ -43,12 +41,8 @@ def test_an_empty_history_is_not_described(variant: str) -> None:
     _, changing = told(transmission()[0], variant)
     assert changing.endswith("Propose the first sample.") and "amples so far" not in changing
     assert ("good first samples" in changing) == (variant in ("MP5", "MP6"))
-
-
-def test_advice_on_first_samples_leaves_after_the_first() -> None:
-    problem, evaluation = transmission()
-    texts = "\n".join(told(problem, "MP5", [evaluation]))
-    assert "first samples" not in texts and "earlier samples" in texts
+    texts = "\n".join(told(transmission()[0], variant, transmission()[1:]))
+    assert "first samples" not in texts and ("earlier samples" in texts) == (variant in ("MP5", "MP6"))
 
 
 def test_a_question_begins_with_the_one_before_it() -> None:
@@ -135,24 +129,18 @@ def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
     assert "flat" not in other and "Lowest robustness so far: sample 2 and sample 1." in other
 
 
-def test_failed_samples_with_their_reason() -> None:
+def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
     failed = Evaluation(PROBLEM.space.decode([1] * 5), "crashed", reason="division by zero")
     assert "no verdict, the simulation crashed: division by zero" in told(PROBLEM, "MP5", [failed])[1]
     assert "crashed" not in told(PROBLEM, "MP4", [failed])[1]
-
-
-def test_the_rationale_and_the_lessons_are_told_back() -> None:
     questions = Questions(View.of(PROBLEM), VARIANTS["MP5"])
-    questions.tell(*sampled(PROBLEM, [0.5] * 5), why="a step\nup " + "and on " * 100)
+    first, alike = sampled(PROBLEM, [0.5] * 5, [0.5 + 1e-6, 0.5, 0.5, 0.5, 0.5])
+    questions.tell(first, why="a step\nup " + "and on " * 100)
+    questions.tell(alike)
     text = questions.ask(lessons="x follows u")[1].content
     assert "chosen because: a step up and on" in text and text.count("and on") < 50
     assert "Your lessons so far: x follows u" in text
-
-
-def test_inputs_that_look_alike_are_said_to_be_rounded() -> None:
-    points = ([0.5] * 5, [0.5 + 1e-6, 0.5, 0.5, 0.5, 0.5])
-    _, changing = told(PROBLEM, "MP5", sampled(PROBLEM, *points))
-    assert changing.count("these inputs are rounded: they differ from those of sample 1") == 1
+    assert text.count("these inputs are rounded: they differ from those of sample 1") == 1
 
 
 def test_runs_are_explained_where_there_is_one() -> None:
@@ -161,17 +149,6 @@ def test_runs_are_explained_where_there_is_one() -> None:
     with_runs = told(PROBLEM, "MP5", [evaluate(PROBLEM, PROBLEM.space.admit(long))])
     assert '["0 x 99", 1]' in with_runs[1] and "stands for 187 zeros" in with_runs[1]
     assert "stands for" not in "".join(told(PROBLEM, "MP5", sampled(PROBLEM, [0.5] * 5)))
-
-
-def test_oscillations_are_told_by_their_envelopes() -> None:
-    problem = lag_problem()
-    times = problem.experiment.times
-    candidate = problem.space.decode([0, 0, 0, 0])
-    x = 0.5 * np.sin(2 * np.pi * times / 0.8)
-    trajectory = Trajectory(times, {"x": x, "u": 0 * times})
-    verdict = monitor_for(View.of(problem)).evaluate(trajectory)
-    _, changing = told(problem, "MP5", [Evaluation(candidate, "ok", verdict, "", trajectory)])
-    assert "oscillates from 0.2 to 9.8 s with period 0.8 s, between" in changing
 
 
 def test_several_candidates_pending_ones_and_the_budget() -> None:

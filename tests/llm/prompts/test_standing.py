@@ -29,14 +29,10 @@ def test_variants_only_add_parts_up_to_mp4() -> None:
     assert all(a < b for a, b in pairwise(parts))
     assert variant_named("mp3").name == "MP3"
     assert variant_named(None).name == DEFAULT_VARIANT
+    assert variant_named(None, has_context=True).name == "MP6"
+    assert VARIANTS["MP6"].parts - VARIANTS["MP5"].parts == {"context"}
     with pytest.raises(SpecError, match="did you mean 'MP5'"):
         variant_named("MP55")
-
-
-def test_context_makes_mp6_the_default() -> None:
-    assert variant_named(None, has_context=True).name == "MP6"
-    assert variant_named("mp4", has_context=True).name == "MP4"
-    assert VARIANTS["MP6"].parts - VARIANTS["MP5"].parts == {"context"}
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -64,11 +60,6 @@ def test_mp5_tells_what_the_model_description_knows(part: str) -> None:
     problem = transmission()[0]
     assert part in standing(problem)
     assert part not in standing(problem, "MP4")
-
-
-def test_no_freedom_is_offered_where_control_points_are_fixed() -> None:
-    text = standing(lag_problem())
-    assert "Alternatively, choose" not in text and '"times"' not in text
 
 
 @pytest.mark.parametrize(
@@ -234,6 +225,7 @@ def test_only_mp6_tells_context() -> None:
 
 
 def test_freedom_is_told_as_far_as_it_goes_and_once() -> None:
+    assert "Alternatively, choose" not in standing(lag_problem()) and '"times"' not in standing(lag_problem())
     assert "at most 7, at least 0.5 s apart" in standing(lag_problem(free=Freedom(7, 0.5)))
     problem = lag_problem(inputs=2, free=Freedom(7, 0.5))
     assert standing(problem).count("control points of u and v yourself: at most 7") == 1
