@@ -7,12 +7,12 @@ from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType
 
-from falsifier.context.crossings import crossings_of
 from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text, source_of
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
-from falsifier.context.values import SIMULINK, Compared, Context, Excerpt
+from falsifier.context.thresholds import Threshold
+from falsifier.context.values import SIMULINK, Compared, Context, Crossing, Excerpt
 from falsifier.core.words import counted
 from falsifier.errors import SpecError
 
@@ -21,6 +21,7 @@ MAX_CHARACTERS = 12_000
 MAX_TOTAL = 20_000
 _MAX_BYTES = 32 << 20
 _MAX_COMPARISONS, _MAX_COMPARED = 60, 6_000  # number, and characters of all
+_MAX_CROSSINGS = 24  # of a signal
 _LEAVE_OUT = "remove it, or leave the file out"
 
 
@@ -100,8 +101,8 @@ def gather(
     contents = [(file, readable_of(file)) for file in found]
     # Of the files inside an FMU, those with one form say nothing about the signals.
     contents = [(file, readable) for file, readable in contents if file.is_named or len(readable.forms) > 1]
-    limits = [threshold for _, readable in contents for threshold in readable.found]
-    crossings = crossings_of(limits, ranges)
+    found_in = [threshold for _, readable in contents for threshold in readable.found]
+    crossings = tuple(each for name, ends in ranges.items() for each in _crossings(found_in, name, *ends))
     if sentry is None:
         return Context(crossings=crossings)
     told = _compared(contents, signals)
@@ -176,6 +177,19 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
         i = chosen[longest][0] + 1
         chosen[longest] = (i, forms[longest][i].text())
     return chosen
+
+
+def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -> list[Crossing]:
+    """Return the levels of a signal within its range; names in files may be those within a component."""
+    names = {name, name.rpartition(".")[2].strip("'")}
+    levels = {
+        level
+        for threshold in found
+        if threshold.names and {each.strip("'") for each in threshold.names} <= names
+        for level in threshold.levels
+        if low <= level <= high
+    }
+    return [Crossing(name, level) for level in sorted(levels)[:_MAX_CROSSINGS]]
 
 
 def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:

@@ -1,7 +1,7 @@
 """Which constants are compared with which signals, in conditions of any of the languages that are read."""
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from math import isinf
@@ -57,18 +57,14 @@ class Threshold:
     Attributes:
         names: variables in it that are not constants.
         text: the comparison as written, with the values of named constants: ``u > limit (limit = 9.5)``.
-        left: what stands before the sign, as written.
-        right: what stands behind it.
-        constants: values of the named constants in it, as written; ``5 or 9`` if there are two. Also what
-            variables of a function or chart stand for, and empty texts for those that nothing outside knows.
+        levels: if one variable is compared with nothing but a number or constant, that number: two numbers
+            of a constant that has two values. Of a table, its breakpoints.
         place: file and line, or block.
     """
 
     names: frozenset[str]
     text: str
-    left: str
-    right: str
-    constants: Mapping[str, str]
+    levels: tuple[float, ...]
     place: str
 
 
@@ -113,10 +109,8 @@ def at_breakpoints(signal: str, values: Sequence[str], place: str) -> Threshold:
     told = ", ".join(values[:_SHOWN_VALUES]) + (
         f", ... ({len(values)})" if len(values) > _SHOWN_VALUES else ""
     )
-    name = "its breakpoint"
-    constants = {name: " or ".join(values)}
-    return Threshold(frozenset([signal]), f"{signal} leads to a table with the breakpoints {told}", signal,
-                     f"'{name}'", constants, place)  # fmt: skip
+    text = f"{signal} leads to a table with the breakpoints {told}"
+    return Threshold(frozenset([signal]), text, _numbers(values), place)
 
 
 def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
@@ -134,7 +128,6 @@ def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
         found,
         names=(found.names - inner.keys()) | outer,
         text=f"{found.text} ({said})" if said else found.text,
-        constants={**found.constants, **inner},
     )
 
 
@@ -163,25 +156,35 @@ def _threshold(
     is_dotted: bool,
 ) -> Threshold | None:
     """Return the comparison that some tokens are, the relation being at a place among them."""
-    left, right = tokens[:at], tokens[at + 1 :]
-    if not left or not right:
+    sides = tokens[:at], tokens[at + 1 :]
+    shown = _written(text, tokens)
+    if not all(sides) or len(shown) > _MAX_LENGTH:
         return None
     paths = dict(_variables(tokens, is_dotted=is_dotted))
     known = {path: constants[name] for path, name in sorted(paths.items()) if name in constants}
     named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
-    values = [value for t in tokens if t.kind == "number" and (value := number_in(t.text)) is not None]
-    values += [
-        value for s in named.values() for each in s.split(" or ") if (value := number_in(each)) is not None
-    ]
-    variables = paths.keys() - known.keys()
-    if not variables or not values:
+    stated_values = [value for stated in named.values() for value in stated.split(" or ")]
+    variables = frozenset(paths.keys() - known.keys())
+    if not variables or not _numbers([*(t.text for t in tokens if t.kind == "number"), *stated_values]):
         return None
-    shown = _written(text, tokens)
-    if len(shown) > _MAX_LENGTH:
-        return None
-    stated = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
-    before, behind = _written(text, left), _written(text, right)
-    return Threshold(frozenset(variables), f"{shown}{stated}", before, behind, named, place)
+    levels: tuple[float, ...] = ()
+    for side, other in (sides, sides[::-1]):
+        if variables == {path for path, _ in _variables(side, is_dotted=is_dotted)} and _is_name(side):
+            constant = "".join(token.text for token in other)
+            levels = _numbers(stated_values if _is_name(other) else [constant])
+    said = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
+    return Threshold(variables, f"{shown}{said}", levels, place)
+
+
+def _numbers(texts: Iterable[str]) -> tuple[float, ...]:
+    """Return those of some texts that are numbers."""
+    return tuple(number for text in texts if (number := number_in(text)) is not None)
+
+
+def _is_name(side: Sequence[Token]) -> bool:
+    """Whether an operand is nothing but a name, such as ``(m->u)``."""
+    is_called = any(a.kind == "name" and b.text == "(" for a, b in pairwise(side))
+    return not is_called and all(t.kind == "name" or t.text in (".", "->", "(", ")") for t in side)
 
 
 def _written(text: str, tokens: Sequence[Token]) -> str:

@@ -2,7 +2,6 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.context.crossings import crossings_of
 from falsifier.context.simulink.comparisons import diagram_thresholds
 from falsifier.context.simulink.diagram import (
     Block,
@@ -116,5 +115,4 @@ def test_breakpoints_of_tables_are_levels_of_what_leads_there() -> None:
     wires = (Wire(End("u", "1"), (End("map", "1"), End("unknown", "1"))),)
     (found,) = diagram_thresholds(Diagram("m", BlockSystem(blocks, wires)))
     assert found.text == "u leads to a table with the breakpoints 0, 2.5, 1e1"
-    crossings = crossings_of([found], {"m.u": (1.0, 20.0)})
-    assert [crossing.value for crossing in crossings] == [2.5, 10.0]
+    assert found.levels == (0.0, 2.5, 10.0)

@@ -199,6 +199,16 @@ def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
     assert "power > limit (limit = 3)" in context.of("power")
 
 
+def test_levels_of_inputs_within_their_ranges_are_crossings(tmp_path: Path) -> None:
+    path = tmp_path / "a.c"
+    limits = "".join(f"if (m->power > {i}) m->trips = {i};\n" for i in range(1, 90))
+    path.write_text(f"void step(M *m) {{ {limits} if (m->power + m->limp > 0.5) m->trips = 0; }}")
+    ranges = {"plant.power": (3.0, 50.0), "limp": (0.0, 9.0)}
+    read_only = gather([str(path)], [], seeds=(), signals=(), ranges=ranges, is_told=False)
+    assert read_only == Context(crossings=read_only.crossings)
+    assert [(c.signal, c.value) for c in read_only.crossings] == [("plant.power", i) for i in range(3, 27)]
+
+
 def test_what_is_known_of_a_signal() -> None:
     context = Context(comparisons=(Compared(("u",), "u > 3", "a.mo:1"), Compared((), "x > 1", "a.mo:2")))
     assert context.of("u") == ("u > 3",)

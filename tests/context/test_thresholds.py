@@ -1,3 +1,5 @@
+import pytest
+
 from falsifier.context.thresholds import number_in, thresholds, tokens_of, within
 
 
@@ -25,8 +27,6 @@ def test_names_values_and_place() -> None:
     text = "a;\n/* \n */ m->pause * period < valid;\nm->pause * period < valid;"
     (one,) = thresholds(text, {"valid": "1.5", "period": "0.1"}, "a.c", has_lines=True)
     assert (one.names, one.place) == (frozenset({"pause"}), "a.c:3")
-    assert (one.left, one.right) == ("m->pause * period", "valid")
-    assert one.constants == {"valid": "1.5", "period": "0.1"}
 
 
 def test_numbers() -> None:
@@ -45,7 +45,6 @@ def test_names_within_stand_for_others_outside() -> None:
     (one,) = thresholds("d - t > 3", {}, "a.slx")
     seen = within(one, {"d": "speed", "t": "", "other": "x"})
     assert (seen.text, seen.names) == ("d - t > 3 (d = speed)", frozenset({"speed"}))
-    assert seen.constants == {"d": "speed", "t": ""}
 
 
 def test_kinds_of_tokens_of_all_languages() -> None:
@@ -55,3 +54,29 @@ def test_kinds_of_tokens_of_all_languages() -> None:
         ("number", "1.5e-3f"), ("sign", ";"),
         ("name", "'a b'"), ("text", '"t\\""'), ("sign", ":=")
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "levels"),
+    [
+        ("u > 9.5", (9.5,)),
+        ("-9.5 < (plant.u)", (-9.5,)),
+        ("m->u > 1e-3f", (0.001,)),
+        ("u > 0x1.8p1", (3.0,)),
+        ("u <= limit", (5.0, 9.0)),
+        ("limit <= u", (5.0, 9.0)),
+        ("(u > 3", (3.0,)),
+        ("u > 0x" + 300 * "F", ()),
+        ("u > 1e999", ()),
+        ("2 * u > 3", ()),
+        ("u > 2 * 3", ()),
+        ("pre(u) > 3", ()),
+        ("u > v + 3", ()),
+    ],
+)
+def test_levels_are_those_of_a_variable_that_is_compared_with_a_number(
+    text: str, levels: tuple[float, ...]
+) -> None:
+    assert [t.levels for t in thresholds(text, {"limit": "5 or 9 or something"}, "a.mo") if t.levels] == (
+        [levels] if levels else []
+    )
