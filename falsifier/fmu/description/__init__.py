@@ -32,7 +32,7 @@ from falsifier.fmu.description.structure import (
     read_structure,
     read_units,
 )
-from falsifier.fmu.description.variables import Slot
+from falsifier.fmu.description.variables import Slot, is_true
 from falsifier.fmu.description.xml import read_xml
 
 __all__ = [
@@ -51,6 +51,7 @@ __all__ = [
     "file_hash",
     "find_wine",
     "is_known",
+    "is_true",
     "library_file",
     "needed_tool_text",
     "open_archive",

@@ -38,6 +38,7 @@ _CAUSALITIES: Mapping[str, Causality] = {
     "calculatedParameter": "calculatedParameter",
     "independent": "independent",
 }
+_NO_ELEMENT = Element("none")
 # Why variables of these causalities cannot be set.
 _REFUSALS: Mapping[str, str] = {
     "structuralParameter": "it is a structural parameter, which sets array sizes",
@@ -125,24 +126,17 @@ def with_aliases_marked(
         The variables and their slots in the same order; aliases cannot be set.
     """
     first: dict[tuple[str, int, int], str] = {}
-    # Inputs before parameters before start values: an input may share its reference with a local variable.
-    by_rank = sorted(variables, key=_rank)
     marked: dict[str, Variable] = {}
     changed = dict(slots)
-    for v in by_rank:
-        if v.causality != "input" and not v.settable:
-            continue
+    # Inputs before parameters before start values: an input may share its reference with a local variable.
+    for v in sorted(variables, key=lambda v: (v.causality != "input", v.causality != "parameter")):
         slot = slots[v.name]
-        known = first.setdefault((slot.type, slot.reference, slot.offset), v.name)
-        if known == v.name:
-            continue
-        marked[v.name] = replace(v, alias_of=known, settable=False)
-        changed[v.name] = replace(slot, refusal=f"it is another name of {known!r}; set that one")
+        if v.causality == "input" or v.settable:
+            known = first.setdefault((slot.type, slot.reference, slot.offset), v.name)
+            if known != v.name:
+                marked[v.name] = replace(v, alias_of=known, settable=False)
+                changed[v.name] = replace(slot, refusal=f"it is another name of {known!r}; set that one")
     return tuple(marked.get(v.name, v) for v in variables), changed
-
-
-def _rank(v: Variable) -> int:
-    return 0 if v.causality == "input" else 1 if v.causality == "parameter" else 2
 
 
 def input_clocks(root: Element) -> dict[int, str]:
@@ -163,12 +157,10 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
         if typed is None:
             raise ValueError(f"variable {element.attrib['name']!r} has no type")
         kind, code = _TYPES_1_2[typed.tag]
-        declared = types.get(typed.get("declaredType", ""))
-        definition = None if declared is None else next(iter(declared), None)
-        attributes = {**({} if definition is None else definition.attrib), **typed.attrib}
+        definition = next(iter(types.get(typed.get("declaredType", ""), ())), _NO_ELEMENT)
         role = _role(element, major, has_start=typed.get("start") is not None)
         start, is_state = _start(kind, typed.get("start")), position in states
-        variable = _variable(element, (kind, code), role, attributes, definition, start, is_state=is_state)
+        variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
         reference, negated = int(element.attrib["valueReference"]), element.get("alias") == "negatedAlias"
         yield variable, Slot(reference, code, negated=negated, refusal=role.refusal)
 
@@ -195,8 +187,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         if element.tag not in _TYPES_3:
             continue
         kind, code = _TYPES_3[element.tag]
-        definition = types.get(element.get("declaredType", ""))
-        attributes = {**({} if definition is None else definition.attrib), **element.attrib}
+        definition = types.get(element.get("declaredType", ""), _NO_ELEMENT)
         starts = _starts_3(kind, element)
         default = "continuous" if kind == "real" else "discrete"
         role = _role(element, 3, default, has_start=bool(starts))
@@ -210,9 +201,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         starts = starts * count if len(starts) == 1 else starts
         if shape and kind != "string":
             arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
-        variable = _variable(
-            element, (kind, code), role, attributes, definition, is_state=reference in states
-        )
+        variable = _variable(element, element, definition, (kind, code), role, is_state=reference in states)
         is_clocked = bool(clocks) and (clocks <= ticked or role.causality == "input")
         names = [(variable.name, variable.description)]
         names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
@@ -242,18 +231,30 @@ class _Role:
 
 def _variable(
     element: Element,
-    typed: tuple[Kind, str],
+    typed: Element,
+    definition: Element,
+    type_: tuple[Kind, str],
     role: _Role,
-    attributes: Mapping[str, str],
-    definition: Element | None,
     start: float | str | None = None,
     *,
     is_state: bool,
 ) -> Variable:
-    """Return a variable, from its own attributes and those of its declared type."""
+    """Return a variable.
+
+    Args:
+        element: with its name.
+        typed: with the attributes of its type.
+        definition: with those of its declared type, which hold unless it states others.
+        type_: kind and type code.
+        role: its role.
+        start: its start value.
+        is_state: whether it is a continuous state.
+    """
+    attributes = {**definition.attrib, **typed.attrib}
+    items = enumerate(definition.findall("Item"), start=1)
     return Variable(
         name=element.attrib["name"],
-        kind=typed[0],
+        kind=type_[0],
         causality=role.causality,
         variability=role.variability,
         unit=_unit(attributes.get("unit")),
@@ -264,9 +265,9 @@ def _variable(
         start=start,
         settable=not role.refusal,
         is_state=is_state,
-        literals=_literals(definition),
+        literals={item.attrib["name"]: int(item.get("value", k)) for k, item in items},
         description=element.get("description", ""),
-        type=typed[1],
+        type=type_[1],
     )
 
 
@@ -304,13 +305,6 @@ def _start(kind: Kind, text: str | None) -> float | str | None:
     if text is None or kind == "string":
         return text
     return float(is_true(text)) if kind == "boolean" else float(text)
-
-
-def _literals(definition: Element | None) -> dict[str, int]:
-    if definition is None:
-        return {}
-    items = definition.findall("Item")
-    return {item.attrib["name"]: int(item.get("value", k)) for k, item in enumerate(items, start=1)}
 
 
 def finite(text: str | None) -> float | None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.model import Interface
 from falsifier.errors import ModelError
@@ -57,7 +56,8 @@ def block(data: bytes) -> bytes:
 
 def ports(description: Description, names: Sequence[str]) -> bytes:
     """Return the calls that get or set these variables, and where each value is in their buffers."""
-    return _Table(description, names, ()).encoded
+    calls, places = _table(description, names)
+    return calls + integers(len(names)) + b"".join(places)
 
 
 def inputs(description: Description, names: Sequence[str], parameters: Sequence[str]) -> bytes:
@@ -66,9 +66,10 @@ def inputs(description: Description, names: Sequence[str], parameters: Sequence[
     Setting an input sets its whole array, and must not put the other elements back to their start values.
     """
     fixed = fixed_elements(description, names, parameters)
-    table = _Table(description, names, [parameters[k] for k in fixed])
-    others = [place + integers(k) for place, k in zip(table.fixed, fixed, strict=True)]
-    return table.encoded + integers(len(others)) + b"".join(others)
+    calls, places = _table(description, [*names, *(parameters[k] for k in fixed)])
+    own, others = places[: len(names)], places[len(names) :]
+    numbered = [place + integers(k) for place, k in zip(others, fixed, strict=True)]
+    return calls + integers(len(own)) + b"".join(own) + integers(len(numbered)) + b"".join(numbered)
 
 
 def fixed_elements(description: Description, names: Sequence[str], parameters: Sequence[str]) -> list[int]:
@@ -80,43 +81,30 @@ def fixed_elements(description: Description, names: Sequence[str], parameters: S
     return [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
 
 
-class _Table:
-    """Calls and places of some variables, and of fixed elements of their arrays."""
-
-    def __init__(self, description: Description, names: Sequence[str], fixed: Sequence[str]) -> None:
-        slots = [description.slot(name) for name in (*names, *fixed)]
-        codes = list(dict.fromkeys(slot.type for slot in slots))
-        calls, starts = [], []
-        for code in codes:
-            members = {slot.reference: slot.size for slot in slots if slot.type == code}
-            values, begins = _buffer(description, code, members)
-            references = np.array(list(members), dtype=np.uint32)
-            calls.append(text(code) + block(references.tobytes()) + integers(values.size))
-            calls.append(block(values.tobytes()))
-            starts.append(begins)
-        places = []
-        for slot in slots:
-            call, stored = codes.index(slot.type), STORED[description.major][slot.type]
-            offset = np.dtype(stored).itemsize * (starts[call][slot.reference] + slot.offset)
-            sign = -1.0 if slot.negated else 1.0
-            head = integers(STORAGE.index(stored), call, offset)
-            places.append(head + reals(sign) + integers(slot.type == "Boolean"))
-        own, self.fixed = places[: len(names)], places[len(names) :]
-        self.encoded = integers(len(codes)) + b"".join(calls) + integers(len(own)) + b"".join(own)
-
-
-def _buffer(
-    description: Description, code: str, sizes: Mapping[int, int]
-) -> tuple[NDArray[np.generic], dict[int, int]]:
-    """Return the values of one call, and where those of each value reference begin."""
-    begins = dict(zip(sizes, np.cumsum([0, *sizes.values()]).tolist(), strict=False))
-    values = np.zeros(sum(sizes.values()), dtype=STORED[description.major][code])
-    # A set call transfers whole arrays: elements that are not searched keep their start values.
-    for reference, start in begins.items():
-        if reference in description.arrays:
-            numbers = description.arrays[reference]
+def _table(description: Description, names: Sequence[str]) -> tuple[bytes, list[bytes]]:
+    """Return the calls that transfer some variables, one per type, and the place of each variable in them."""
+    slots = [description.slot(name) for name in names]
+    codes = list(dict.fromkeys(slot.type for slot in slots))
+    stored = STORED[description.major]
+    calls, starts = [integers(len(codes))], []
+    for code in codes:
+        sizes = {slot.reference: slot.size for slot in slots if slot.type == code}
+        begins = dict(zip(sizes, np.cumsum([0, *sizes.values()]).tolist(), strict=False))
+        values = np.zeros(sum(sizes.values()), dtype=stored[code])
+        # A set call transfers whole arrays: elements that are not searched keep their start values.
+        for reference, start in begins.items():
+            numbers = description.arrays.get(reference, ())
             values[start : start + len(numbers)] = numbers
-    return values, begins
+        references = np.array(list(sizes), dtype=np.uint32)
+        calls += [text(code), block(references.tobytes()), integers(values.size), block(values.tobytes())]
+        starts.append(begins)
+    places = []
+    for slot in slots:
+        call, kind = codes.index(slot.type), stored[slot.type]
+        offset = np.dtype(kind).itemsize * (starts[call][slot.reference] + slot.offset)
+        head = integers(STORAGE.index(kind), call, offset)
+        places.append(head + reals(-1.0 if slot.negated else 1.0) + integers(slot.type == "Boolean"))
+    return b"".join(calls), places
 
 
 def fmu(

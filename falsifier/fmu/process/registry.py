@@ -5,7 +5,7 @@ import contextlib
 import os
 import threading
 import time
-from collections.abc import Collection, Hashable, Iterable, Mapping
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -207,7 +207,7 @@ class Isolated:
         _ = self.rights
 
 
-def rights_text(allow: Iterable[str] = (), deny: Iterable[str] = ()) -> str:
+def rights_text(allow: Collection[str] = (), deny: Collection[str] = ()) -> str:
     """Say in one line what FMUs may do on this machine, and what of that it does not enforce.
 
     It starts a worker to see that.

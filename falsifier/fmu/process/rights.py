@@ -1,7 +1,7 @@
 """What FMUs may do: what users allow and deny, what that means on this machine, and what was refused."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -64,7 +64,7 @@ class Rights:
     network: bool = True
 
     @classmethod
-    def of(cls, allow: Iterable[str], deny: Iterable[str] = ()) -> "Rights":
+    def of(cls, allow: Collection[str], deny: Collection[str] = ()) -> "Rights":
         """Return the rights by what a user allows and denies.
 
         Args:
@@ -75,19 +75,19 @@ class Rights:
             SpecError: naming what is not one of these.
         """
         paths: dict[str, list[Path]] = {kind: [] for kind in _PATHS}
-        programs, network = False, True
         for word in allow:
-            kind, colon, path = word.partition(":")
-            if colon and kind in paths and path.strip():
-                paths[kind].append(_existing(word, path))
-            elif word == _PROGRAMS_WORD:
-                programs = True
-            else:
-                raise SpecError(f"allow: {_wrong(word, ('write:PATH', 'read:PATH', _PROGRAMS_WORD))}")
+            kind, path = _kind_and_path(word)
+            if path is not None:
+                if not path.exists():
+                    raise SpecError(f"allow {word}: there is no such file or folder; create it first")
+                paths[kind].append(path.resolve())
+            elif word != _PROGRAMS_WORD:
+                near = did_you_mean(word, ("write:PATH", "read:PATH", _PROGRAMS_WORD))
+                raise SpecError(f"allow: unknown {word!r}; {near}")
         for word in deny:
             if word != _NETWORK_WORD:
-                raise SpecError(f"deny: {_wrong(word, (_NETWORK_WORD,))}")
-            network = False
+                raise SpecError(f"deny: unknown {word!r}; {did_you_mean(word, (_NETWORK_WORD,))}")
+        programs, network = _PROGRAMS_WORD in allow, _NETWORK_WORD not in deny
         return cls(tuple(paths["write"]), tuple(paths["read"]), programs, network)
 
 
@@ -99,22 +99,15 @@ def resolved(allow: Iterable[str], folder: Path) -> tuple[str, ...]:
     """
     found = []
     for word in allow:
-        kind, colon, path = word.partition(":")
-        if colon and kind in _PATHS and path.strip():
-            word = f"{kind}:{(folder / Path(path.strip()).expanduser()).absolute()}"
-        found.append(word)
+        kind, path = _kind_and_path(word)
+        found.append(word if path is None else f"{kind}:{(folder / path).absolute()}")
     return tuple(found)
 
 
-def _existing(word: str, path: str) -> Path:
-    found = Path(path.strip()).expanduser()
-    if not found.exists():
-        raise SpecError(f"allow {word}: there is no such file or folder; create it first")
-    return found.resolve()
-
-
-def _wrong(word: str, known: Sequence[str]) -> str:
-    return f"unknown {word!r}; {did_you_mean(word, known)}"
+def _kind_and_path(word: str) -> tuple[str, Path | None]:
+    """Split what is allowed with a path; None for all else."""
+    kind, _, path = word.partition(":")
+    return kind, Path(path.strip()).expanduser() if kind in _PATHS and path.strip() else None
 
 
 def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_root: bool) -> tuple[str, ...]:

@@ -80,33 +80,24 @@ def sweep() -> None:
         with contextlib.suppress(OSError):
             if not (_MADE.fullmatch(path.name) and path.lstat().st_uid == os.getuid()):
                 continue
-            if path.name.endswith(_LOCK_SUFFIX):
-                _sweep_lock(path)
-            else:
-                _sweep_folder(path)
+            if not path.name.endswith(_LOCK_SUFFIX):
+                lock = posix_files.lock_file(_lock_of(path))
+                if lock is not None:
+                    try:
+                        remove_work_folder(path)
+                    finally:
+                        os.close(lock)
+            elif not path.with_name(path.name.removesuffix(_LOCK_SUFFIX)).exists():
+                age = time.time() - path.lstat().st_mtime
+                if age > _MAKING_SECONDS:
+                    path.unlink()
 
 
 def _lock_of(path: Path) -> Path:
     return path.with_name(path.name + _LOCK_SUFFIX)
 
 
-def _sweep_folder(path: Path) -> None:
-    lock = posix_files.lock_file(_lock_of(path))
-    if lock is not None:
-        try:
-            remove_work_folder(path)
-        finally:
-            os.close(lock)
-
-
-def _sweep_lock(path: Path) -> None:
-    if not path.with_name(path.name.removesuffix(_LOCK_SUFFIX)).exists():
-        age = time.time() - path.lstat().st_mtime
-        if age > _MAKING_SECONDS:
-            path.unlink()
-
-
-class Workplace:
+class Workplace(WorkFolder):
     """The folder of this process's workers, and the FMUs that are unpacked to it.
 
     Raises:
@@ -117,13 +108,8 @@ class Workplace:
         posix.check_memory_limits()
         _protect_secrets(os.environ)
         sweep()
-        self._folder = WorkFolder()
-        self._lock = threading.Lock()
-
-    @property
-    def root(self) -> Path:
-        """The folder."""
-        return self._folder.path
+        super().__init__()
+        self._making = threading.Lock()
 
     def unpacked(self, archives: Mapping[str, tuple[Path, str]]) -> Path:
         """Return the folder to which FMUs are unpacked; unpack them if necessary.
@@ -135,8 +121,8 @@ class Workplace:
             ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
         """
         key = sha256(repr([(name, sha) for name, (_, sha) in archives.items()]).encode()).hexdigest()[:16]
-        folder = self.root / key
-        with self._lock:
+        folder = self.path / key
+        with self._making:
             if not folder.is_dir():
                 partial = folder.with_suffix(".partial")
                 for name, (path, sha) in archives.items():
@@ -154,25 +140,17 @@ class Workplace:
         Raises:
             ModelError: if there is none for this machine, or no library can be loaded from the folder.
         """
-        if not windows and posix_files.forbids_programs(self.root):
+        if not windows and posix_files.forbids_programs(self.path):
             raise ModelError(
-                f"FMUs are unpacked to {self.root.parent}, from which this system loads no libraries "
+                f"FMUs are unpacked to {self.path.parent}, from which this system loads no libraries "
                 "(noexec); set TMPDIR to another folder"
             )
-        with self._lock:
-            return worker_program(self.root, windows=windows)
+        with self._making:
+            return worker_program(self.path, windows=windows)
 
     def scratch(self) -> Path:
         """Return a new folder for one worker."""
-        return Path(tempfile.mkdtemp(prefix="work-", dir=self.root))
-
-    def remove(self) -> None:
-        """Remove the folder."""
-        self._folder.remove()
-
-    def forget(self) -> None:
-        """Leave the folder to another process, of which this is a copy."""
-        self._folder.forget()
+        return Path(tempfile.mkdtemp(prefix="work-", dir=self.path))
 
 
 def worker_program(root: Path, *, windows: bool = False) -> Path:

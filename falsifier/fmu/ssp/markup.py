@@ -11,7 +11,7 @@ from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.description import Unit, read_units, read_xml
+from falsifier.fmu.description import Unit, is_true, read_units, read_xml
 
 T = TypeVar("T")
 _NAMESPACE = "{http://ssp-standard.org/SSP"
@@ -124,7 +124,7 @@ def parse_mappings(text: bytes, shown: str) -> tuple[Mapping, ...]:
 
 def _parsed(text: bytes, shown: str, expected: str, read: Callable[[Element], T]) -> T:
     root = read_xml(text, shown, SpecError)
-    if not root.tag.startswith(_NAMESPACE) or root.tag.rpartition("}")[2] != expected:
+    if not root.tag.startswith(_NAMESPACE) or _tag(root) != expected:
         raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
     try:
         return read(root)
@@ -141,71 +141,72 @@ def _structure(root: Element) -> Structure:
     system = root.find("{*}System")
     if system is None:
         raise ValueError("it has no System")
-    experiment = root.find("{*}DefaultExperiment")
-    times = experiment if experiment is not None else Element("none")
-    return Structure(
-        _part(system),
-        read_units(root, tag="{*}Units/{*}Unit"),
-        _time(times.get("startTime")),
-        _time(times.get("stopTime")),
-    )
+    stated = {k: v for each in root.findall("{*}DefaultExperiment") for k, v in each.attrib.items()}
+    start, stop = (_number(stated[name]) if name in stated else None for name in ("startTime", "stopTime"))
+    return Structure(_part(system), read_units(root, tag="{*}Units/{*}Unit"), start, stop)
 
 
 def _part(element: Element) -> Part:
-    kind = element.tag.rpartition("}")[2]
-    parts, wires = [], []
-    for child in element.findall("{*}Elements/*"):
-        tag = child.tag.rpartition("}")[2]
-        if tag == "SignalDictionaryReference":
-            raise ValueError(
-                f"{child.get('name')!r} refers to a signal dictionary, which is not supported; connect the "
-                "components directly"
-            )
-        if tag in ("Component", "System"):
-            parts.append(_part(child))
-    for wire in element.findall("{*}Connections/{*}Connection"):
-        wires.append(
-            Wire(
-                (wire.get("startElement"), wire.attrib["startConnector"]),
-                (wire.get("endElement"), wire.attrib["endConnector"]),
-                _transformation(wire),
-            )
+    is_component = _tag(element) == "Component"
+    for child in element.findall("{*}Elements/{*}SignalDictionaryReference"):
+        raise ValueError(
+            f"{child.get('name')!r} refers to a signal dictionary, which is not supported; connect the "
+            "components directly"
         )
-    name = element.get("name", "") if kind == "System" else element.attrib["name"]
-    source = element.attrib["source"] if kind == "Component" else ""
-    if kind == "Component" and not (name and source):
+    name = element.attrib["name"] if is_component else element.get("name", "")
+    source = element.attrib["source"] if is_component else ""
+    if is_component and not (name and source):
         raise ValueError(f"a component has the name {name!r} and the source {source!r}; neither may be empty")
     return Part(
         name=name,
-        type=element.get("type", "application/x-fmu-sharedlibrary") if kind == "Component" else "",
+        type=element.get("type", "application/x-fmu-sharedlibrary") if is_component else "",
         source=source,
         implementation=element.get("implementation", "any"),
         connectors=tuple(map(_connector, element.findall("{*}Connectors/{*}Connector"))),
         bindings=tuple(map(_binding, element.findall("{*}ParameterBindings/{*}ParameterBinding"))),
-        parts=tuple(parts),
-        wires=tuple(wires),
+        parts=tuple(_part(e) for e in element.findall("{*}Elements/*") if _tag(e) in ("Component", "System")),
+        wires=tuple(map(_wire, element.findall("{*}Connections/{*}Connection"))),
     )
 
 
+def _tag(element: Element) -> str:
+    """Return the name of an element without its namespace."""
+    return element.tag.rpartition("}")[2]
+
+
+def _typed(element: Element) -> tuple[str, Element]:
+    """Return the type and the element of a value or connector; an empty type if none is stated."""
+    typed = next((child for child in element if _tag(child) in _VALUE_TAGS), None)
+    return ("", Element("none")) if typed is None else (_tag(typed), typed)
+
+
+def _unit(typed: Element) -> str:
+    unit = typed.get("unit", "")
+    return "" if unit == "1" else unit
+
+
 def _connector(element: Element) -> Connector:
-    typed = next((child for child in element if child.tag.rpartition("}")[2] in _VALUE_TAGS), None)
-    unit = "" if typed is None else typed.get("unit", "")
-    kind = "" if typed is None else typed.tag.rpartition("}")[2]
-    return Connector(element.attrib["name"], element.attrib["kind"], "" if unit == "1" else unit, kind)
+    kind, typed = _typed(element)
+    return Connector(element.attrib["name"], element.attrib["kind"], _unit(typed), kind)
+
+
+def _wire(element: Element) -> Wire:
+    return Wire(
+        (element.get("startElement"), element.attrib["startConnector"]),
+        (element.get("endElement"), element.attrib["endConnector"]),
+        _transformation(element),
+    )
 
 
 def _transformation(element: Element) -> Transformation:
     for child in element:
-        if child.tag.rpartition("}")[2] in _MAPPINGS:
-            kind = child.tag.rpartition("}")[2]
-            raise ValueError(f"the element {kind} is not supported; map the values inside a component")
-    linear = element.find("{*}LinearTransformation")
-    factor, offset = (1.0, 0.0) if linear is None else (
-        _number(linear.get("factor", "1")), _number(linear.get("offset", "0"))
-    )  # fmt: skip
+        if _tag(child) in _MAPPINGS:
+            raise ValueError(f"the element {_tag(child)} is not supported; map the values inside a component")
+    stated = {k: v for each in element.findall("{*}LinearTransformation") for k, v in each.attrib.items()}
+    factor, offset = _number(stated.get("factor", "1")), _number(stated.get("offset", "0"))
     if factor == 0.0:
         raise ValueError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
-    return Transformation(factor, offset, _flag(element.get("suppressUnitConversion")))
+    return Transformation(factor, offset, is_true(element.get("suppressUnitConversion")))
 
 
 def _binding(element: Element) -> Binding:
@@ -227,14 +228,15 @@ def _binding(element: Element) -> Binding:
 def _values(element: Element) -> Iterator[Value]:
     for parameter in element.findall("{*}Parameters/{*}Parameter"):
         name = parameter.attrib["name"]
-        typed = next((child for child in parameter if child.tag.rpartition("}")[2] in _VALUE_TAGS), None)
-        if typed is None:
+        kind, typed = _typed(parameter)
+        if not kind:
             raise ValueError(f"the parameter {name!r} has no value of a known type")
-        tag, text = typed.tag.rpartition("}")[2], typed.attrib["value"]
-        is_text = tag in ("String", "Enumeration")
-        number = float(_flag(text)) if tag == "Boolean" else 0.0 if is_text else _number(text)
-        unit = typed.get("unit", "")
-        yield Value(name, text if is_text else number, tag == "Enumeration", "" if unit == "1" else unit)
+        text, is_item = typed.attrib["value"], kind == "Enumeration"
+        if is_item or kind == "String":
+            yield Value(name, text, is_item, _unit(typed))
+        else:
+            number = float(is_true(text)) if kind == "Boolean" else _number(text)
+            yield Value(name, number, is_item, _unit(typed))
 
 
 def _mappings(element: Element) -> Iterator[Mapping]:
@@ -247,11 +249,3 @@ def _number(text: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{text!r} is not a finite number")
     return number
-
-
-def _time(text: str | None) -> float | None:
-    return None if text is None else _number(text)
-
-
-def _flag(text: str | None) -> bool:
-    return text is not None and text.strip() in ("true", "1")
