@@ -1,7 +1,7 @@
 """Drives the bundled FMUs with inputs on a grid, and judges what comes out by the spec files."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,11 @@ Array = NDArray[np.float64]
 def golden(system: str) -> dict[str, Any]:
     """Golden figures of a system."""
     return tomllib.loads((Path(__file__).parent / "golden" / f"{system}.toml").read_text())
+
+
+def held(pieces: Sequence[float], ticks: int) -> Array:
+    """Equal pieces of so many ticks each; the last value also holds at the end."""
+    return np.append(np.repeat(np.asarray(pieces, float), ticks), float(pieces[-1]))
 
 
 def evenly(values: list[float], stop_time: float) -> Signal:
@@ -47,8 +52,8 @@ class Driver:
         stop_time: float,
         samples: int,
         parameters: Mapping[str, float] | None = None,
-    ) -> Array:
-        """Outputs on the evenly spaced grid of the inputs, shape (samples, outputs).
+    ) -> dict[str, Array]:
+        """Outputs by name on the evenly spaced grid of the inputs, shape (samples,) each.
 
         Args:
             inputs: values at every grid time, each held until the next one.
@@ -61,7 +66,7 @@ class Driver:
         held = {name: Signal(grid, tuple(u.tolist()), "constant") for name, u in inputs.items()}
         experiment = Experiment(stop_time, stop_time / (samples - 1), outputs)
         trajectory = self.model.simulate(held, parameters or {}, experiment)
-        return np.column_stack([trajectory[name] for name in outputs])
+        return {name: trajectory[name] for name in outputs}
 
 
 def robustness(requirement: str, system: str, columns: Mapping[str, Array], *, stop_time: float) -> float:

@@ -3,7 +3,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from tests.systems.driving import Array, Driver, golden, robustness
+from tests.systems.driving import Array, Driver, golden, held, robustness
 
 GOLDEN = golden("AFC")
 STOP = GOLDEN["stop_time"]
@@ -11,23 +11,18 @@ OUTPUTS = ("mu", "mode", "pressure", "fuel")
 PIECE = 5.0
 
 
-def pieces(values: Sequence[float], stop: float = STOP) -> Array:
-    """Return a signal of equal pieces at the controller's samples; the last value also holds at the end."""
-    counts = round(stop / 0.01 / len(values))
-    return np.append(np.repeat(np.asarray(values, float), counts), values[-1])
-
-
-def drive(fmu: Driver, pedal: Array, engine: float) -> dict[str, Array]:
-    inputs = {"pedal": pedal, "engine": np.full(len(pedal), engine)}
-    stop = 0.01 * (len(pedal) - 1)
-    rows = fmu.run(inputs, OUTPUTS, stop_time=stop, samples=len(pedal))
-    return {"pedal": pedal, **dict(zip(OUTPUTS, rows.T, strict=True))}
+def drive(fmu: Driver, pedal: Sequence[float], engine: float, stop: float = STOP) -> dict[str, Array]:
+    """Drive with equal pieces of the pedal at the controller's samples."""
+    inputs = {"pedal": held(pedal, round(stop / 0.01 / len(pedal)))}
+    inputs["engine"] = np.full(len(inputs["pedal"]), engine)
+    found = fmu.run(inputs, OUTPUTS, stop_time=stop, samples=len(inputs["pedal"]))
+    return {"pedal": inputs["pedal"], **found}
 
 
 @pytest.mark.parametrize("name", GOLDEN["runs"])
 def test_golden_ratios(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    found = drive(fmu, pieces(run["pedal"]), run["engine"])
+    found = drive(fmu, run["pedal"], run["engine"])
     at = [round(100 * t) for t in GOLDEN["times"]]
     assert found["mu"][at] == pytest.approx(run["mu"], abs=GOLDEN["tolerance"])
     assert np.all(found["mu"][:100] == 0)
@@ -45,7 +40,7 @@ def test_golden_ratios(fmu: Driver, name: str) -> None:
 @pytest.mark.parametrize("name", [n for n, run in GOLDEN["runs"].items() if "then" in run])
 def test_golden_answers_to_steps(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    found = drive(fmu, pieces([*run["pedal"], run["then"]], STOP + PIECE), run["engine"])
+    found = drive(fmu, [*run["pedal"], run["then"]], run["engine"], STOP + PIECE)
     for requirement, expected in run["robustness_until_55_s"].items():
         measured = robustness(requirement, "AFC", found, stop_time=STOP + PIECE)
         assert measured == pytest.approx(expected, abs=3e-5), requirement
@@ -53,6 +48,6 @@ def test_golden_answers_to_steps(fmu: Driver, name: str) -> None:
 
 def test_a_dead_sensor_opens_the_loop(fmu: Driver) -> None:
     inputs = {"pedal": np.full(2001, 30.0), "engine": np.full(2001, 1000.0)}
-    rows = fmu.run(inputs, ("mode",), stop_time=20.0, samples=2001, parameters={"faultTime": 15.0})
-    assert rows[1000:1500, 0].max() == 0
-    assert rows[1500:, 0].min() == 1
+    mode = fmu.run(inputs, ("mode",), stop_time=20.0, samples=2001, parameters={"faultTime": 15.0})["mode"]
+    assert mode[1000:1500].max() == 0
+    assert mode[1500:].min() == 1

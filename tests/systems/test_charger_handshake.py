@@ -1,27 +1,18 @@
 import numpy as np
 import pytest
 
-from tests.systems.driving import Array, Driver, golden, robustness
+from tests.systems.driving import Driver, golden, held, robustness
 
 GOLDEN = golden("ChargerHandshake")
 STOP, PERIOD, READY = GOLDEN["stop_time"], 0.1, 4
 OUTPUTS = ("phase", "locked", "closed", "voltage")
 
 
-def commands(pieces: list[int]) -> Array:
-    """Return the command at every tick of a run, held over pieces of 1 s."""
-    return np.append(np.repeat(np.asarray(pieces, float), 10), float(pieces[-1]))
-
-
-def drive(fmu: Driver, command: Array) -> dict[str, Array]:
-    rows = fmu.run({"command": command}, OUTPUTS, stop_time=STOP, samples=len(command))
-    return dict(zip(OUTPUTS, rows.T, strict=True))
-
-
 @pytest.mark.parametrize("name", GOLDEN["runs"])
 def test_golden_phases(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    found = drive(fmu, commands(run["command"]))
+    command = held(run["command"], 10)
+    found = fmu.run({"command": command}, OUTPUTS, stop_time=STOP, samples=len(command))
     ends = np.arange(9, 160, 10)
     for output in ("phase", "locked", "closed"):
         assert found[output][ends].tolist() == run[output], output

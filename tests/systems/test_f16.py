@@ -14,8 +14,7 @@ STATE = ("vt", "alpha", "beta", "phi", "theta", "psi", "p", "q", "r", "altitude"
 
 def fly(fmu: Driver, roll: float, pitch: float, yaw: float) -> dict[str, Array]:
     attitude = {"roll": roll, "pitch": pitch, "yaw": yaw}
-    rows = fmu.run({}, (*STATE, "mode"), stop_time=STOP, samples=SAMPLES, parameters=attitude)
-    return dict(zip((*STATE, "mode"), rows.T, strict=True))
+    return fmu.run({}, (*STATE, "mode"), stop_time=STOP, samples=SAMPLES, parameters=attitude)
 
 
 @pytest.mark.parametrize("name", GOLDEN["runs"])

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from tests.systems.driving import Array, Driver, golden, robustness
+from tests.systems.driving import Array, Driver, golden, held, robustness
 
 GOLDEN = golden("HeaterLimpHome")
-STOP, PERIOD = GOLDEN["stop_time"], 0.1
+STOP, PERIOD, TICKS = GOLDEN["stop_time"], 0.1, 20
 OUTPUTS = ("temperature", "limp", "trips")
 
 
@@ -39,21 +39,14 @@ def heater(disagreement: Array) -> Array:
     return rows
 
 
-def held(pieces: list[float]) -> Array:
-    """Return the disagreement at every tick of a run, held over pieces of 2 s."""
-    return np.append(np.repeat(np.asarray(pieces, float), 20), pieces[-1])
-
-
 def drive(fmu: Driver, disagreement: Array) -> dict[str, Array]:
-    inputs = {"disagreement": disagreement}
-    rows = fmu.run(inputs, OUTPUTS, stop_time=STOP, samples=len(disagreement))
-    return dict(zip(OUTPUTS, rows.T, strict=True))
+    return fmu.run({"disagreement": disagreement}, OUTPUTS, stop_time=STOP, samples=len(disagreement))
 
 
 @pytest.mark.parametrize("name", GOLDEN["runs"])
 def test_golden_limp_homes(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    found = drive(fmu, held(run["disagreement"]))
+    found = drive(fmu, held(run["disagreement"], TICKS))
     changes = np.diff(found["limp"])
     begins, ends = (PERIOD * (np.flatnonzero(changes == sign) + 1) for sign in (1, -1))
     # Outputs are read before the input is set, so a jump of the input has its effect one row later.
@@ -76,8 +69,9 @@ def test_independent_baths(fmu: Driver) -> None:
         begin = rng.integers(0, 8)
         pieces[begin : begin + 6] = [7.0, 0.2, 7.0, 5.0, 0.2, 5.0]
         pieces[rng.integers(0, 20)] = rng.uniform(0, 10)
-        found, expected = drive(fmu, held(pieces.tolist())), heater(held(pieces.tolist()))
-        same = np.diff(held(pieces.tolist()), prepend=pieces[0]) == 0
+        apart = held(pieces.tolist(), TICKS)
+        found, expected = drive(fmu, apart), heater(apart)
+        same = np.diff(apart, prepend=pieces[0]) == 0
         for k, output in enumerate(OUTPUTS):
             assert found[output][same] == pytest.approx(expected[same, k], abs=1e-6), output
         trips += int(found["trips"][-1])

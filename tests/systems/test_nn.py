@@ -20,7 +20,8 @@ def signal(points: dict[str, Any]) -> Signal:
 def test_golden_positions(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
     reference = signal(run["Ref"]).sample(TIMES)
-    position, current = fmu.run({"Ref": reference}, ("Pos", "current"), stop_time=STOP, samples=SAMPLES).T
+    found = fmu.run({"Ref": reference}, ("Pos", "current"), stop_time=STOP, samples=SAMPLES)
+    position, current = found["Pos"], found["current"]
     for time, expected in zip(run["times"], run["Pos"], strict=True):
         tolerance = next(row["position"] for row in GOLDEN["tolerance"] if time <= row["until"])
         assert position[round(time * 100)] == pytest.approx(expected, abs=tolerance), f"t = {time}"
@@ -43,6 +44,7 @@ def test_golden_positions(fmu: Driver, name: str) -> None:
 
 def test_golden_start(fmu: Driver) -> None:
     start = GOLDEN["start"]
-    rows = fmu.run({"Ref": np.full(11, 2.0)}, ("NNPos", "Pos"), stop_time=0.1, samples=11)
-    assert rows[[round(t * 100) for t in start["times"]], 0] == pytest.approx(start["NNPos"], abs=1e-5)
-    assert rows[10, 1] == pytest.approx(start["Pos_at_0_1"], abs=1e-5)
+    found = fmu.run({"Ref": np.full(11, 2.0)}, ("NNPos", "Pos"), stop_time=0.1, samples=11)
+    at = [round(t * 100) for t in start["times"]]
+    assert found["NNPos"][at] == pytest.approx(start["NNPos"], abs=1e-5)
+    assert found["Pos"][10] == pytest.approx(start["Pos_at_0_1"], abs=1e-5)

@@ -10,8 +10,7 @@ TIMES = np.linspace(0, STOP, 10001)
 
 
 def count(fmu: Driver, rates: Array) -> Array:
-    rows = fmu.run({"LRL_input": rates}, ("PACE_COUNT",), stop_time=STOP, samples=len(rates))
-    return np.asarray(rows[:, 0])
+    return fmu.run({"LRL_input": rates}, ("PACE_COUNT",), stop_time=STOP, samples=len(rates))["PACE_COUNT"]
 
 
 @pytest.mark.parametrize("name", GOLDEN["runs"])
@@ -37,6 +36,5 @@ def test_golden_counts(fmu: Driver, rate: str, expected: int) -> None:
 
 
 def test_periods(fmu: Driver) -> None:
-    rates = np.full(11, 70.9)
-    rows = fmu.run({"LRL_input": rates}, ("LRL", "Period"), stop_time=0.01, samples=11)
-    assert rows[-1].tolist() == [70, 857]
+    found = fmu.run({"LRL_input": np.full(11, 70.9)}, ("LRL", "Period"), stop_time=0.01, samples=11)
+    assert (found["LRL"][-1], found["Period"][-1]) == (70, 857)

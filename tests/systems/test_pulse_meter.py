@@ -1,28 +1,18 @@
 import numpy as np
 import pytest
 
-from tests.systems.driving import Array, Driver, golden, robustness
+from tests.systems.driving import Driver, golden, held, robustness
 
 GOLDEN = golden("PulseMeter")
 STOP, PERIOD = GOLDEN["stop_time"], 0.05
 OUTPUTS = ("counted", "missed", "asleep")
 
 
-def contacts(pieces: list[int]) -> Array:
-    """Return the contact at every tick of a run, held over equal pieces."""
-    per_piece = round(STOP / PERIOD / len(pieces))
-    return np.append(np.repeat(np.asarray(pieces, float), per_piece), float(pieces[-1]))
-
-
-def drive(fmu: Driver, contact: Array) -> dict[str, Array]:
-    rows = fmu.run({"contact": contact}, OUTPUTS, stop_time=STOP, samples=len(contact))
-    return dict(zip(OUTPUTS, rows.T, strict=True))
-
-
 @pytest.mark.parametrize("name", GOLDEN["runs"])
 def test_golden_counts(fmu: Driver, name: str) -> None:
     run = GOLDEN["runs"][name]
-    found = drive(fmu, contacts(run["contact"]))
+    contact = held(run["contact"], round(STOP / PERIOD / len(run["contact"])))
+    found = fmu.run({"contact": contact}, OUTPUTS, stop_time=STOP, samples=len(contact))
     assert found["counted"][-1] == run["counted"]
     assert found["missed"][-1] == run["missed"]
     if "asleep_from" in run:

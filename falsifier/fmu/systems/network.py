@@ -3,8 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import reduce
-from math import gcd
+from math import gcd, lcm
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -298,11 +297,6 @@ def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float
     """Return the largest step that divides all steps of the components' own; else the smallest default."""
     exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in own if step]
     if exact:
-        return float(reduce(_common, exact))
+        whole = lcm(*(step.denominator for step in exact))
+        return gcd(*(int(step * whole) for step in exact)) / whole
     return min((step for step in default if step), default=None)
-
-
-def _common(a: Fraction, b: Fraction) -> Fraction:
-    return Fraction(
-        gcd(a.numerator * b.denominator, b.numerator * a.denominator), a.denominator * b.denominator
-    )
