@@ -18,13 +18,22 @@ def write(path: Path, *entries: tuple[zipfile.ZipInfo | str, bytes]) -> Path:
 
 
 @pytest.mark.parametrize(
-    "name", ["../evil.txt", "/etc/evil.txt", "a/../../evil.txt", "..\\evil.txt", "C:\\evil"]
+    ("names", "what"),
+    [
+        *(((n,), "outside the folder") for n in ("../evil.txt", "/etc/evil.txt", "a/../../evil.txt")),
+        *(((n,), "outside the folder") for n in ("..\\evil.txt", "C:\\evil")),
+        *((n, "both a file and a folder") for n in (("a", "a/b"), ("a/b", "a"))),
+        *((n, "both a file and a folder") for n in (("a/", "a"), ("x/y", "x/y/z"))),
+        *(((n,), "control character") for n in ("a\nb", "a\x1b[31m", "a\x7f")),
+        *(((n,), "too long") for n in ("a" * 256, "ü" * 128, "a/" * 1025 + "b")),
+    ],
+    ids=range(15),
 )
-def test_entries_that_leave_the_folder_are_refused(tmp_path: Path, name: str) -> None:
-    fmu = write(tmp_path / "evil.fmu", (name, b"x"))
-    with pytest.raises(ModelError, match="outside the folder"):
+def test_names_that_do_harm_are_refused(tmp_path: Path, names: tuple[str, ...], what: str) -> None:
+    fmu = write(tmp_path / "evil.fmu", *((name, b"x") for name in names))
+    with pytest.raises(ModelError, match=what):
         archive.extract(fmu, tmp_path / "deep" / "out")
-    assert not list(tmp_path.rglob("evil.txt"))
+    assert [path.name for path in tmp_path.iterdir()] == ["evil.fmu"]
 
 
 @pytest.mark.parametrize(
@@ -43,25 +52,6 @@ def test_only_plain_files_are_accepted(tmp_path: Path, mode: int, what: str) -> 
     with pytest.raises(ModelError, match=f"'resources/passwd'.*{what}"):
         archive.extract(write(tmp_path / "special.fmu", (special, b"/etc/passwd")), tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("names", [("a", "a/b"), ("a/b", "a"), ("a/", "a"), ("x/y", "x/y/z")])
-def test_a_file_and_a_folder_of_one_name_are_refused(tmp_path: Path, names: tuple[str, str]) -> None:
-    fmu = write(tmp_path / "both.fmu", *((name, b"") for name in names))
-    with pytest.raises(ModelError, match="both a file and a folder"):
-        archive.extract(fmu, tmp_path / "out")
-
-
-@pytest.mark.parametrize("name", ["a\nb", "a\x1b[31m", "a\x7f"])
-def test_control_characters_in_names_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ModelError, match="control character"):
-        archive.extract(write(tmp_path / "named.fmu", (name, b"x")), tmp_path / "out")
-
-
-@pytest.mark.parametrize("name", ["a" * 256, "ü" * 128, "a/" * 1025 + "b"])
-def test_names_that_are_too_long_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(ModelError, match="too long"):
-        archive.extract(write(tmp_path / "named.fmu", (name, b"x")), tmp_path / "out")
 
 
 def test_an_entry_with_more_data_than_it_declares_is_refused(tmp_path: Path) -> None:

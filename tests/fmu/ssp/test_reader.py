@@ -8,7 +8,7 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
-from falsifier.fmu import System, read_package
+from falsifier.fmu import read_package
 from falsifier.fmu.ssp import reader as ssp
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import run, sampled_loop
@@ -25,15 +25,11 @@ PORTS = """
 MILLIMETRE = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>'
 
 
-def local(file: Path) -> System:
-    return read_package(file)
-
-
 @pytest.mark.parametrize("name", ["loop.ssp", "loop.ssd"])
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
 def test_components_and_connections_make_a_system(name: str, version: str, tmp_path: Path) -> None:
     ssd = structure(system(PLANT + PI, FEEDBACK), version=version)
-    model = local(write(tmp_path / name, ssd, "Plant_2", "Gain_2"))
+    model = read_package(write(tmp_path / name, ssd, "Plant_2", "Gain_2"))
     assert model.info.connections == (("pi.y", "plant.u"), ("plant.y", "pi.measured"))
     assert model.info.name == "root" and [v.name for v in model.info.inputs] == ["pi.r"]
     np.testing.assert_allclose(run(model, "plant.x")["plant.x"], sampled_loop(0), atol=1e-9)
@@ -46,7 +42,7 @@ def test_ports_of_the_whole_units_and_the_default_experiment(tmp_path: Path) -> 
         system(PLANT + PI, FEEDBACK + PORTS, before=ROOT_PORTS + bound),
         after=MILLIMETRE + '<ssd:DefaultExperiment stopTime="3"/>',
     )
-    model = local(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))
+    model = read_package(write(tmp_path / "loop.ssp", ssd, "Plant_2", "Gain_2"))
     info = model.info
     assert info.stop_time == 3.0
     (reference,) = info.inputs
@@ -84,7 +80,7 @@ def test_nested_systems_are_flattened_and_transformations_add_up(tmp_path: Path)
                                endConnector="measured" suppressUnitConversion="true"/>""",
         )
     )
-    model = local(write(tmp_path / "nested.ssp", ssd, "Plant_2", "Gain_2"))
+    model = read_package(write(tmp_path / "nested.ssp", ssd, "Plant_2", "Gain_2"))
     assert model.info.components == ("body.plant", "pi")
     links = {n.target.name: n for n in model.network.links}
     assert (links["u"].factor, links["u"].offset) == (20.0, 7.0), "2 (10 y + 3) + 1"
@@ -106,7 +102,9 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     wires = "".join(
         f'<ssd:Connection startConnector="r" endElement="{each}" endConnector="r"/>' for each in ("pi", "pj")
     )
-    model = local(write(tmp_path / "fan.ssp", structure(system(PI + second, wires, before=port)), "Gain_2"))
+    model = read_package(
+        write(tmp_path / "fan.ssp", structure(system(PI + second, wires, before=port)), "Gain_2")
+    )
     ramp = Signal((0.0, 1.0), (0.0, 1.0), "linear")
     found = run(model, "pi.y", "pj.y", signals={"r": ramp})
     np.testing.assert_array_equal(found["pi.y"], found["pj.y"])
