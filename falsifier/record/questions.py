@@ -28,13 +28,11 @@ class Sample:
         candidate: what was proposed.
         text: robustness, or why there is none, and whether a violation was confirmed; empty if it was not
             simulated.
-        seconds: how long the simulation took, in s.
     """
 
     index: int
     candidate: Candidate
     text: str
-    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,22 +42,15 @@ class Iteration:
     Attributes:
         exchanges: what was asked and answered during the call, rejected replies included.
         samples: one per candidate.
-        seconds: how long the call took, with its questions, in s.
     """
 
     exchanges: tuple[Exchange, ...]
     samples: tuple[Sample, ...]
-    seconds: float
 
     @property
     def question_seconds(self) -> float:
         """How long its questions took, in s."""
         return sum(exchange.seconds for exchange in self.exchanges)
-
-    @property
-    def simulation_seconds(self) -> float:
-        """How long its simulations took, in s."""
-        return sum(sample.seconds for sample in self.samples)
 
 
 def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
@@ -75,32 +66,31 @@ def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
         elif isinstance(record, AskedRecord):
             if record.requirement == requirement:
                 samples = [
-                    Sample(i, Candidate.from_json(c), *told.get(i, ("", 0.0)))
+                    Sample(i, Candidate.from_json(c), told.get(i, ""))
                     for i, c in enumerate(record.candidates, start=record.first)
                 ]
-                found.append(Iteration(_exchanges(asked), tuple(samples), record.seconds))
+                found.append(Iteration(_exchanges(asked), tuple(samples)))
             asked = []
-    return [*found, Iteration(_exchanges(asked), (), 0.0)] if asked else found
+    return [*found, Iteration(_exchanges(asked), ())] if asked else found
 
 
 def _exchanges(records: Iterable[ExchangeRecord]) -> tuple[Exchange, ...]:
     return tuple(Exchange.model_validate(record.exchange) for record in records)
 
 
-def _results(records: Iterable[Record], requirement: str) -> dict[int, tuple[str, float]]:
-    """Return what came of each evaluation, and how long it took, by index."""
-    found: dict[int, tuple[str, float]] = {}
+def _results(records: Iterable[Record], requirement: str) -> dict[int, str]:
+    """Return what came of each evaluation, by index."""
+    found: dict[int, str] = {}
     for record in records:
         if isinstance(record, EvaluatedRecord):
             verdict = record.verdicts.get(requirement)
             text = (
                 f"robustness {signed(verdict.robustness)}" if verdict else f"{record.status}: {record.reason}"
             )
-            found[record.index] = text, record.seconds
+            found[record.index] = text
         elif isinstance(record, ConfirmedRecord) and record.requirement == requirement:
-            text, seconds = found[record.index]
             reason = "" if record.outcome == "confirmed" else f" ({record.reason})"
-            found[record.index] = f"{text}, {record.outcome}{reason}", seconds
+            found[record.index] += f", {record.outcome}{reason}"
     return found
 
 

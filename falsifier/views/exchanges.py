@@ -6,7 +6,6 @@ Prompts are folded; nothing needs a script.
 import re
 import shlex
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 
 from falsifier.core.words import counted, in_one_line
@@ -22,45 +21,24 @@ _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
 def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
-    """Show the exchanges of a recorded run, and the time of each iteration; empty if it asked nothing.
+    """Show the exchanges of a recorded run; empty if it asked nothing.
 
     Args:
         directory: run directory.
         requirement: name of the requirement whose engine asked.
-        most: maximum number of iterations to show, the latest; the text says what is left out.
+        most: maximum number of turns to show, the latest; the text says what is left out.
     """
-    found = iterations(read_journal(directory), requirement)
-    if not any(one.exchanges for one in found):
-        return Html("")
-    asked = [one for one in found if one.exchanges]
-    parts = []
-    before: tuple[Message, ...] = ()
+    asked = [one for one in iterations(read_journal(directory), requirement) if one.exchanges]
+    parts, before = [], tuple[Message, ...]()
     for one in asked[-most:]:
         parts.append(_iteration(one, before))
         before = one.exchanges[-1].messages
-    return join(
-        _left_out(directory, asked[: len(asked) - len(parts)], "question"),
-        *parts,
-        el(
-            "details",
-            el("summary", "Time per iteration"),
-            _left_out(directory, found[:-most], "iteration"),
-            _times(found[-most:]),
-            class_="times",
-        ),
-    )
-
-
-def _left_out(directory: Path, missing: Sequence[Iteration], what: str) -> Html:
-    if not missing:
-        return Html("")
-    command = f"falsifier llm prompt {shlex.quote(str(directory))} --at N"
-    return el(
-        "p",
-        f"The first {counted(len(missing), what)} are not shown; the question before sample N: ",
-        el("code", command),
-        class_="note",
-    )
+    missing = len(asked) - len(parts)
+    if missing:
+        said = f"The first {counted(missing, 'question')} are not shown; the question before sample N: "
+        command = el("code", f"falsifier llm prompt {shlex.quote(str(directory))} --at N")
+        parts.insert(0, el("p", said, command, class_="note"))
+    return join(*parts)
 
 
 def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
@@ -95,8 +73,11 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
         else Html(""),
         *(join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]),
     ]
-    usage = exchange.usage
-    reply = exchange.reply
+    usage, reply = exchange.usage, exchange.reply
+    answer = "(none)"
+    if reply:
+        calls = [f"{call.name}({call.arguments})" for call in reply.tool_calls]
+        answer = "\n".join([reply.text, *calls]).strip()
     return join(
         el(
             "details",
@@ -106,17 +87,11 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
             class_="prompt",
         ),
         el("p", f"Reply of {exchange.llm}: {counted(usage.completion_tokens, 'token')}"),
-        _text(_reply_text(exchange) if reply else "(none)"),
+        _text(answer),
         el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem)
         if exchange.problem
         else Html(""),
     )
-
-
-def _reply_text(exchange: Exchange) -> str:
-    assert exchange.reply is not None
-    calls = [f"{call.name}({call.arguments})" for call in exchange.reply.tool_calls]
-    return "\n".join([exchange.reply.text, *calls]).strip()
 
 
 def _text(text: str) -> Html:
@@ -140,28 +115,3 @@ def _name(part: str) -> str:
     if re.match(r"Sample \d", line):
         return "samples"
     return line if len(line) <= _LONGEST_NAME else f"{line[:_LONGEST_NAME]} ..."
-
-
-def _times(shown: Sequence[Iteration]) -> Html:
-    rows = []
-    for one in shown:
-        numbers = [str(o.index + 1) for o in one.samples]
-        rows.append(
-            (
-                ", ".join(numbers) or "\u2013",
-                ", ".join(dict.fromkeys(o.candidate.origin for o in one.samples)) or "\u2013",
-                f"{one.question_seconds:.3g}",
-                f"{max(0.0, one.seconds - one.question_seconds):.3g}",
-                f"{one.simulation_seconds:.3g}",
-                "; ".join(o.text for o in one.samples),
-            )
-        )
-    header = (
-        "sample",
-        "proposed by",
-        "questions [s]",
-        "other proposal time [s]",
-        "simulation [s]",
-        "outcome",
-    )
-    return table(header, rows, label="Time per iteration")

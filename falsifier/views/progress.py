@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,7 +58,7 @@ def progress() -> Listener:
     """
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
-        return NotebookLine()
+        return _NotebookDisplay()
     news = News()
 
     def show(event: Event) -> None:
@@ -89,30 +90,89 @@ def _live_display(console: "Console") -> Iterator[Listener]:
         console=console,
         transient=True,
     )
-    news = News()
+    state, news = _State(), News()
     with moving(bar):
         task = bar.add_task("starting", total=None, note="")
 
         def show(event: Event) -> None:
             for line in news.kept(event):
                 bar.console.print(one_line(line), highlight=False, markup=False)
-            match event:
-                case RunStarted():
-                    bar.update(task, description=_title(event), total=event.budget.simulations)
-                case Evaluated():
-                    if text := news.better(event):
-                        bar.update(task, note=text)
-                    bar.update(task, completed=event.spent.simulations)
-                case Exchanged():
-                    bar.update(task, note=_replied(event))
-                case _:
-                    pass
+            if state.follow(event, news):
+                bar.update(
+                    task, description=state.title, total=state.total, completed=state.done, note=state.note
+                )
 
         def tell(_name: str, reached: float, stop_time: float) -> None:
             bar.update(task, note=f"simulated {reached:.4g} of {stop_time:g} s")
 
         with watching(tell):
             yield unbroken(show)
+
+
+class _NotebookDisplay:
+    """Shows a run as one line below the cell and updates it in place.
+
+    It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
+    """
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+        self._state, self._news = _State(), News()
+
+    def __call__(self, event: Event) -> None:
+        """Update the line."""
+        if isinstance(event, RunStarted):
+            self._handle, self._state, self._news = None, _State(), News()
+        tuple(self._news.kept(event))  # there is no place for it
+        if not self._state.follow(event, self._news):
+            return
+        from IPython.display import HTML, display
+
+        state = self._state
+        bar = el("progress", value=state.done, max=state.total) if state.total else ""
+        count = counted(state.total or state.done, "simulation")
+        of = f" {state.done} of {count}. " if state.total else f" {count}. "
+        line = HTML(join(el("code", state.title), " ", bar, of, state.note))  # type: ignore[no-untyped-call]
+        if self._handle is None:
+            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            self._handle.update(line)
+
+
+@dataclass(slots=True)
+class _State:
+    """What one line says of a run.
+
+    Attributes:
+        title: the requirements and the engine.
+        total: maximum number of simulations; None without a limit.
+        done: number of simulations so far.
+        note: the latest news.
+    """
+
+    title: str = ""
+    total: int | None = None
+    done: int = 0
+    note: str = ""
+
+    def follow(self, event: Event, news: "News") -> bool:
+        """Return whether an event has changed it."""
+        match event:
+            case RunStarted():
+                names = ", ".join(problem.name for problem in event.problems)
+                self.title, self.total = one_line(f"{names}, {event.engines[0]}"), event.budget.simulations
+            case Evaluated():
+                self.done = event.spent.simulations
+                self.note = news.better(event) or self.note or "no successful simulation yet"
+            case Exchanged():
+                self.note = f"LLM replied, {event.spent.tokens} tokens so far"
+            case Confirmed():
+                self.note = f"violation {event.confirmation.outcome}"
+            case RunEnded():
+                self.note = f"{event.status}; {self.note}"
+            case _:
+                return False
+        return True
 
 
 class News:
@@ -221,55 +281,6 @@ class News:
         yield f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
 
 
-class NotebookLine:
-    """Shows a run as one line below the cell and updates it in place.
-
-    It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
-    """
-
-    def __init__(self) -> None:
-        self._handle: Any = None
-        self._name = self._note = ""
-        self._total: int | None = None
-
-    def __call__(self, event: Event) -> None:
-        """Update the line."""
-        match event:
-            case RunStarted():
-                self._name = _title(event)
-                self._handle, self._total = None, event.budget.simulations
-                self._show(0)
-            case Evaluated(best=best):
-                verdict = best.verdict if best else None
-                self._note = "no successful simulation yet"
-                if verdict is not None:
-                    at = f"t = {verdict.critical_time:.5g} s"
-                    self._note = f"best robustness {signed(verdict.robustness, 5)} at {at}"
-                self._show(event.spent.simulations)
-            case Exchanged():
-                self._note = _replied(event)
-                self._show(event.spent.simulations)
-            case Confirmed():
-                self._note = f"violation {event.confirmation.outcome}"
-            case RunEnded():
-                self._note = f"{event.status}; {self._note}"
-                self._show(event.spent.simulations)
-
-    def _show(self, done: int) -> None:
-        from IPython.display import HTML, display
-
-        bar = el("progress", value=done, max=self._total) if self._total else ""
-        count = (
-            f"{done} of {counted(self._total, 'simulation')}" if self._total else counted(done, "simulation")
-        )
-        text = join(el("code", self._name), " ", bar, f" {count}. ", self._note)
-        line = HTML(text)  # type: ignore[no-untyped-call]
-        if self._handle is None:
-            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            self._handle.update(line)
-
-
 class FmuLog:
     """Listener that writes the FMU's messages of each simulation; the file is replaced when the run starts.
 
@@ -305,14 +316,5 @@ def _choices(event: RunStarted) -> list[str]:
     return [text for text in (parameterization, unsearched, *chosen) if text]
 
 
-def _replied(event: Exchanged) -> str:
-    return f"LLM replied, {event.spent.tokens} tokens so far"
-
-
 def _duration(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
-
-
-def _title(event: RunStarted) -> str:
-    """The requirements and the engine."""
-    return one_line(f"{', '.join(problem.name for problem in event.problems)}, {event.engines[0]}")

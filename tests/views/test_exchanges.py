@@ -1,7 +1,6 @@
 """What a run asked a language model, as the report and a notebook show it."""
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -52,14 +51,6 @@ def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path)
     assert '<th scope="row" style="text-align: left">samples</th>' in html
     assert "as in the question before" in html
     assert html.count("You search for a counterexample") == 1 + 7, "the text once, its share in each question"
-
-
-def test_the_time_of_each_iteration_is_told(run: Path) -> None:
-    times = exchanges_html(run, name(), most=10).partition('class="times"')[2]
-    rows = times.partition("<tbody>")[2].split("<tr>")[1:]
-    assert len(rows) == 6
-    questions = [re.findall(r">([^<]*)</td>", row)[1] for row in rows]
-    assert questions == ["1.5", "3", "1.5", "1.5", "1.5", "1.5"]
 
 
 def test_long_runs_are_cut_and_say_how_the_rest_is_seen(run: Path) -> None:

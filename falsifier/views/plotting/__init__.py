@@ -1,4 +1,4 @@
-"""Figures: simulations, what decided a verdict, the progress of searches, the comparison of methods.
+"""Figures: simulations, what was tried, the progress of searches, the comparison of methods.
 
 The only package that imports matplotlib. Functions draw on the given axes or make a new figure; none of them
 needs a display.
@@ -12,12 +12,9 @@ from falsifier.views.plotting.diagram import plot_diagram
 from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from falsifier.views.plotting.simulation import (
     plot,
-    plot_diagnosis,
     plot_evaluation,
-    plot_panel,
     plot_panels,
     plot_requirement,
-    plot_signal,
     plot_trajectory,
 )
 
@@ -28,17 +25,14 @@ __all__ = [
     "plot",
     "plot_comparison",
     "plot_coverage",
-    "plot_diagnosis",
     "plot_diagram",
     "plot_evaluation",
     "plot_history",
     "plot_iteration_times",
-    "plot_panel",
     "plot_panels",
     "plot_rates",
     "plot_requirement",
     "plot_robustness_map",
-    "plot_signal",
     "plot_trajectory",
     "png",
     "save_figure",

@@ -8,11 +8,9 @@ import numpy as np
 from falsifier.analyses.coverage import labels_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation, monitor_for
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
-from falsifier.stl import Formula
-from falsifier.stl.formula import Always, Eventually, Until
 from falsifier.stl.margins import signed
 from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.axes import (
@@ -51,11 +49,6 @@ _CORNERS = (
 _LABELLED = 3
 # Share of a panel's height above which a predicate is written below its line.
 _TOP = 0.85
-# Operators with a time window, as formulas write them, and colours of their windows.
-_OPERATORS: dict[type[Formula], str] = {Always: "G", Eventually: "F", Until: "U"}
-_COLOURS = ("#8a5a00", "#2f7d4f", "#6a3d9a", "#1f5fa8")
-# Height of a window's bar and of its row, as a share of the axes.
-_BAR, _ROW = 0.025, 0.11
 
 
 def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
@@ -82,19 +75,23 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
     Raises:
         ValueError: if the evaluation has no trajectory.
     """
-    trajectory, verdict = evaluation.trajectory, evaluation.verdict
-    if trajectory is None or verdict is None:
+    drawn, verdict = _panels(problem, evaluation)
+    return plot_panels(drawn, verdict, _title(problem, evaluation, verdict))
+
+
+def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verdict]:
+    if evaluation.trajectory is None or evaluation.verdict is None:
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     drawn = panels(
         problem.requirement.formula,
-        trajectory,
+        evaluation.trajectory,
         evaluation.candidate,
         problem.space.inputs,
-        verdict,
+        evaluation.verdict,
         _labels(problem),
         problem.info.components,
     )
-    return plot_panels(drawn, verdict, _title(problem, evaluation, verdict))
+    return drawn, evaluation.verdict
 
 
 def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = "") -> "Figure":
@@ -210,13 +207,8 @@ def plot_requirement(
     Raises:
         ValueError: if the evaluation has no trajectory.
     """
-    trajectory, verdict = evaluation.trajectory, evaluation.verdict
-    if trajectory is None or verdict is None:
-        raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
+    drawn, verdict = _panels(problem, evaluation)
     ax = ax if ax is not None else own_axes(8, 3)
-    drawn = panels(
-        problem.requirement.formula, trajectory, evaluation.candidate, (), verdict, _labels(problem)
-    )
     decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
     plot_panel(ax, decisive, _decided_colour(verdict))
     if inset is not None:
@@ -311,38 +303,6 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
     ax.annotate(text, at, where, textcoords="offset points", va=side, color=LIMIT, fontsize=8)
 
 
-def plot_diagnosis(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
-    """Plot the deciding quantity, and below it the window of each operator on the path to the critical time.
-
-    Args:
-        problem: the problem with the requirement.
-        evaluation: an evaluation with its trajectory.
-        ax: where to draw; None: a new figure.
-
-    Raises:
-        ValueError: if the evaluation has no trajectory.
-    """
-    from matplotlib.transforms import blended_transform_factory
-
-    figure = plot_requirement(problem, evaluation, ax)
-    ax = figure.axes[0] if ax is None else ax
-    assert evaluation.trajectory is not None
-    path = monitor_for(problem).diagnose(evaluation.trajectory).path
-    windows = [step for step in path if step.window is not None]
-    in_axes = blended_transform_factory(ax.transData, ax.transAxes)
-    low, high = ax.get_ylim()
-    room = _ROW * (len(windows) + 1)
-    ax.set_ylim(low - room * (high - low) / (1 - room), high)
-    for row, step in enumerate(windows):
-        assert step.window is not None
-        start, end = step.window
-        y, colour = _ROW * (len(windows) - row), _COLOURS[row % len(_COLOURS)]
-        ax.fill_between([start, end], y, y - _BAR, color=colour, transform=in_axes, linewidth=0, alpha=0.8)
-        label = f"{_OPERATORS[type(step.formula)]} over [{start:.6g}, {end:.6g}] s"
-        ax.text(start, y, label, color=colour, transform=in_axes, va="bottom", fontsize=8)
-    return figure_of(ax)
-
-
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
     """Plot signals over time, one small panel per signal.
 
@@ -356,24 +316,8 @@ def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) 
     figure = Figure(figsize=(8, 0.6 + 1.1 * len(names)), layout="constrained")
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     for ax, name in zip(axes, names, strict=True):
-        plot_signal(trajectory, name, ax)
-        ax.set_xlabel("")
+        unit = trajectory.units.get(name, "")
+        ax.plot(trajectory.times, trajectory[name], linewidth=1.2, color=OUTPUT)
+        ax.set_ylabel(caption(f"{name} [{unit}]" if unit else name))
     axes[-1].set_xlabel("time [s]")
     return figure
-
-
-def plot_signal(trajectory: Trajectory, name: str, ax: "Axes | None" = None, *, label: str = "") -> "Figure":
-    """Plot one signal over time.
-
-    Args:
-        trajectory: the simulation.
-        name: name of the signal.
-        ax: where to draw; None: a new figure.
-        label: label of the line in a legend; if given, each line gets its own colour.
-    """
-    ax = ax if ax is not None else own_axes(8, 2.5)
-    colour = None if label else OUTPUT
-    ax.plot(trajectory.times, trajectory[name], linewidth=1.2, label=caption(label) or None, color=colour)
-    unit = trajectory.units.get(name, "")
-    ax.set(xlabel="time [s]", ylabel=caption(f"{name} [{unit}]" if unit else name))
-    return figure_of(ax)

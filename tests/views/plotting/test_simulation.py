@@ -9,23 +9,20 @@ from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import MonitorError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
 from falsifier.views.plotting import (
     plot,
-    plot_diagnosis,
     plot_evaluation,
-    plot_panel,
     plot_requirement,
-    plot_signal,
     plot_trajectory,
     png,
     save_figure,
 )
 from falsifier.views.plotting.panels import Panel
+from falsifier.views.plotting.simulation import plot_panel
 from tests.fmu.small_systems import LOOP, system
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import conditional, hard, unusable
@@ -230,40 +227,3 @@ def test_a_trajectory_has_a_panel_for_each_signal_with_its_unit() -> None:
     assert [ax.get_xlabel() for ax in figure.axes] == ["", "time [s]"]
     (ax,) = plot_trajectory(trajectory, ["u"]).axes
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("u [V]", "time [s]")
-
-
-def test_signals_with_labels_share_axes_in_colours_of_their_own() -> None:
-    trajectory = simulated().trajectory
-    assert trajectory is not None
-    ax = Figure().subplots()
-    for label in ("one", "other"):
-        plot_signal(trajectory, "x", ax, label=label)
-    assert [line.get_label() for line in ax.get_lines()] == ["one", "other"]
-    assert len({line.get_color() for line in ax.get_lines()}) == 2
-    assert xs(ax.get_lines()[0])[-1] == 10.0
-
-
-def test_a_signal_that_is_not_there_is_named() -> None:
-    trajectory = simulated().trajectory
-    assert trajectory is not None
-    with pytest.raises(MonitorError, match="'z'"):
-        plot_signal(trajectory, "z")
-
-
-def test_each_operator_has_its_window_and_inner_ones_are_where_they_decided() -> None:
-    # x falls from the sixth second on: its last three seconds are the worst to find a high value in.
-    problem = lag_problem("G[0,7] F[0,3] (x >= 0.5)", points=4)
-    evaluation = evaluate(problem, problem.space.decode([1.0, 1.0, 1.0, -1.0]))
-    ax = Figure().subplots()
-    plot_diagnosis(problem, evaluation, ax)
-    assert [text.get_text() for text in ax.texts] == ["x >= 0.5", "G over [0, 7] s", "F over [0, 3] s"]
-    spans = [c.get_paths()[0].get_extents() for c in ax.collections if c.get_alpha() == 0.8]
-    assert [(round(s.x0, 6), round(s.x1, 6)) for s in spans] == [(0.0, 7.0), (0.0, 3.0)]
-    low, _ = ax.get_ylim()
-    assert low < ys(ax.get_lines()[0]).min(), "there is room for the windows below the curve"
-
-
-def test_a_diagnosis_without_axes_makes_a_figure() -> None:
-    problem = lag_problem()
-    figure = plot_diagnosis(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    assert [text.get_text() for text in figure.axes[0].texts] == ["x <= 0.9", "G over [0, 10] s"]
