@@ -18,7 +18,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import lag_problem
 from tests.command import Done, falsifier
 from tests.llm.server import Step, serving
-from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.pictures import CRITICAL, OUTPUT, colours
 
 
 def run(folder: Path, *arguments: str) -> Done:
@@ -127,7 +127,7 @@ def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
 
 
 def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> None:
-    done = run(folder, "explain", "run", "--map", "--budget", "25", "--json")
+    done = run(folder, "explain", "run", "--map", "--budget", "25", "--out", "m.png", "--json")
     assert done.code == 0, done.err
     shares = [p["share"] for p in done.json["persistence"]]
     assert shares == sorted(shares, reverse=True)
@@ -160,12 +160,6 @@ def test_budgets_and_pictures_that_cannot_be_are_refused(
 ) -> None:
     done = run(folder, *arguments)
     assert (done.code, message in done.err, done.out) == (2, True, ""), done.err
-
-
-def test_the_smallest_map_is_drawn(folder: Path) -> None:
-    done = run(folder, "explain", "run", "--map", "--budget", "7", "--out", "small.svg")
-    assert done.code == 0, done.err
-    assert (folder / "small.svg").exists()
 
 
 def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
@@ -245,14 +239,6 @@ PROBLEM = lag_problem()
 FOUND = confirm(PROBLEM, evaluate(PROBLEM, PROBLEM.space.decode([1.0] * 4)))
 
 
-def test_a_counterexample_is_a_file_with_its_picture_beside_it(tmp_path: Path) -> None:
-    data, picture = write_counterexample(FOUND, tmp_path / "run")
-    assert load(data).robustness == FOUND.evaluation.robustness
-    assert data == tmp_path / "run" / "counterexample.json"
-    assert picture == data.with_suffix(".png")
-    assert {OUTPUT, INPUT, CRITICAL} <= colours(picture)
-
-
 def test_the_picture_is_named_and_titled_like_the_counterexample(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -264,7 +250,7 @@ def test_the_picture_is_named_and_titled_like_the_counterexample(
     monkeypatch.setattr("falsifier.views.plotting.save_figure", keep)
     files = write_counterexample(FOUND, tmp_path, name="fragile-1.json")
     assert [f.name for f in files] == ["fragile-1.json", "fragile-1.png"]
-    assert json.loads(files[0].read_text())["outcome"] == "confirmed"
+    assert load(files[0]).robustness == FOUND.evaluation.robustness
     assert titles[0].startswith("LAG: x <= 0.9 was violated from")
     assert f"robustness {FOUND.evaluation.robustness:+.5g}" in titles[0]
 

@@ -8,6 +8,8 @@ from tests.llm.server import Step, serving
 
 
 def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
+    text = falsifier("llm", "prompt", "AT1", "--variant", "MP4", cwd=tmp_path).out
+    assert re.search(r"\d+ tokens; the first \d+ of them \(\d+%\) are the same in every question", text)
     printed = falsifier("llm", "prompt", "AT1", "--variant", "MP4", "--json", cwd=tmp_path)
     with serving(reply(FULL)) as server:
         falsifier(*at1(server.url), cwd=tmp_path, env=ENV)
@@ -20,8 +22,7 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
         falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         sent = server.received[1].body["messages"]
     printed = falsifier(
-        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--at", "2", "--json"),
-        cwd=tmp_path,
+        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--at", "2", "--json"), cwd=tmp_path
     )
     assert json.loads(printed.out) == sent
     rich = falsifier("llm", "prompt", "AT1", "--after", "run", cwd=tmp_path).out
@@ -44,16 +45,6 @@ def test_what_the_model_wrote_down_is_in_the_next_prompt(tmp_path: Path) -> None
         falsifier("run", "AT1", *name, "--budget", "1", cwd=tmp_path, env=ENV)
     text = falsifier("llm", "prompt", "AT1", "--after", "run", cwd=tmp_path).out
     assert "Your lessons so far: braking helps" in text and "chosen because: " in text
-
-
-def test_a_printed_prompt_says_how_much_of_it_stays_the_same(tmp_path: Path) -> None:
-    text = falsifier("llm", "prompt", "F16", cwd=tmp_path).out
-    assert (
-        "100 simulations may be spent" in text
-        and "altitude above the ground; at t = 0: 2338" in text.replace("Altitude", "altitude")
-    )
-    tokens, constant = (int(n) for n in re.findall(r"(\d+) tokens; the first (\d+) of them", text)[0])
-    assert 500 < constant < tokens < 1000
 
 
 def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
@@ -128,25 +119,3 @@ def test_a_run_without_a_usable_answer_fails_and_says_why_in_the_last_line(tmp_p
     last = done.out.splitlines()[-1]
     assert last.startswith("failed: the budget of 200 tokens is used up; the language model gave no usable")
     assert "nothing was simulated" in last
-
-
-def test_a_campaign_counts_a_run_without_a_usable_answer_as_failed(tmp_path: Path) -> None:
-    with serving(*[Step("[]")] * 6) as server:
-        done = falsifier(
-            *("bench", "AT1", "--llm", "openai/gpt-5-mini", "--api-base", server.url, "--runs", "1"),
-            *(
-                "--max-tokens",
-                "200",
-                "--llm-option",
-                "price=1:1",
-                "--llm-option",
-                "cache=no",
-                "--out",
-                "c",
-                "--json",
-            ),
-            cwd=tmp_path,
-            env=ENV,
-        )
-    assert done.code == 3, done.err
-    assert "1 run failed" in done.err

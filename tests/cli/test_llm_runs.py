@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.record.journal import read_journal
-from falsifier.record.records import AskedRecord, ExchangeRecord
+from falsifier.record.records import ExchangeRecord
 from tests.cli.support import BRAKE_LATE, ENV, FULL, at1, reply
 from tests.command import falsifier
 from tests.llm.server import Step, serving
@@ -33,33 +33,6 @@ def test_two_replies_falsify_at1(tmp_path: Path) -> None:
     assert b"sk-test-not-a-key" not in everything + done.err.encode() + done.out.encode()
 
 
-def test_bad_replies_are_answered_with_what_was_wrong(tmp_path: Path) -> None:
-    with serving(Step("no idea"), reply([120, *FULL[1:]]), reply(FULL)) as server:
-        done = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
-        second, third = (request.texts[-1] for request in server.received[1:])
-    assert done.code == 1, done.err
-    assert done.json["spent"]["simulations"] == 1
-    assert done.json["spent"]["calls"] == 3
-    assert "JSON" in second
-    assert "'throttle' at t = 0 s: 120 is outside its range [0, 100]" in third
-
-
-def test_after_three_bad_replies_the_run_goes_on_with_a_random_change(tmp_path: Path) -> None:
-    repeated = reply(BRAKE_LATE)
-    with serving(repeated, repeated, repeated, repeated, reply(FULL)) as server:
-        done = falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
-        assert len(server.received) == 5
-    assert done.code == 1, done.err
-    assert "fallback       1 of 3 samples from random changes of the best sample, because" in done.out
-    records = read_journal(tmp_path / "run")
-    one = ["asked", "evaluated"]
-    assert [r.kind for r in records] == [
-        *("exchange", *one), *("exchange",) * 3, *one, *("exchange", *one), "confirmed", "ended"
-    ]  # fmt: skip
-    changed = [c["origin"] for r in records if isinstance(r, AskedRecord) for c in r.candidates]
-    assert changed[1] == "random change"
-
-
 def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
     with serving(reply(BRAKE_LATE), Step(status=401)) as server:
         broken = falsifier(
@@ -76,38 +49,6 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
         assert "robustness 0.419" in server.received[0].texts[-1]
     assert resumed.code == 1, resumed.err
     assert resumed.json["spent"]["calls"] == 2
-
-
-def test_a_resumed_run_asks_again_where_it_failed_and_has_paid_for_that(tmp_path: Path) -> None:
-    with serving(*[reply(BRAKE_LATE)] * 10) as server:
-        broken = falsifier(
-            *at1(server.url, "--out", "run", "--llm-option", "cache=no"), cwd=tmp_path, env=ENV
-        )
-    assert (broken.code, "to continue: falsifier resume run" in broken.out + broken.err) == (3, True)
-    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
-    with serving(reply(FULL)) as server:
-        manifest["request"]["llm"]["api_base"] = server.url
-        write_manifest(tmp_path / "run", manifest)
-        resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
-        assert len(server.received) == 1
-    assert resumed.code == 1, resumed.err
-    assert (resumed.json["spent"]["calls"], resumed.json["spent"]["prompt_tokens"]) == (11, 1100)
-
-
-def test_equal_questions_are_answered_from_disk(tmp_path: Path) -> None:
-    with serving(reply(FULL)) as server:
-        assert falsifier(*at1(server.url), cwd=tmp_path, env=ENV).code == 1
-        again = falsifier(*at1(server.url, "--json"), cwd=tmp_path, env=ENV)
-        assert len(server.received) == 1
-    assert again.code == 1
-    assert again.json["spent"]["cost"] == 0
-
-
-def test_a_missing_key_is_said_before_the_first_simulation(tmp_path: Path) -> None:
-    done = falsifier("run", "AT1", "--llm", "openai/gpt-5-mini", cwd=tmp_path)
-    assert done.code == 2
-    assert "set OPENAI_API_KEY" in done.err
-    assert not (tmp_path / "runs").exists()
 
 
 def test_an_unknown_option_is_refused_before_the_first_simulation(tmp_path: Path) -> None:

@@ -30,6 +30,9 @@ def test_check_prints_requirement_place_and_what_to_do(tmp_path: Path) -> None:
 
 
 def test_check_says_what_is_searched(tmp_path: Path) -> None:
+    repeated = falsifier("check", "AT", cwd=tmp_path)
+    assert repeated.code == 1, "AT6abc repeats others"
+    assert repeated.out.count(": ok") == 10
     done = falsifier("check", "CC1", cwd=tmp_path)
     assert done.code == 0
     assert done.out.startswith("CC1: ok, ") and done.out.endswith("nothing found\n")
@@ -53,17 +56,8 @@ SENTENCE = "The speed stays below 120 mph for 20 s."
 
 
 def asked(server: Server, model: str) -> list[str]:
-    return [
-        "formalize",
-        model,
-        SENTENCE,
-        "--llm",
-        "openai/gpt-5-mini",
-        "--api-base",
-        server.url,
-        "--llm-option",
-        "price=1:2",
-    ]
+    llm = ("--llm", "openai/gpt-5-mini", "--api-base", server.url, "--llm-option", "price=1:2")
+    return ["formalize", model, SENTENCE, *llm]
 
 
 def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:

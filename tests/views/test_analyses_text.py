@@ -15,7 +15,6 @@ from falsifier.views.analyses_text import (
     coverage_text,
     formalized_json,
     formalized_text,
-    sparkline,
     trace_lines,
 )
 from tests.analyses.test_coverage import described
@@ -85,12 +84,6 @@ def test_advice_is_told_as_a_section() -> None:
     advice = [Advice("rise", "it rises", '[requirements.NAME]\ntemplate = "rise"')]
     assert advice_text("80 in 2 s", advice).startswith("rise: it rises\n  [requirements.NAME]\n")
     assert "note: Formulas compare values" in advice_text("after each step", advice)
-
-
-def test_a_line_shows_the_course() -> None:
-    ramp = np.linspace(0, 7, 801)
-    assert sparkline(ramp, width=8)[0] < sparkline(ramp, width=8)[-1]
-    assert sparkline(np.array([3.0, 3.0]), width=3) == "▁▁▁"
 
 
 def test_each_signal_has_its_name_and_range() -> None:

@@ -3,14 +3,7 @@ from pathlib import Path
 from falsifier.context.simulink import read_diagram
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import Connection, Coupling, Frame, System, read_info
-from falsifier.views.model_text import (
-    MOST_PORTS,
-    diagram,
-    diagram_text,
-    info_text,
-    model_json,
-    simulink_text,
-)
+from falsifier.views.model_text import MOST_PORTS, diagram, diagram_text, info_text, model_json, simulink_text
 from tests.fixtures import simulink
 from tests.fmu.fixtures import path
 from tests.fmu.fixtures import path as fmu_path
@@ -38,10 +31,6 @@ def test_unbounded_inputs_are_said_to_be_so() -> None:
     lines = info_text(read_info(fmu_path("HugeLimits_2"))).splitlines()
     (row,) = [line for line in lines if line.startswith("u ")]
     assert row.split() == ["u", "real", "m", "unbounded", "unbounded", "0"]
-
-
-def test_what_is_unusual_is_noted() -> None:
-    assert "note: the default experiment starts at 5 s" in info_text(read_info(fmu_path("LateStart_2")))
 
 
 def test_without_outputs_all_variables_are_shown() -> None:

@@ -55,31 +55,20 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
     assert "falsified; violation confirmed" in front_end.lines[-1]
 
 
-def test_a_warning_comes_once_when_most_simulations_have_failed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cause_is_told_once_and_that_most_have_failed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
     with make_display() as display:
         result = falsify(problem, "uniform", budget=20, seed=1, listeners=[display])
-    warnings = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+    lines = capsys.readouterr().err.splitlines()
+    told = [line for line in lines if " failed: " in line]
+    assert told == ["simulation 1 failed: lag: output 'x' is nan at t = 0.5 s"], "each cause once"
+    warnings = [line for line in lines if line.startswith("warning: ")]
     assert len(warnings) == 1
     assert re.match(r"warning: \d+ of \d+ simulations have failed; the run counts as failed", warnings[0])
     assert f"failed after 20 simulations, {result.spent.failures} of them failed" in result_text(result)
     assert result_json(result)["spent"]["failures"] == result.spent.failures
-
-
-def test_a_few_failures_bring_no_warning(capsys: pytest.CaptureFixture[str]) -> None:
-    with make_display() as display:
-        falsify(
-            lag_problem("G[0,10] (x <= 2)", response=broken), "uniform", budget=2, seed=1, listeners=[display]
-        )
-    assert "warning" not in capsys.readouterr().err
-
-
-def test_a_cause_of_failures_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
-    with make_display() as display:
-        falsify(problem, "uniform", budget=20, seed=1, listeners=[display])
-    told = [line for line in capsys.readouterr().err.splitlines() if " failed: " in line]
-    assert told == ["simulation 1 failed: lag: output 'x' is nan at t = 0.5 s"]
 
 
 def test_of_several_requirements_progress_names_the_one_that_improved(
@@ -93,9 +82,7 @@ def test_of_several_requirements_progress_names_the_one_that_improved(
     assert len(improved) == len(set(improved))
 
 
-def test_if_nothing_gets_better_rate_and_time_left_are_told(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_if_nothing_gets_better_rate_and_time_left_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     evaluation = evaluate(problem, problem.space.decode([0.0] * 4))
     display = progress()

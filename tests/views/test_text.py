@@ -1,3 +1,4 @@
+import json
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -67,24 +68,9 @@ def test_a_run_that_can_be_continued_says_how(tmp_path: Path) -> None:
     assert f"falsifier resume {shlex.quote(str(tmp_path))}" in result_text(result)
 
 
-def test_where_every_simulation_failed_there_is_nothing_but_the_reason() -> None:
-    result = falsify(unusable(), "uniform", budget=20)
-    text = result_text(result)
-    assert "out of order" in text
-    assert "robustness" not in text
-
-
 def test_what_the_language_model_used_is_told(found: Result) -> None:
     assert "language model" not in result_text(found)
-    spent = Spent(
-        simulations=1,
-        calls=3,
-        timed_out=1,
-        prompt_tokens=90,
-        completion_tokens=10,
-        reasoning_tokens=4,
-        cost=0.25,
-    )
+    spent = Spent(simulations=1, calls=3, timed_out=1, prompt_tokens=90, completion_tokens=10, cost=0.25)
     text = result_text(replace(found, spent=spent))
     assert "3 requests (1 of them timed out), 100 tokens" in text and "0.2500 US dollars" in text
     unknown = result_text(replace(found, spent=replace(spent, cost=None)))
@@ -148,16 +134,17 @@ def test_a_shared_directory_has_a_counterexample_for_each_requirement(tmp_path: 
 
 
 def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
-    import json
-
     data = json.loads(json.dumps(result_json(found)))
     assert (data["requirement"], data["status"]) == ("EASY", "falsified")
     assert data["counterexample"]["robustness"] == found.robustness
     assert data["counterexample"]["switches"] == {"u": 0}
     assert data["spent"]["simulations"] == found.spent.simulations
     assert data["directory"] is None
-    failed = json.loads(json.dumps(result_json(falsify(unusable(), "uniform", budget=20))))
+    unusable_ = falsify(unusable(), "uniform", budget=20)
+    failed = json.loads(json.dumps(result_json(unusable_)))
     assert (failed["counterexample"], failed["best"]) == (None, None)
+    text = result_text(unusable_)
+    assert "out of order" in text and "robustness" not in text
 
 
 def test_samples_of_a_fallback_are_told_with_the_reason(tmp_path: Path) -> None:

@@ -39,19 +39,14 @@ def test_predicates_count_within_all_windows_around_them(
 
 
 def test_each_compared_quantity_has_a_panel_and_then_each_input() -> None:
-    first, second, last = drawn("G[0,10] (x <= 0.9) and G[2,4] (x >= 0) and F[0,5] (x - u <= 0)")
+    first, second, last = drawn("G (0.9 >= x) and G[2,4] (x >= 0) and F[0,5] (x - u <= 0)")
     assert [p.title for p in (first, second, last)] == ["x [m]", "x - u", "u [V]"]
     assert [(b.predicate, b.start, b.end) for b in first.bounds] == [
-        ("x <= 0.9", 0.0, 10.0),
+        ("0.9 >= x", 0.0, 10.0),
         ("x >= 0", 2.0, 4.0),
     ]
     assert set(first.bounds[0].values.tolist()) == {0.9}
     assert second.values.tolist() == (first.values - last.values).tolist()
-
-
-def test_a_quantity_on_the_right_side_is_the_one_that_is_drawn() -> None:
-    panel = drawn("G[0,10] (0.9 >= x)")[0]
-    assert (panel.title, set(panel.bounds[0].values.tolist())) == ("x [m]", {0.9})
 
 
 def test_the_critical_time_is_marked_on_what_decided_only() -> None:
@@ -77,11 +72,6 @@ def test_an_input_is_drawn_with_its_control_points_and_its_range() -> None:
     assert (panel.points, panel.limits, panel.steps) == (((0.0, 1.0), (4.0, 0.0)), (-1.0, 1.0), True)
     assert panel.bounds == ()
     assert panel.values[39] == 1.0 and panel.values[41] == 0.0
-
-
-def test_windows_without_an_end_are_drawn_to_the_end_of_the_simulation() -> None:
-    (bound,) = drawn("G (x <= 0.9)")[0].bounds
-    assert (bound.start, bound.end) == (0.0, 10.0)
 
 
 def test_panels_of_a_system_are_grouped_by_component() -> None:

@@ -8,7 +8,6 @@ from matplotlib.patches import Rectangle
 from falsifier.campaigns.analysis import load
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.views.plotting import plot_comparison, plot_history, plot_iteration_times, plot_rates
-from falsifier.views.plotting.axes import figure_of
 from falsifier.views.plotting.runs import falsification_curve, improvements, thinned
 from tests.views.plotting.support import xs, ys
 
@@ -30,10 +29,6 @@ def test_rates_end_at_the_share_of_falsified_runs(campaign: Path) -> None:
     axes = plot_rates(load(campaign)).axes[0]
     assert [line.get_label() for line in axes.get_lines()] == ["uniform (4 runs)", "corners (4 runs)"]
     assert [ys(line)[-1] for line in axes.get_lines()] == [0.5, 0.5]
-
-
-def test_without_runs_there_are_no_rates() -> None:
-    assert plot_rates([]).axes[0].get_lines() == []
 
 
 def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) -> None:
@@ -79,9 +74,3 @@ def test_curves(campaign: Path) -> None:
     assert [c.tolist() for c in improvements(np.array([np.nan, 2.0]))] == [[2], [2]]
     assert [c.tolist() for c in thinned(values, 2)] == [[4, 6], [1, 0.5]]
     assert len(thinned(values, 10)[0]) == 5
-
-
-def test_the_figure_of_a_part_is_the_whole() -> None:
-    figure = Figure()
-    part = figure.add_subfigure(figure.add_gridspec(1, 2)[0])
-    assert figure_of(part.subplots()) is figure

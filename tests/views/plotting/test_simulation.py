@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,40 +18,32 @@ from falsifier.views.plotting import (
     plot_requirement,
     plot_trajectory,
     png,
-    save_figure,
 )
 from falsifier.views.plotting.panels import Panel
 from falsifier.views.plotting.simulation import plot_panel
 from tests.fmu.small_systems import LOOP, system
-from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.pictures import CRITICAL
 from tests.problems import conditional, hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
 
 
-def test_a_requirement_is_drawn_on_given_axes_up_to_its_critical_time() -> None:
+def test_a_requirement_is_drawn_on_given_axes_and_enlarged_around_its_critical_time() -> None:
     evaluation, ax = simulated(), Figure().subplots()
     assert evaluation.verdict is not None
-    assert plot_requirement(hard(), evaluation, ax) is ax.get_figure()
+    assert plot_requirement(hard(), evaluation, ax, inset=2.0) is ax.get_figure()
     dots = [line for line in ax.get_lines() if line.get_marker() == "o"]
     assert [xs(dot).tolist() for dot in dots] == [[evaluation.verdict.critical_time]]
     assert evaluation.verdict.breach is not None
     first, decided = ax.get_title().splitlines()
     assert first == evaluation.verdict.breach.text
     assert f"decided by x <= 0.6 at {evaluation.verdict.critical_time:.5g} s" in decided
-
-
-def test_an_inset_shows_the_curve_and_its_bound_around_the_critical_time() -> None:
-    evaluation, ax = simulated(), Figure().subplots()
-    assert evaluation.verdict is not None
-    plot_requirement(hard(), evaluation, ax, inset=2.0)
     (inside,) = ax.child_axes
     low, high = inside.get_xlim()
     assert (low + high) / 2 == pytest.approx(evaluation.verdict.critical_time)
     assert high - low == pytest.approx(2.0)
     assert len(inside.get_lines()) == 3, "the curve, its bound, and the dot at the critical time"
     bottom, top = inside.get_ylim()
-    value = ys(inside.get_lines()[-1])[0]
-    assert bottom < value < top
+    assert bottom < ys(inside.get_lines()[-1])[0] < top
     assert top - bottom < ax.get_ylim()[1] - ax.get_ylim()[0]
 
 
@@ -163,13 +154,6 @@ def test_signals_that_are_not_real_are_drawn_in_steps_with_their_names() -> None
     assert figure.axes[0].get_lines()[0].get_drawstyle() == "steps-post"
 
 
-def test_bounds_are_drawn_in_their_window_only() -> None:
-    problem = lag_problem("G[2,5] (x <= 0.9)")
-    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    times = xs(figure.axes[0].get_lines()[1])
-    assert (times[0], times[-1]) == pytest.approx((2.0, 5.0))
-
-
 def test_plot_takes_results_counterexamples_and_trajectories() -> None:
     result = falsify(hard(), "corners", budget=10)
     assert result.counterexample is not None
@@ -191,15 +175,6 @@ def test_what_failed_has_nothing_to_draw() -> None:
     assert result.status == "failed"
     with pytest.raises(ValueError, match="every simulation failed"):
         plot(result)
-
-
-def test_pictures_show_output_input_and_what_decided(tmp_path: Path) -> None:
-    figure = plot_evaluation(hard(), simulated())
-    save_figure(figure, tmp_path / "a.png")
-    save_figure(figure, tmp_path / "a.svg")
-    assert {OUTPUT, INPUT, CRITICAL} <= colours(tmp_path / "a.png")
-    assert {OUTPUT, INPUT, CRITICAL} <= colours(png(figure, dpi=130))
-    assert all(colour in (tmp_path / "a.svg").read_text() for colour in (OUTPUT, INPUT, CRITICAL))
 
 
 def test_the_panels_of_a_system_are_headed_by_their_components() -> None:

@@ -2,6 +2,7 @@ import os
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from xml.etree import ElementTree
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -42,18 +43,13 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --search u=0:1:3 --stop-time 5.0 --engine uniform "
         "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
-    quick = request.model_copy(update={"budget": Budget(None, 9.0)})
-    assert run_command(quick).endswith("--engine uniform --seconds 9.0 --seed 3 --jobs 2")
-
-
-def test_a_models_search_can_be_repeated_too() -> None:
     model = LLMSettings(
         name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
     )
-    request = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model)
-    assert run_command(request) == (
+    asked = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model, budget=Budget(None, 9.0))
+    assert run_command(asked) == (
         "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 --anonymous "
-        "--budget 100 --seed 0"
+        "--seconds 9.0 --seed 0"
     )
 
 
@@ -87,3 +83,53 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     assert not gather(tmp_path).sides[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
     assert not gather(tmp_path).sides[0].sections[0].shown[0].is_shrunk
+
+
+def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(campaign: Path) -> None:
+    text = markdown_report(campaign)
+    assert text.startswith("# Falsification report: nightly\n")
+    parts = [
+        "## HARD: violated",
+        "required x \\<= 0.6",
+        "falsifier replay",
+        "## NEVER: not violated",
+        "What was tried:",
+        "What this does not show:",
+        "| HARD | uniform | 2/2 |",
+    ]
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+    assert "`G[0,10] (x <= 0.6)`" in text
+    assert "Robustness" not in text.partition("required")[0]
+
+
+def test_several_directories_are_compared(campaign: Path, tmp_path: Path) -> None:
+    falsify(hard(), "corners", budget=3, directory=tmp_path / "again")
+    text = markdown_report(campaign, tmp_path / "again")
+    assert "## HARD in nightly: violated" in text and "## HARD in again: violated" in text
+    assert "## NEVER in again: not searched" in text
+
+
+def test_junit_has_a_case_for_each_run(campaign: Path) -> None:
+    root = ElementTree.fromstring(junit_report(campaign))
+    suites = {suite.get("name"): suite for suite in root}
+    assert set(suites) == {"uniform", "corners"}
+    for suite in suites.values():
+        assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["4", "2", "0", "0"]
+        cases = list(suite)
+        assert [case.get("name") for case in cases] == ["seed 0", "seed 1"] * 2
+        failures = [case.find("failure") for case in cases]
+        assert [f is not None for f in failures] == [True, True, False, False]
+        assert failures[0] is not None
+        message = failures[0].get("message") or ""
+        assert message.startswith("x <= 0.6 was violated from ")
+        assert "; robustness -" in message
+        assert "x <= 0.6" in (failures[0].text or "")
+
+
+def test_what_a_search_did_not_show_is_told(tmp_path: Path) -> None:
+    result = falsify(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), "sobol", budget=3, directory=tmp_path)
+    case = ElementTree.fromstring(junit_report(tmp_path))[0][0]
+    told = {p.get("name"): p.get("value") for p in case.iter("property")}
+    assert told["falsifier.condition"] == result.findings[0].text
+    assert f"what this does not show: {result.findings[0].text}" in (case.findtext("system-out") or "")
