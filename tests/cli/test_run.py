@@ -115,7 +115,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         ),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
         ((*SPEED, "--search", "throttle=0-100"), "for example --search throttle=0:100"),
-        ((*SPEED, "--search", "throttle=-5.5..7"), "for example --search throttle=-5.5:7"),
+        ((*SPEED, "--search", "throttle=-5.5..7"), "expected NAME=LOW:HIGH, with a colon"),
         ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=0:100"),
         ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
