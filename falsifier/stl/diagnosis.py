@@ -21,7 +21,6 @@ from falsifier.stl.formula import (
     Eventually,
     Flag,
     Formula,
-    Iff,
     Implies,
     Next,
     Not,
@@ -65,52 +64,41 @@ def path_to_decider(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoin
     """
     path: list[Waypoint] = []
     while True:
-        window = part.window_at(sample)
-        path.append(Waypoint(part, sample, part.at(buffer, sample), window))
+        path.append(Waypoint(part, sample, part.at(buffer, sample), part.window_at(sample)))
         if not part.children:
             return path
-        part, sample = _decider(part, buffer, sample, window)
+        part, sample = _decider(path[-1], buffer)
 
 
-def _decider(part: Part, buffer: Floats, sample: int, window: tuple[int, int] | None) -> tuple[Part, int]:
-    kind, children = type(part.formula), part.children
+def _decider(here: Waypoint, buffer: Floats) -> tuple[Part, int]:
+    kind, children, sample = type(here.part.formula), here.part.children, here.sample
+    first, last = here.window or (sample, sample)
     if kind is Not:
         return children[0], sample
     if kind is Next:
         return children[0], sample + 1
-    if window is not None and kind is Always:
-        return children[0], window[0] + int(children[0].over(buffer, *window).argmin())
-    if window is not None and kind is Eventually:
-        return children[0], window[0] + int(children[0].over(buffer, *window).argmax())
-    if window is not None and kind is Until:
-        return _decider_of_until(part, buffer, sample, window)
-    return children[_side(kind, *(child.at(buffer, sample) for child in children))], sample
-
-
-def _side(kind: type[Formula], left: float, right: float) -> int:
-    """Return which operand decided: 0 for the left one, 1 for the right one."""
+    if kind is Always:
+        return children[0], first + int(children[0].over(buffer, first, last).argmin())
+    if kind is Eventually:
+        return children[0], first + int(children[0].over(buffer, first, last).argmax())
+    if kind is Until:
+        left, right = children
+        lefts, rights = left.over(buffer, sample, last), right.over(buffer, first, last)
+        lowest = np.minimum.accumulate(lefts)[first - sample :]
+        best = int(np.minimum(lowest, rights).argmax())
+        if lowest[best] <= rights[best]:
+            return left, sample + int(lefts[: first - sample + best + 1].argmin())
+        return right, first + best
+    one, other = (child.at(buffer, sample) for child in children)
     if kind is And:
-        return int(left > right)
-    if kind is Or:
-        return int(left < right)
-    if kind is Implies:
-        return int(-left < right)
-    if kind is Iff:
-        is_forward = max(-left, right) <= max(-right, left)
-        return int(-left < right) if is_forward else int(-right >= left)
-    raise TypeError(f"{kind.__name__} has no two sides")
-
-
-def _decider_of_until(part: Part, buffer: Floats, sample: int, window: tuple[int, int]) -> tuple[Part, int]:
-    first, last = window
-    left, right = part.children
-    lefts = left.over(buffer, sample, last)
-    lowest = np.minimum.accumulate(lefts)[first - sample :]
-    rights = right.over(buffer, first, last)
-    best = int(np.minimum(lowest, rights).argmax())
-    if lowest[best] <= rights[best]:
-        return left, sample + int(lefts[: first - sample + best + 1].argmin())
-    return right, first + best
+        is_right = one > other
+    elif kind is Or:
+        is_right = one < other
+    elif kind is Implies or max(-one, other) <= max(-other, one):
+        is_right = -one < other
+    else:  # of an equivalence the implication backwards
+        is_right = -other >= one
+    return children[is_right], sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,23 +205,22 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     steps = []
     chain: list[Formula] = []
     for here, following in zip(path, [*path[1:], path[-1]], strict=True):
-        formula, time = here.part.formula, float(times[here.sample])
+        formula, time, decider = here.part.formula, float(times[here.sample]), following.part.formula
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
+        chain = chain or _links(formula)
+        text = plain = ""
         if isinstance(formula, Predicate):
             text = plain = _comparison(formula, here.value, trajectory.at(time))
-        elif isinstance(formula, And | Or) and len(chain or _links(formula)) > 2:
-            chain = chain or _links(formula)
-            text = plain = ""
-            if type(following.part.formula) is not type(formula):
-                text = plain = _of_chain(formula, chain, following.part.formula)
-                chain = []
-        else:
-            decided_at = float(times[following.sample])
-            text, plain = _words(formula, following.part.formula, window, decided_at, here.value)
+        elif not isinstance(formula, And | Or) or len(chain) <= 2:
+            text, plain = _words(formula, decider, window, float(times[following.sample]), here.value)
+        elif type(decider) is not type(formula):  # the end of a chain
+            name, number = "and" if isinstance(formula, And) else "or", chain.index(decider) + 1
+            text = plain = f"part {number} of {len(chain)} joined by '{name}' decided"
+        if type(decider) is not type(formula) or len(chain) <= 2:
+            chain = []
         steps.append(Step(formula, time, here.value, window, text, plain))
-    vacuities = {
-        v.implication: v for part in root.walk() for v in [_vacuity(part, buffer, times)] if v is not None
-    }
+    found = (_vacuity(part, buffer, times) for part in root.walk())
+    vacuities = {v.implication: v for v in found if v is not None}
     critical = float(times[path[-1].sample])
     return Diagnosis(path[0].value, critical, tuple(steps), tuple(vacuities.values()))
 
@@ -256,12 +243,6 @@ def _links(formula: Formula) -> list[Formula]:
     """Parts of a chain of the same connective, from left to right."""
     parts = (_links(child) if type(child) is type(formula) else [child] for child in formula.children)
     return [part for found in parts for part in found]
-
-
-def _of_chain(formula: Formula, chain: list[Formula], decider: Formula) -> str:
-    name = "and" if isinstance(formula, And) else "or"
-    position = next(k for k, part in enumerate(chain, start=1) if part == decider)
-    return f"part {position} of {len(chain)} joined by '{name}' decided"
 
 
 def _words(
