@@ -36,50 +36,39 @@ def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | 
     )
 
 
-def with_context(problem: Problem) -> Problem:
+def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
     """Return the problem with what its context files say.
+
+    Args:
+        problem: the problem.
+        is_told: whether a language model will be told; else only the crossings are kept, for engines, which
+            send nothing.
 
     Raises:
         SpecError: naming the file that cannot be read, or the line that looks like a secret.
         ModelError: if an archive is damaged or dangerous.
     """
-    if not problem.named_context or problem.context != Context():
-        return problem
-    found = _gathered(problem, is_told=True)
-    for note in found.notes:
-        _say_once(note)
-    return replace(problem, context=found)
-
-
-def _gathered(problem: Problem, *, is_told: bool) -> Context:
     from falsifier.context.gather import gather
 
+    named = problem.named_context
+    if not named or problem.context != Context():
+        return problem
     searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     seeds = problem.requirement.formula.signals
-    signals = dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))
-    named = problem.named_context
-    fmus = fmu_files(problem.model) if named.fmu else {}
-    return gather(
+    found = gather(
         named.files,
-        fmus,
+        fmu_files(problem.model) if named.fmu else {},
         seeds=tuple(seeds),
-        signals=tuple(signals),
+        signals=tuple(dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))),
         checked=named.checked,
         ranges={r.name: (r.low, r.high) for r in searched},
         is_told=is_told,
     )
-
-
-def with_crossings(problem: Problem) -> Problem:
-    """Return the problem with nothing of its context but the crossings: for engines, which send nothing.
-
-    Raises:
-        SpecError: naming the file that cannot be read.
-        ModelError: if an archive is damaged or dangerous.
-    """
-    if not problem.named_context or problem.context != Context():
-        return problem
-    return replace(problem, context=Context(crossings=_gathered(problem, is_told=False).crossings))
+    if not is_told:
+        return replace(problem, context=Context(crossings=found.crossings))
+    for note in found.notes:
+        _say_once(note)
+    return replace(problem, context=found)
 
 
 @lru_cache(maxsize=1000)

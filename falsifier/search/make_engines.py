@@ -11,7 +11,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.engines.refining import Refining, Stage
 from falsifier.errors import SpecError
 from falsifier.llm.messages import Chat
-from falsifier.problem.context import with_crossings
+from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
 from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.request import LLMSettings, RunRequest
@@ -82,7 +82,8 @@ def told_problems(
     known = [replace(p, context=recorded[p.name]) if p.name in recorded else p for p in problems]
     if llm is None:
         engine = ENGINES.get(request.engine or DEFAULT_ENGINE)
-        return [with_crossings(p) for p in known] if engine is not None and engine.uses_context else known
+        is_read = engine is not None and engine.uses_context
+        return [with_context(p, is_told=False) if is_read else p for p in known]
     from falsifier.engines.briefing import told_context
 
     return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]

@@ -116,39 +116,40 @@ class _Translation:
         until = f"({text} until {both})"
         if window is None:
             return until
-        start, end = window_samples(window, self.trajectory.step or 1.0)
+        start, end = self.samples(window)
         within = f"((eventually[{start},{end}] {both}) and (eventually[{start},{start}] {until}))"
         return f"((always[0,{start - 1}] {text}) and {within})" if start else within
 
+    def samples(self, window: Window) -> tuple[int, int]:
+        return window_samples(window, self.trajectory.step or 1.0)
+
     def window(self, window: Window | None) -> str:
         """Return the text of a window in samples."""
-        if window is None:
-            return ""
-        start, end = window_samples(window, self.trajectory.step or 1.0)
-        return f"[{start},{end}]"
+        return "[{},{}]".format(*self.samples(window)) if window else ""
+
+    def column(self, values: list[float]) -> str:
+        """Add a column and return its alias."""
+        alias = f"v{len(self.columns)}"
+        self.columns[alias] = values
+        return alias
 
     def inside(self, window: Window) -> str:
         """Return the alias of a column that is infinite in a window and minus infinite outside."""
-        start, end = window_samples(window, self.trajectory.step or 1.0)
-        alias = f"v{len(self.columns)}"
-        self.columns[alias] = [inf if start <= k <= end else -inf for k in range(len(self.trajectory))]
-        return alias
+        start, end = self.samples(window)
+        return self.column([inf if start <= k <= end else -inf for k in range(len(self.trajectory))])
 
     def side(self, expression: Expression) -> str:
         """Return the text of a compared expression: a number, or the alias of its column."""
         if isinstance(expression, Number):
             return number_text(expression.value)
         if expression not in self.aliases:
-            self.aliases[expression] = f"v{len(self.columns)}"
-            self.columns[self.aliases[expression]] = self.values(expression).tolist()
+            self.aliases[expression] = self.column(self.values(expression).tolist())
         return self.aliases[expression]
 
     def truth(self, predicate: Predicate) -> str:
         """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""
         true = np.broadcast_to(predicate.holds(self.trajectory.columns), self.trajectory.times.shape)
-        alias = f"v{len(self.columns)}"
-        self.columns[alias] = np.where(true, 1.0, -1.0).tolist()
-        return alias
+        return self.column(np.where(true, 1.0, -1.0).tolist())
 
     def values(self, expression: Expression) -> NDArray[np.float64]:
         """Return the values of a compared expression at all samples."""
