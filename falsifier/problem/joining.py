@@ -136,10 +136,6 @@ def join_formula(
     if isinstance(model, Path) and not model.is_file():
         raise SpecError(f"{path}: no such file; give the path of an .fmu file")
     if isinstance(model, Path) and is_package(model):
-        if changes.interface == "model-exchange":
-            raise SpecError(
-                f"{path}: the components of a system have interfaces of their own; leave --interface out"
-            )
         model = replace(read_package(model), logging=bool(changes.logging))
     data: dict[str, Any]
     if isinstance(model, Path):
@@ -147,6 +143,10 @@ def join_formula(
         interface = changes.interface or default_interface(info)
         data = {"model": {"fmu": str(model.resolve()), "interface": interface}}
     else:
+        if changes.interface == "model-exchange":
+            raise SpecError(
+                f"{path}: the components of a system have interfaces of their own; leave --interface out"
+            )
         info = model.info
         system = replace(model, allow=(*model.allow, *changes.allow), deny=(*model.deny, *changes.deny))
         data = {"model": {}, "components": {n: {"fmu": str(part.fmu)} for n, part in model.parts.items()}}

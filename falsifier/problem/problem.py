@@ -83,7 +83,7 @@ class Problem:
 
     @staticmethod
     def from_fmu(
-        fmu: str | Path,
+        fmu: str | Path | System,
         formula: str,
         *,
         name: str = STL_NAME,
@@ -99,14 +99,14 @@ class Problem:
         allow: Sequence[str] = (),
         deny: Sequence[str] = (),
     ) -> "Problem":
-        """Return the problem for an FMU and a formula.
+        """Return the problem for an FMU, an SSP package or a system of FMUs, and a formula.
 
         Args:
-            fmu: path of the FMU.
+            fmu: path of the FMU or package, or the system, whose variables are ``component.variable``.
             formula: the requirement, in Signal Temporal Logic.
             name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
-                all real inputs with a min and a max are.
+                all real inputs with a min and a max are. Inputs that are connected cannot be searched.
             parameters: values of parameters and start values, or ranges to search, by name.
             stop_time: end of each simulation in s; default: the FMU's.
             output_interval: step of the monitored time grid in s; default: the FMU's step, or the next
@@ -115,7 +115,8 @@ class Problem:
             tolerance: relative tolerance of the solver; default: the FMU's.
             time_limit: maximum wall-clock time of one simulation in s; default: 60 for each tenth of the
                 simulated time.
-            interface: interface of the FMU; default: co-simulation if the FMU offers it.
+            interface: interface of the FMU; default: co-simulation if the FMU offers it. The components of a
+                system have interfaces of their own.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
             allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file
                 or folder that may hold keys), ``programs`` (execute programs).
@@ -126,6 +127,8 @@ class Problem:
             ModelError: if the FMU cannot be read or simulated.
 
         >>> Problem.from_fmu("my.fmu", "G[0,10] (h >= 0)", inputs={"u": (-1, 1)})  # doctest: +SKIP
+        >>> system = System({"plant": "plant.fmu", "pi": "pi.fmu"}, {"plant.u": "pi.y"})  # doctest: +SKIP
+        >>> Problem.from_fmu(system, "G[0,10] (plant.h >= 0)")  # doctest: +SKIP
         """
         from falsifier.problem.joining import join_formula
 
@@ -142,62 +145,14 @@ class Problem:
             deny=deny,
         )
         stated = RequirementSection(formula=formula)
-        joined = join_formula(Path(fmu), stated, changes=changes, name=name)
-        source = ProblemSource(
-            target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
-        )
-        return replace(Problem.of(joined), source=source, named_context=Named.of(context))
-
-    @staticmethod
-    def from_system(
-        system: System,
-        formula: str,
-        *,
-        name: str = STL_NAME,
-        inputs: Mapping[str, InputChoice] | None = None,
-        parameters: Mapping[str, ParameterChoice] | None = None,
-        stop_time: float | None = None,
-        output_interval: float | None = None,
-        step_size: float | None = None,
-        tolerance: float | None = None,
-        time_limit: float | None = None,
-    ) -> "Problem":
-        """Return the problem for a system of FMUs and a formula.
-
-        Args:
-            system: components and connections; its variables are ``component.variable``.
-            formula: the requirement, in Signal Temporal Logic.
-            name: the requirement's name, in results and records.
-            inputs: as for ``from_fmu``; inputs that are connected cannot be searched.
-            parameters: as for ``from_fmu``.
-            stop_time: end of each simulation in s; default: the components', if they agree.
-            output_interval: step of the monitored time grid in s; default: fits the components' steps, the
-                stop time and the formula's times.
-            step_size: communication step in s; default: the output interval.
-            tolerance: relative tolerance of the components' solvers.
-            time_limit: maximum wall-clock time of one simulation in s; default: 60 for each tenth of the
-                simulated time.
-
-        Raises:
-            SpecError: naming what is wrong or unknown.
-            ModelError: if the system cannot be simulated.
-
-        >>> system = System({"plant": "plant.fmu", "pi": "pi.fmu"}, {"plant.u": "pi.y"})  # doctest: +SKIP
-        >>> Problem.from_system(system, "G[0,10] (plant.h >= 0)")  # doctest: +SKIP
-        """
-        from falsifier.problem.joining import join_formula
-
-        changes = changes_from(
-            inputs=inputs,
-            parameters=parameters,
-            stop_time=stop_time,
-            output_interval=output_interval,
-            step_size=step_size,
-            tolerance=tolerance,
-            time_limit=time_limit,
-        )
-        stated = RequirementSection(formula=formula)
-        return Problem.of(join_formula(system, stated, changes=changes, name=name))
+        model = fmu if isinstance(fmu, System) else Path(fmu)
+        problem = Problem.of(join_formula(model, stated, changes=changes, name=name))
+        source = None
+        if not isinstance(fmu, System):
+            source = ProblemSource(
+                target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
+            )
+        return replace(problem, source=source, named_context=Named.of(context))
 
     @staticmethod
     def of(joined: "Joined") -> "Problem":

@@ -85,17 +85,17 @@ def test_a_command_that_needs_one_fmu_names_those_of_the_system(spec: Path, tmp_
 
 
 def test_a_problem_made_in_python_is_searched() -> None:
-    problem = Problem.from_system(
+    problem = Problem.from_fmu(
         loop(), "G[0,10] (plant.y <= 1.2)", inputs={"pi.r": (0.0, 2.0, 3)}, output_interval=0.1
     )
     assert falsify(problem, engine="corners", budget=3).falsified
-    everything = Problem.from_system(loop(), "G[0,10] (plant.y <= 1.2)")
+    everything = Problem.from_fmu(loop(), "G[0,10] (plant.y <= 1.2)")
     assert everything.space.names == ("pi.r",), "inputs with limits that nothing feeds"
 
 
 def test_what_only_the_coupling_violates_is_fragile() -> None:
     """With a gain of 30 the loop oscillates at a step of 0.1 s, and does not at half of it."""
-    problem = Problem.from_system(
+    problem = Problem.from_fmu(
         loop(), "G[0,5] (plant.y <= 1.3)", parameters={"pi.k": 30.0}, inputs={"pi.r": (0.0, 1.0, 1)},
         stop_time=5.0, output_interval=0.1,
     )  # fmt: skip
@@ -113,7 +113,7 @@ def test_workers_get_the_files_that_they_miss(tmp_path: Path, monkeypatch: pytes
     for name in ("Plant_2", "Gain_2"):
         (folder / f"{name}.fmu").write_bytes(path(name).read_bytes())
     system = System({"plant": folder / "Plant_2.fmu", "pi": folder / "Gain_2.fmu"}, {"plant.u": "pi.y"})
-    problem = Problem.from_system(system, "G[0,1] (plant.y <= 5)", stop_time=1.0)
+    problem = Problem.from_fmu(system, "G[0,1] (plant.y <= 5)", stop_time=1.0)
     contents = {digest: file.read_bytes() for file, digest in fmu_files(system).items()}
     for file in fmu_files(system):
         file.unlink()

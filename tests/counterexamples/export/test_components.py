@@ -26,7 +26,7 @@ LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", ex
 
 
 def problem_of(model: System) -> Problem:
-    return Problem.from_system(
+    return Problem.from_fmu(
         model,
         "G (plant.y <= 10)",
         inputs={"pi.r": (0.0, 2.0)},
@@ -95,7 +95,7 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
                     data = data.replace(f'name="{old}" value'.encode(), written.encode())
             target.writestr(entry.filename, data)
     links = {f"plant.{odd['u']}": "pi.y", "pi.measured": f"plant.{odd['y']}"}
-    whole = Problem.from_system(
+    whole = Problem.from_fmu(
         System({"plant": renamed, "pi": path("Gain_2")}, links),
         "G (plant.height.always <= 10)",
         inputs={"pi.r": (0.0, 2.0)},

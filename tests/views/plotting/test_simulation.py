@@ -180,7 +180,7 @@ def test_what_failed_has_nothing_to_draw() -> None:
 def test_the_panels_of_a_system_are_headed_by_their_components() -> None:
     model = system({"plant": "Plant_2", "pi": "Gain_2"}, LOOP)
     formula, inputs = "G (pi.y <= 1 and plant.y <= 2)", {"pi.r": (0.0, 2.0)}
-    problem = Problem.from_system(model, formula, inputs=inputs, stop_time=1.0, output_interval=0.1)
+    problem = Problem.from_fmu(model, formula, inputs=inputs, stop_time=1.0, output_interval=0.1)
     evaluation = evaluate(problem, problem.space.decode(problem.space.bounds.T[1]))
     heads = [(ax.get_title("left"), ax.get_ylabel()) for ax in plot_evaluation(problem, evaluation).axes]
     named = [head for head in heads if head[1]]
