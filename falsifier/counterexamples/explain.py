@@ -101,7 +101,7 @@ class Explanation:
             found = f"It is not violated here; {shown(robustness):.5g} is missing to a violation ({named})"
             if is_on_limit(robustness):
                 found = f"It {margin_words(robustness, str(self.diagnosis.path[-1].formula))}"
-            yield f"{found}: {self.diagnosis.plain}"
+            yield f"{found}: {self.diagnosis.text}"
             return
         yield f"What broke: {verdict.breach.text}."
         decided = f"decided by {verdict.predicate} at {verdict.critical_time:.5g} s"

@@ -5,7 +5,7 @@ earliest sample and the left operand; ``or`` and ``->`` are treated as negated c
 to the left operand too. For until, too, the path goes to the left operand if both are equal.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, log10
 from typing import NamedTuple
@@ -110,8 +110,7 @@ class Step:
         time: time in s at which it was evaluated.
         value: its robustness at that time.
         window: start and end in s of its operator's window; None if it has no window.
-        text: what happened here, in words that name the operator.
-        plain: the same for readers who do not know the operators.
+        text: what happened here, in words; empty within a chain of ``and`` or ``or``.
     """
 
     formula: Formula
@@ -119,7 +118,6 @@ class Step:
     value: float
     window: tuple[float, float] | None
     text: str
-    plain: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,15 +177,7 @@ class Diagnosis:
     @property
     def text(self) -> str:
         """The path in words, followed by the vacuous implications."""
-        return self._told([step.text for step in self.path])
-
-    @property
-    def plain(self) -> str:
-        """The same for readers who do not know the operators of formulas."""
-        return self._told([step.plain for step in self.path])
-
-    def _told(self, steps: Sequence[str]) -> str:
-        *above, predicate = (step for step in steps if step)
+        *above, predicate = (step.text for step in self.path if step.text)
         decided = f"{'; '.join(above)}: {predicate}" if above else predicate
         return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
@@ -208,17 +198,17 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
         formula, time, decider = here.part.formula, float(times[here.sample]), following.part.formula
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
         chain = chain or _links(formula)
-        text = plain = ""
+        text = ""
         if isinstance(formula, Predicate):
-            text = plain = _comparison(formula, here.value, trajectory.at(time))
+            text = _comparison(formula, here.value, trajectory.at(time))
         elif not isinstance(formula, And | Or) or len(chain) <= 2:
-            text, plain = _words(formula, decider, window, float(times[following.sample]), here.value)
+            text = _words(formula, decider, window, float(times[following.sample]), here.value)
         elif type(decider) is not type(formula):  # the end of a chain
             name, number = "and" if isinstance(formula, And) else "or", chain.index(decider) + 1
-            text = plain = f"part {number} of {len(chain)} joined by '{name}' decided"
+            text = f"part {number} of {len(chain)} joined by '{name}' decided"
         if type(decider) is not type(formula) or len(chain) <= 2:
             chain = []
-        steps.append(Step(formula, time, here.value, window, text, plain))
+        steps.append(Step(formula, time, here.value, window, text))
     found = (_vacuity(part, buffer, times) for part in root.walk())
     vacuities = {v.implication: v for v in found if v is not None}
     critical = float(times[path[-1].sample])
@@ -247,33 +237,26 @@ def _links(formula: Formula) -> list[Formula]:
 
 def _words(
     formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
-) -> tuple[str, str]:
-    """Say what happened at an operator: with its name, and for readers who do not know it."""
-    at, (start, end) = seconds(time), window or (0.0, 0.0)
-    during = f"from {number(start)} to {seconds(end)}"
-    is_left = bool(formula.children) and decider is formula.children[0]
-    side, came = "left" if is_left else "right", "decided" if value >= 0 else "failed"
+) -> str:
+    """Say what happened at an operator."""
+    side = "left" if formula.children and decider is formula.children[0] else "right"
     match formula:
         case Always():
-            return f"G {_over(window)} was lowest at {at}", f"{during}, the worst moment is {at}"
+            return f"G {_over(window)} was lowest at {seconds(time)}"
         case Eventually():
-            return f"F {_over(window)} was highest at {at}", f"{during}, the best moment is {at}"
+            return f"F {_over(window)} was highest at {seconds(time)}"
         case Until():
-            what = "what must hold until then" if is_left else "what must happen"
-            text = f"U {_over(window)} was decided by its {side} side at {at}"
-            return text, f"{during}, {what} decided at {at}"
-        case Implies() if is_left:
-            return "the condition of -> decided", "the condition (the part after 'if') decided"
+            return f"U {_over(window)} was decided by its {side} side at {seconds(time)}"
+        case Implies() if side == "left":
+            return "the condition of -> decided"
         case Implies():
-            return f"the consequence of -> {came}", f"the condition was met, and what must follow {came}"
+            return f"the consequence of -> {'decided' if value >= 0 else 'failed'}"
         case Next():
-            text = f"the next recorded time is {at}"
+            return f"the next recorded time is {seconds(time)}"
         case Not():
-            text = f"'not' {'holds' if value >= 0 else 'fails'}"
-        case _:
-            name = "and" if isinstance(formula, And) else "or" if isinstance(formula, Or) else "<->"
-            text = f"the {side} side of '{name}' decided"
-    return text, text
+            return f"'not' {'holds' if value >= 0 else 'fails'}"
+    name = "and" if isinstance(formula, And) else "or" if isinstance(formula, Or) else "<->"
+    return f"the {side} side of '{name}' decided"
 
 
 def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:

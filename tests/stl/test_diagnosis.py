@@ -118,26 +118,6 @@ def test_diagnoses_end_where_verdicts_do() -> None:
         assert abs(found.path[-1].value) == pytest.approx(abs(verdict.robustness))
 
 
-@pytest.mark.parametrize(
-    ("formula", "expected"),
-    [
-        ("G[0,10] (x <= 5)", "from 0 to 10 s, the worst moment is 10 s: x = 10 exceeds 5 by 5."),
-        ("F[0,5] (x >= 8)", "from 0 to 5 s, the best moment is 5 s: x = 5 is below 8 by 3."),
-        (
-            "G[0,10] (x >= 3 -> x <= 5)",
-            "from 0 to 10 s, the worst moment is 10 s; the condition was met, and what must follow failed: "
-            "x = 10 exceeds 5 by 5.",
-        ),
-        (
-            "(x <= 2) U[0,5] (x >= 8)",
-            "from 0 to 5 s, what must hold until then decided at 5 s: x = 5 exceeds 2 by 3.",
-        ),
-    ],
-)
-def test_plain_words_name_no_operator(formula: str, expected: str) -> None:
-    assert diagnose(formula, x=[float(t) for t in range(11)]).plain == expected
-
-
 def test_numbers_that_differ_read_as_different() -> None:
     assert diagnose("x <= 87.5", x=[87.5 + 1.08e-5]).text == "x = 87.500011 exceeds 87.5 by 1.08e-05."
     assert diagnose("x <= 87.5", x=[87.4]).text == "x = 87.4 is below 87.5 by 0.1."
