@@ -8,7 +8,7 @@ Negations are carried down instead of rewriting the formula: a demand is a part 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -194,46 +194,27 @@ class _Demand(NamedTuple):
         return self.margins(buffer, span) > 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Condition:
-    """A demand that was met, and at which sample; None: at that of the shortfall."""
-
-    demand: _Demand
-    sample: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class _Spot:
+class _Spot(NamedTuple):
     """Where a demand was not met.
 
     Attributes:
         sample: the sample.
         scope: window in which it had to be met throughout; None if at this sample only.
         guards: demands from the operator of that window down to here.
-        notes: what made it necessary.
+        held: conditions at this sample that were met, which made it necessary.
+        notes: what else made it necessary, in words.
         sought: what held at no time of a window, in words; here it came nearest.
     """
 
     sample: int
     scope: Span | None = None
     guards: tuple[_Demand, ...] = ()
-    notes: tuple[_Condition | str, ...] = ()
+    held: tuple[_Demand, ...] = ()
+    notes: tuple[str, ...] = ()
     sought: str = ""
 
-    def noted(self, *notes: _Condition | str) -> "_Spot":
-        return replace(self, notes=(*self.notes, *notes))
-
-    def moved(self, sample: int, scope: Span | None = None) -> "_Spot":
-        """Another sample; conditions stay at the one at which they were asked."""
-        return _Spot(sample, scope, (), self.settled.notes, self.sought)
-
-    @property
-    def settled(self) -> "_Spot":
-        notes = (
-            replace(n, sample=self.sample) if isinstance(n, _Condition) and n.sample is None else n
-            for n in self.notes
-        )
-        return replace(self, notes=tuple(notes))
+    def under(self, *conditions: _Demand) -> "_Spot":
+        return self._replace(held=(*self.held, *conditions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +226,7 @@ class _Search:
 
     def at(self, demand: _Demand, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was not met at a sample."""
-        spot = replace(spot, guards=(*spot.guards, demand))
+        spot = spot._replace(guards=(*spot.guards, demand))
         here = (spot.sample, spot.sample)
         window = demand.part.window_at(spot.sample) or here
         operands = demand.operands
@@ -253,15 +234,15 @@ class _Search:
             case Predicate():
                 yield self._compared(demand, spot)
             case Next():
-                yield from self.at(operands[0], spot.moved(spot.sample + 1))
+                yield from self.at(operands[0], self._moved(spot, spot.sample + 1))
             case Until() if demand.wanted:
                 yield from self._until(operands[0], operands[1], window, spot)
             case Until():
                 left, right = operands
                 met = self._first(right.opposite, window)
-                yield from self.at(right, spot.noted(_Condition(left.opposite)).moved(met))
+                yield from self.at(right, self._moved(spot.under(left.opposite), met))
             case Implies() if demand.wanted:  # apart from other choices, as the consequence may be negated
-                yield from self.at(operands[1], spot.noted(_Condition(operands[0].opposite)))
+                yield from self.at(operands[1], spot.under(operands[0].opposite))
             case Iff():
                 yield from self._unequal(demand, spot)
             case _ if demand.is_throughout:
@@ -272,9 +253,9 @@ class _Search:
                 # "not p or q" is read as "p -> q": what had to be false is a condition that held.
                 refused, choices = ([d for d in operands if d.wanted is w] for w in (False, True))
                 if choices:
-                    spot = spot.noted(*(_Condition(d.opposite) for d in refused))
+                    spot = spot.under(*(d.opposite for d in refused))
                 if len(choices) != 1:  # then all conditions are told of the same sample
-                    spot = spot.settled
+                    spot = self._settled(spot)
                 for choice in choices or operands:
                     yield from self.at(choice, spot)
             case _:
@@ -286,12 +267,12 @@ class _Search:
             yield from self._throughout(demand.operands[0], _inner(demand.part, window), spot)
         else:
             sample = window[0] + int(demand.margins(self.buffer, window).argmin())
-            yield from self.at(demand, spot.moved(sample, window))
+            yield from self.at(demand, self._moved(spot, sample, window))
 
     def _never(self, demand: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was met at no sample of a window."""
         if isinstance(demand.formula, Predicate):
-            yield self._compared(demand, spot.settled, window)
+            yield self._compared(demand, self._settled(spot), window)
         elif demand.is_sometime:
             yield from self._never(demand.operands[0], _inner(demand.part, window), spot)
         elif demand.is_choice:
@@ -301,10 +282,9 @@ class _Search:
             best = window[0] + int(demand.margins(self.buffer, window).argmax())
             if window[0] < window[1] and not spot.sought:
                 over, near = _over(*map(self._time, window)), seconds(self._time(best))
-                spot = replace(
-                    spot, sought=f"{demand.text} held at no time {over}; it came nearest at {near}"
-                )
-            yield from self.at(demand, spot.moved(best))
+                sought = f"{demand.text} held at no time {over}; it came nearest at {near}"
+                spot = spot._replace(sought=sought)
+            yield from self.at(demand, self._moved(spot, best))
 
     def _until(self, left: _Demand, right: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         if not right.met(self.buffer, window).any():
@@ -312,7 +292,8 @@ class _Search:
             return
         met = self._first(right, window)
         note = f"it had to hold until {right.text}, which held at {seconds(self._time(met))}"
-        yield from self._throughout(left, (spot.sample, met), spot.noted(note))
+        spot = self._settled(spot)
+        yield from self._throughout(left, (spot.sample, met), spot._replace(notes=(*spot.notes, note)))
 
     def _unequal(self, demand: _Demand, spot: _Spot) -> Iterator[Shortfall]:
         """Why an equivalence failed, told from a side that held; if none did, from what the left one was."""
@@ -321,10 +302,8 @@ class _Search:
         if demand.wanted and not is_true:
             left, right = right, left
         held = is_true or demand.wanted
-        yield from self.at(
-            right if held is demand.wanted else right.opposite,
-            spot.noted(_Condition(left if held else left.opposite)),
-        )
+        failed = right if held is demand.wanted else right.opposite
+        yield from self.at(failed, spot.under(left if held else left.opposite))
 
     def _compared(self, demand: _Demand, spot: _Spot, window: Span | None = None) -> Shortfall:
         """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
@@ -355,7 +334,7 @@ class _Search:
             never=window is not None,
             reading=reading,
             sought=spot.sought,
-            context=tuple(self._told(note, sample) for note in spot.notes),
+            context=(*spot.notes, *(f"while {self._held(d, sample, now=True)}" for d in spot.held)),
         )
 
     def _stretch(self, spot: _Spot) -> Span:
@@ -368,20 +347,25 @@ class _Search:
         before, after = good[good < spot.sample], good[good > spot.sample]
         return int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
 
-    def _told(self, note: _Condition | str, sample: int) -> str:
-        if isinstance(note, str):
-            return note
-        at = sample if note.sample is None else note.sample
-        text, time, formula = note.demand.text, seconds(self._time(at)), note.demand.formula
-        names, read = formula.signals, ""
-        if len(names) <= _MOST_SIGNALS and not formula.horizon(self.trajectory.step):
-            values, units = self._signals(at), self.trajectory.units
+    def _settled(self, spot: _Spot) -> _Spot:
+        """The same spot; its conditions are told with the time at which they were asked."""
+        told = (f"after {self._held(condition, spot.sample)}" for condition in spot.held)
+        return spot._replace(held=(), notes=(*spot.notes, *told))
+
+    def _moved(self, spot: _Spot, sample: int, scope: Span | None = None) -> _Spot:
+        return self._settled(spot)._replace(sample=sample, scope=scope, guards=())
+
+    def _held(self, condition: _Demand, sample: int, *, now: bool = False) -> str:
+        """Say that a condition held, with its signals' values; ``now``: where the shortfall was."""
+        names, at, read = condition.formula.signals, seconds(self._time(sample)), ""
+        if len(names) <= _MOST_SIGNALS and not condition.formula.horizon(self.trajectory.step):
+            values, units = self._signals(sample), self.trajectory.units
             read = ", ".join(
                 f"{name_text(n)} = {number(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
             )
-        if note.sample is None:
-            return f"while {text} held{f' ({read} at {time})' if read else ''}"
-        return f"after {text} held at {time}{f' ({read})' if read else ''}"
+        if now:
+            return f"{condition.text} held{f' ({read} at {at})' if read else ''}"
+        return f"{condition.text} held at {at}{f' ({read})' if read else ''}"
 
     def _first(self, demand: _Demand, window: Span) -> int:
         """The first sample of a window at which a demand is met."""
