@@ -13,7 +13,6 @@ from falsifier.evaluation.evaluate import Evaluation, diagnosis_of
 from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
     Array,
-    Course,
     change_list,
     coarse_clock,
     column_decimals,
@@ -256,23 +255,19 @@ def told_accuracy(view: View, name: str, column: Array) -> float:
     return (TOLERANCE if in_formula else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
 
 
-def drawn_course(
-    view: View,
-    name: str,
-    inside: Trajectory,
-    column: Array,
-    *,
-    steps: Sequence[float] = (),
-    most: int = MOST_BREAKPOINTS,
-) -> Course:
+def _drawn(
+    view: View, name: str, inside: Trajectory, column: Array, steps: Sequence[float], most: int
+) -> str:
     """What is told of a signal, or of what is compared, over the time at which the requirement looks."""
+    if np.ptp(column) == 0:
+        return f"constant {plain(float(column[0]), column_decimals(column))}"
     claimed = told_accuracy(view, name, column)
     wanted = np.full_like(inside.times, claimed)
     for predicate in view.requirement.formula.predicates:
         if name in (str(predicate.left), str(predicate.right)):
             left, right = (side.evaluate(inside.columns) for side in (predicate.left, predicate.right))
             wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(np.asarray(left) - np.asarray(right)))
-    return course(
+    drawn = course(
         inside.times,
         column,
         tolerance=np.maximum(wanted, _FINEST * float(np.ptp(column))),
@@ -281,14 +276,6 @@ def drawn_course(
         kept=steps,
         most=most,
     )
-
-
-def _drawn(
-    view: View, name: str, inside: Trajectory, column: Array, steps: Sequence[float], most: int
-) -> str:
-    if np.ptp(column) == 0:
-        return f"constant {plain(float(column[0]), column_decimals(column))}"
-    drawn = drawn_course(view, name, inside, column, steps=steps, most=most)
     return drawn.text(clock=coarse_clock(view.space.stop_time))
 
 

@@ -144,13 +144,11 @@ class Questions:
         self._told += 1
         if evaluation.verdict is None and not self._variant.has("failures"):
             return
-        is_own = self._variant.has("history")
-        sample = self._seen(evaluation, doubt, why) if is_own else self._published(evaluation, doubt)
-        self._samples.append(sample)
-        if is_own:
-            self._shorten()
+        if self._variant.is_published:
+            self._samples = [*self._samples, self._published(evaluation, doubt)][-MOST_SAMPLES:]
         else:
-            del self._samples[:-MOST_SAMPLES]
+            self._samples.append(self._seen(evaluation, doubt, why))
+            self._shorten()
 
     def ask(
         self,
@@ -175,19 +173,15 @@ class Questions:
         """
         constant = self._standing(count)
         news = "\n\n".join(self._news(count, simulations, pending, notes, lessons))
-        aim = self._aim()
-        while True:
-            lasting = self._lasting()
-            size = self._count(constant) + self._count(lasting) + self._count(news)
-            latest = self._latest()
-            if size <= aim or not self._samples:
-                break
+        others, aim = self._count(constant) + self._count(news), self._aim()
+        while (size := others + self._count(self._lasting())) > aim and self._samples:
             self._drop()
         if size > self._tokens:
             raise ChatError(
                 f"the prompt needs {size} tokens without any history, but the limit is {self._tokens}: "
                 "raise the limit (prompt_tokens), or choose a plainer prompt variant (--variant)"
             )
+        lasting, latest = self._lasting(), self._latest()
         more = (latest,) if latest and size + self._count(latest) <= aim else ()
         changing = "\n\n".join(part for part in (lasting, *more, news) if part)
         return (
@@ -206,10 +200,10 @@ class Questions:
     def _lasting(self) -> str:
         if not self._samples:
             return ""
-        is_own = self._variant.has("history")
         left_out = f", {len(self._samples)} of {self._told}" if self._omitted else ""
         # The published prompts count the samples that they show, not all that there were.
-        numbered = ((s.number if is_own else n, s) for n, s in enumerate(self._samples, start=1))
+        published = self._variant.is_published
+        numbered = ((n if published else s.number, s) for n, s in enumerate(self._samples, start=1))
         told = (f"Sample {n}: {s.texts[s.depth]}" for n, s in numbered)
         return "\n\n".join((f"Samples so far{left_out}, in the order in which they were simulated:", *told))
 
@@ -235,10 +229,10 @@ class Questions:
         is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            none = "" if budget is None else "Nothing has been simulated yet; "
-            left = "" if budget is None else f"{counted(budget, 'simulation')} may be spent. "
             first = f"{self._advice_on_first()} " if is_own else ""
-            yield f"{first}{none}{left}Propose the first {wanted}."
+            if budget is not None:
+                first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
+            yield f"{first}Propose the first {wanted}."
             return
         if is_own and self._samples:
             yield from self._standings()
@@ -274,18 +268,14 @@ class Questions:
             return
         if self._is_flat():
             ranked = sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
-            yield _FLAT.format(
-                lowest=signed(levels.lowest, 3), count=levels.simulations, named=self._named(ranked)
-            )
+            lowest = signed(levels.lowest, 3)
+            yield _FLAT.format(lowest=lowest, count=levels.simulations, named=_named(ranked))
         else:
             ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
-            yield f"Lowest robustness so far: {self._named(ranked)}."
+            yield f"Lowest robustness so far: {_named(ranked)}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
-
-    def _named(self, ranked: Sequence[_Sample]) -> str:
-        return listed([f"sample {s.number}" for s in ranked[:_NAMED]])
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""
@@ -387,6 +377,10 @@ class Questions:
         if not self._variant.has("names") or self._reply == "points":
             return as_point(self.view, candidate)
         return as_values(self.view, candidate)
+
+
+def _named(ranked: Sequence[_Sample]) -> str:
+    return listed([f"sample {s.number}" for s in ranked[:_NAMED]])
 
 
 def _text(inputs: Sequence[str], *lines: str) -> str:
