@@ -39,7 +39,6 @@ def test_a_model_that_does_it_all() -> None:
 @pytest.mark.parametrize(
     ("step", "said"),
     [
-        (Step(""), "empty (null)"),
         (Step(None), "empty (null)"),
         (Step("", finish="length"), "lower the effort"),
         (Step("I am ready."), "not the JSON that was asked for"),

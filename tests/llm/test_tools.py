@@ -75,12 +75,7 @@ class TestPredictionTool:
         with pytest.raises(RejectedReplyError, match=problem):
             made.respond(call)
         assert "last call" in made.respond(about(0.5))
-
-    def test_the_limit(self) -> None:
-        made, _ = tool(calls=2)
-        assert "1 more call can be answered" in made.respond(about(0.5))
-        assert "last call" in made.respond(about(0.6))
-        with pytest.raises(RejectedReplyError, match="limit of 2 calls is reached"):
+        with pytest.raises(RejectedReplyError, match="limit of 1 call is reached"):
             made.respond(about(0.7))
 
     def test_too_many_candidates_are_cut(self) -> None:

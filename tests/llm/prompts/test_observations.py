@@ -92,11 +92,8 @@ def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     assert "robustness -1 V" in line(lines, "alternatives at t = 0 s: ")
 
 
-def test_signals_of_few_whole_numbers_are_told_by_their_changes() -> None:
-    steps = np.where(TIMES < 4.05, 1.0, 2.0)
-    view, evaluation = seen("G[0,10] (x <= 2)", steps)
-    assert line((facts(view, evaluation)), "x: ") == "x: 1, then 2 from 4.1 s"
-    assert courses(view, evaluation) == ["x: 1, then 2 from 4.1 s"]
+def test_signals_of_few_whole_numbers_are_told_by_their_changes_alone() -> None:
+    assert courses(*seen("G[0,10] (x <= 2)", np.where(TIMES < 4.05, 1.0, 2.0))) == ["x: 1, then 2 from 4.1 s"]
 
 
 def test_courses_are_breakpoints_and_more_exact_ones_where_it_was_decided() -> None:

@@ -77,9 +77,6 @@ def test_what_does_not_fit_is_left_out_and_counted() -> None:
     rng = np.random.default_rng(3)
     last = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (40, 5))), tokens=1900)[-1].content
     assert " of 40, in the order in which" in last and "Sample 40: " in last
-
-
-def test_a_question_that_is_too_long_without_samples_is_an_error() -> None:
     with pytest.raises(ChatError, match=r"needs \d+ tokens without any history, but the limit is 100"):
         Questions(View.of(PROBLEM), VARIANTS["MP5"], tokens=100).ask()
 
@@ -98,15 +95,6 @@ def test_what_decided_and_everything_there() -> None:
         "brake: constant 0",
     ):
         assert part in changing, part
-
-
-def test_conjuncts_and_sides_of_an_implication() -> None:
-    problem, evaluation = transmission("AT6a")
-    _, changing = told(problem, "MP5", [evaluation])
-    line = next(x for x in changing.splitlines() if "condition and consequence" in x)
-    assert "G[0,30] (rpm <= 3000) robustness -" in line
-    assert "rev/min; G[0,4] (speed <= 35) robustness -" in line
-    assert line.endswith("mph")
 
 
 def test_connectives_inside_a_chain_are_told_too_and_links_of_it_once() -> None:
