@@ -6,6 +6,7 @@ Parts of the requirement that never had a say, and inputs and parameters without
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,12 +32,44 @@ _MOST_NAMED = 4
 
 
 @dataclass(frozen=True, slots=True)
-class _Moment:
-    """When a part came closest to changing its truth, and the signals' values then."""
+class _Extreme:
+    """The smallest or largest margin of a part, when it had it, and the signals' values then."""
 
+    margin: float
     simulation: int
     time: float
     values: Mapping[str, float]
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What a search has seen of one part, wherever it stands in the same formula.
+
+    Attributes:
+        formula: the implication or disjunction to which the part belongs; for a predicate itself.
+        part: the condition of an implication, an operand of a disjunction, or a predicate.
+        lowest: its smallest margin.
+        highest: its largest margin.
+    """
+
+    formula: Formula
+    part: Formula
+    lowest: _Extreme | None = None
+    highest: _Extreme | None = None
+
+    @property
+    def low(self) -> float:
+        return inf if self.lowest is None else self.lowest.margin
+
+    @property
+    def high(self) -> float:
+        return -inf if self.highest is None else self.highest.margin
+
+    @property
+    def is_far(self) -> bool:
+        """Whether it kept one truth, by much more than it moved."""
+        margin = max(self.low, -self.high)
+        return not is_on_limit(margin) and margin > _FAR * (self.high - self.low)
 
 
 class Vacuity:
@@ -49,11 +82,13 @@ class Vacuity:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._monitor = monitor_for(problem)
-        self._parts = self._monitor.watched
-        self._lows = np.full(len(self._parts), np.inf)
-        self._highs = np.full(len(self._parts), -np.inf)
-        self._lowest: list[_Moment | None] = [None] * len(self._parts)
-        self._highest: list[_Moment | None] = [None] * len(self._parts)
+        seen: dict[tuple[Formula, Formula], _Seen] = {}
+        # One for each place that is watched; places of the same part of the same formula share it.
+        self._places = [
+            seen.setdefault((w.formula, w.part.formula), _Seen(w.formula, w.part.formula))
+            for w in self._monitor.watched
+        ]
+        self._parts = list(seen.values())
         self._effects = Effects(problem)
         self._count = 0
         self._robustness: set[float] = set()
@@ -74,49 +109,29 @@ class Vacuity:
             if not np.array_equal(first, trajectory[name]):
                 self._moved.add(name)
         found = self._monitor.extremes(trajectory)
-        for moments, times, is_new in (
-            (self._lowest, found.lowest, found.lows < self._lows),
-            (self._highest, found.highest, found.highs > self._highs),
-        ):
-            for i in np.flatnonzero(is_new):
-                moments[i] = _Moment(simulation, float(times[i]), trajectory.at(float(times[i])))
-        self._lows = np.minimum(self._lows, found.lows)
-        self._highs = np.maximum(self._highs, found.highs)
+        extremes = (x.tolist() for x in (found.lows, found.lowest, found.highs, found.highest))
+        for part, low, at_low, high, at_high in zip(self._places, *extremes, strict=True):
+            if low < part.low:
+                part.lowest = _Extreme(low, simulation, at_low, trajectory.at(at_low))
+            if high > part.high:
+                part.highest = _Extreme(high, simulation, at_high, trajectory.at(at_high))
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what was not tested by any simulation so far; the most important first."""
         if not self._count:
             return ()
         constant = tuple(self._constant())
-        never = [i for i in self._of(Implies) if max(self._highs[self._alike(i)]) < 0]
-        always = [i for i in self._of(Or) if min(self._lows[self._alike(i)]) > 0]
-        said = {predicate for i in never for predicate in self._parts[i].part.formula.predicates}
+        never = [part for part in self._parts if isinstance(part.formula, Implies) and part.high < 0]
+        always = [part for part in self._parts if isinstance(part.formula, Or) and part.low > 0]
+        said = {predicate for part in never for predicate in part.part.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
-        far = [] if constant else [i for i in self._of(Predicate) if self._is_far(i, said)]
+        predicates = [part for part in self._parts if isinstance(part.formula, Predicate) and not constant]
+        far = [part for part in predicates if part.is_far and part.formula not in said]
         found = (*map(self._condition, never), *map(self._disjunct, always), *map(self._far, far))
         unique = {(finding.kind, finding.part): finding for finding in found}
         # If nothing moves the requirement's signals, that has been said of everything that was searched.
         idle = self._effects.findings() if self._moved else ()
         return (*constant, *_hidden(self._problem), *unique.values(), *idle)
-
-    def _of(self, kind: type[Formula]) -> list[int]:
-        """Return the watched parts that belong to formulas of this kind."""
-        return [i for i, watched in enumerate(self._parts) if isinstance(watched.formula, kind)]
-
-    def _alike(self, i: int) -> list[int]:
-        """Return all places at which the same part of the same formula stands."""
-        one = self._parts[i]
-        return [
-            k
-            for k, other in enumerate(self._parts)
-            if (other.formula, other.part.formula) == (one.formula, one.part.formula)
-        ]
-
-    def _is_far(self, i: int, said: set[Predicate]) -> bool:
-        alike, formula = self._alike(i), self._parts[i].formula
-        low, high = min(self._lows[alike]), max(self._highs[alike])
-        margin = max(low, -high)
-        return formula not in said and not is_on_limit(margin) and bool(margin > _FAR * (high - low))
 
     @property
     def _in_all(self) -> str:
@@ -144,70 +159,49 @@ class Vacuity:
             return
         yield Finding(kind="constant", text=text, part=str(self._problem.requirement.formula), margin=value)
 
-    def _condition(self, i: int) -> Finding:
-        watched = self._parts[i]
-        return self._untested(
-            i,
-            "condition",
-            f"The condition {watched.part.formula} never held {self._in_all}, so {watched.formula} was not "
-            "tested. It must hold at some time",
-            "it was false",
+    def _condition(self, seen: _Seen) -> Finding:
+        what = (
+            f"The condition {seen.part} never held {self._in_all}, so {seen.formula} was not tested. It must "
+            "hold at some time"
         )
+        return _untested("condition", seen, seen.highest, what, "it was false")
 
-    def _disjunct(self, i: int) -> Finding:
-        watched = self._parts[i]
-        return self._untested(
-            i,
-            "disjunct",
-            f"{watched.part.formula} always held {self._in_all}, so the other side of {watched.formula} "
-            "was not tested. It must fail at some time",
-            "it held",
-            held=True,
+    def _disjunct(self, seen: _Seen) -> Finding:
+        what = (
+            f"{seen.part} always held {self._in_all}, so the other side of {seen.formula} was not tested. It "
+            "must fail at some time"
         )
+        return _untested("disjunct", seen, seen.lowest, what, "it held")
 
-    def _far(self, i: int) -> Finding:
-        held = bool(self._lows[i] > 0)
-        margin = self._lows[i] if held else -self._highs[i]
-        return self._untested(
-            i,
-            "threshold",
-            f"{self._parts[i].formula} was never near its threshold {self._in_all}: it moved by "
-            f"{self._highs[i] - self._lows[i]:.6g} and stayed {margin:.6g} away",
-            "it was off",
-            held=held,
+    def _far(self, seen: _Seen) -> Finding:
+        what = (
+            f"{seen.formula} was never near its threshold {self._in_all}: it moved by "
+            f"{seen.high - seen.low:.6g} and stayed {max(seen.low, -seen.high):.6g} away"
         )
+        return _untested("threshold", seen, seen.lowest if seen.low > 0 else seen.highest, what, "it was off")
 
-    def _untested(
-        self,
-        i: int,
-        kind: FindingKind,
-        what: str,
-        off: str,
-        *,
-        held: bool = False,
-    ) -> Finding:
-        """Return the finding about a part: what was not tested, and how close the part came to changing.
 
-        Args:
-            i: index of the part.
-            kind: what it is about.
-            what: what was not tested, in words.
-            off: how its margin is said if its values are not telling.
-            held: whether it was always true; otherwise it never was.
-        """
-        formula = self._parts[i].part.formula
-        moment = (self._lowest if held else self._highest)[i]
-        assert moment is not None, "a part is judged after it has been seen"
-        margin = float(self._lows[i] if held else -self._highs[i])
-        near = _reached(formula, moment.values) or f"{off} by {shown(margin):.6g}"
-        return Finding(
-            kind=kind,
-            text=f"{what}; at the closest, {near} {_when(moment)}.",
-            part=str(formula),
-            margin=margin,
-            time=moment.time,
-            simulation=moment.simulation,
-        )
+def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme | None, what: str, off: str) -> Finding:
+    """Return the finding about a part: what was not tested, and how close the part came to changing.
+
+    Args:
+        kind: what it is about.
+        seen: the part.
+        closest: when it came closest to changing its truth.
+        what: what was not tested, in words.
+        off: how its margin is said if its values are not telling.
+    """
+    assert closest is not None, "a part is judged after it has been seen"
+    margin = abs(closest.margin)
+    near = _reached(seen.part, closest.values) or f"{off} by {shown(margin):.6g}"
+    return Finding(
+        kind=kind,
+        text=f"{what}; at the closest, {near} (simulation {closest.simulation + 1}, {closest.time:.6g} s).",
+        part=str(seen.part),
+        margin=margin,
+        time=closest.time,
+        simulation=closest.simulation,
+    )
 
 
 def _reached(formula: Formula, values: Mapping[str, float]) -> str:
@@ -220,10 +214,6 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     if not all(name in values for side in sides for name in side.signals):
         return ""
     return listed([f"{side} reached {float(side.evaluate(values)):.6g}" for side in sides]) if sides else ""
-
-
-def _when(moment: _Moment) -> str:
-    return f"(simulation {moment.simulation + 1}, {moment.time:.6g} s)"
 
 
 def _hidden(problem: Problem) -> Iterator[Finding]:
