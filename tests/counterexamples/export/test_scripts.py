@@ -6,11 +6,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from runpy import run_path
 
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
+from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
 from falsifier.counterexamples.store import FILE_NAME, load, to_store
 from falsifier.evaluation.evaluate import evaluate
@@ -69,20 +72,62 @@ def test_the_replay_script_shows_what_broke_and_not_the_condition_that_decided()
     assert "'  <- violated: rpm <= 100'" in script
 
 
-def replayed(problem: Problem, values: list[float], directory: Path) -> dict[str, list[float]]:
-    """Export what a point gives, run replay.py there, and return the columns of its table."""
-    evaluation = evaluate(problem, problem.space.decode(values))
+def replayed(
+    problem: Problem, candidate: Candidate, directory: Path, *, rtol: float = 1e-9, atol: float = 1e-9
+) -> dict[str, list[float]]:
+    """Export a candidate, run replay.py, and return the columns of its table, which are as simulated here."""
+    evaluation = evaluate(problem, candidate)
+    problem.model.close()
     assert evaluation.trajectory is not None, evaluation.reason
     exported(problem, evaluation, "not used", directory)
-    script = directory / "replay.py"
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["replay.py"])
+        run_path(str(directory / "replay.py"))
     with (directory / "outputs.csv").open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
     found = {name: [float(row[k]) for row in rows] for k, name in enumerate(header)}
     for name in problem.experiment.outputs:
-        np.testing.assert_allclose(found[name], evaluation.trajectory[name], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(found[name], evaluation.trajectory[name], rtol=rtol, atol=atol)
     return found
+
+
+def somewhere(problem: Problem, seed: int = 1) -> Candidate:
+    low, high = problem.space.bounds.T
+    return problem.space.decode(np.random.default_rng(seed).uniform(low, high))
+
+
+@pytest.mark.parametrize("name", AT_INPUTS)
+def test_steps_reproduce_in_fmpy_wherever_they_are(name: str, tmp_path: Path) -> None:
+    problem = load_problem("AT1")
+    replayed(problem, problem.space.admit(AT_INPUTS[name]), tmp_path)
+
+
+@pytest.mark.parametrize("target", ["CC1", "F16"])
+def test_interpolated_inputs_and_start_values_reproduce_in_fmpy(target: str, tmp_path: Path) -> None:
+    problem = load_problem(target)
+    replayed(problem, somewhere(problem), tmp_path)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_inputs_of_all_types_reproduce_in_fmpy(version: int, tmp_path: Path) -> None:
+    real = "in_Real" if version == 2 else "in_Float64"
+    whole = "in_Integer" if version == 2 else "in_Int32"
+    problem = Problem.from_fmu(
+        fmu_path(f"Echo_{version}"),
+        f"G[0,2] ({real.replace('in', 'out')} <= 100)",
+        inputs={real: (-5, 5, 4), whole: (0, 9, 5), "in_Boolean": (0, 1, 3), "in_Enumeration": (1, 2, 2)},
+        stop_time=2.0,
+        output_interval=0.01,
+    )
+    found = replayed(problem, somewhere(problem, seed=version), tmp_path)
+    assert len(set(found[whole.replace("in", "out")])) > 2
+
+
+def test_a_model_exchange_solver_of_another_tool_gets_the_same_within_its_tolerance(tmp_path: Path) -> None:
+    spec = bundled("specs") / "CC.toml"
+    problem = load_problem(f"{spec}:CC1", interface="model-exchange", stop_time=100.0)
+    middle = problem.space.decode(problem.space.bounds.mean(axis=1))
+    replayed(problem, middle, tmp_path, rtol=1e-3, atol=1e-2)
 
 
 def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
@@ -92,28 +137,22 @@ def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
         inputs={"u[1]": (-1.0, 1.0, 2), "u[2]": (-1.0, 1.0, 2)},
         parameters={"A[1,2]": 0.5, "offset[2]": (0.0, 30.0)},
     )
-    found = replayed(problem, [1.0, -1.0, 0.5, 0.25, 7.0], tmp_path)
+    found = replayed(problem, problem.space.decode([1.0, -1.0, 0.5, 0.25, 7.0]), tmp_path)
     assert {"y[1]", "y[2]", "x[1]"} <= found.keys()
     assert json.loads((tmp_path / "start_values.json").read_text()) == {
         "A": [0.0, 0.5, -1.0, 0.0],
         "offset": [10.0, 7.0],
     }
     assert (tmp_path / "input.csv").read_text().splitlines()[:2] == ['"time","u"', "0.0,1.0 0.5"]
-    problem.model.close()
 
 
-def test_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:
-    problem = Problem.from_fmu(fmu_path("Aliases_3"), "G[0,10] (plant.u + plant.y <= 0)")
-    found = replayed(problem, [10.0] * len(problem.space.dimensions), tmp_path)
+def test_odd_names_and_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:
+    odd = Problem.from_fmu(fmu_path("OddNames_2"), "G[0,10] (größe.y <= 0)")
+    replayed(odd, somewhere(odd), tmp_path / "odd")
+    twice = Problem.from_fmu(fmu_path("Aliases_3"), "G[0,10] (plant.u + plant.y <= 0)")
+    found = replayed(twice, somewhere(twice), tmp_path)
     assert found["plant.y"] == found["y"]
     assert (tmp_path / "input.csv").read_text().splitlines()[0] == '"time","u"'
-    problem.model.close()
-
-
-def test_odd_names_reproduce_in_fmpy(tmp_path: Path) -> None:
-    problem = Problem.from_fmu(fmu_path("OddNames_2"), "G[0,10] (größe.y <= 0)")
-    replayed(problem, [10.0] * len(problem.space.dimensions), tmp_path)
-    problem.model.close()
 
 
 def test_strings_reproduce_in_fmpy(tmp_path: Path) -> None:
@@ -121,9 +160,8 @@ def test_strings_reproduce_in_fmpy(tmp_path: Path) -> None:
     problem = Problem.from_fmu(
         fmu_path("Table_2"), "G[0,1] (y <= 0)", parameters={"fileName": str(tmp_path / "gain.txt")}
     )
-    found = replayed(problem, [1.0] * len(problem.space.dimensions), tmp_path)
+    found = replayed(problem, problem.space.decode([1.0] * len(problem.space.dimensions)), tmp_path)
     assert found["y"][-1] == 2.5
-    problem.model.close()
 
 
 def imported(script: Path) -> set[str]:
@@ -186,3 +224,17 @@ def test_a_requirements_name_becomes_a_python_name() -> None:
     assert script is not None
     (function,) = (n for n in ast.parse(script).body if isinstance(n, ast.FunctionDef))
     assert function.name.startswith("test_r_1__a_")
+
+
+def test_what_does_not_apply_is_left_out(tmp_path: Path) -> None:
+    problem = lag_problem()
+    evaluation = evaluate(problem, problem.space.decode([1.0] * 4))
+    stored = to_store(confirmed(problem, evaluation))
+    files = export_counterexample(problem, stored, evaluation, tmp_path)
+    assert {f.name for f in files} == {
+        FILE_NAME,
+        "input.csv",
+        "inputs.mat",
+        "start_values.json",
+        "start_values.ssv",
+    }
