@@ -2,7 +2,7 @@
 
 import html
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
@@ -38,31 +38,16 @@ _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
-    """One way to tell a file.
-
-    Attributes:
-        name: what it is, in words.
-        text: makes it.
-    """
-
-    name: str
-    text: Callable[[], str]
-
-
-@dataclass(frozen=True, slots=True)
 class Readable:
     """What a file contains.
 
     Attributes:
-        forms: ways to tell it, the fullest first; the last one is always short.
-        found: thresholds in what the requirement depends on.
-        modes: names of signals with what the file says of their values.
+        forms: names and texts of the ways to tell it, the fullest first; the last one is always short.
+        found: thresholds in what the requirement depends on, and what else is said of signals.
     """
 
-    forms: tuple[Form, ...]
+    forms: tuple[tuple[str, str], ...]
     found: tuple[Threshold, ...] = ()
-    modes: tuple[tuple[str, str], ...] = ()
 
 
 def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
@@ -70,11 +55,11 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     only = upstream(diagram, seeds)
     whole = "structure" if only is None else "structure, as far as the requirement depends on it"
     forms = (
-        Form(whole, lambda: structure_text(diagram, only)),
-        Form("names only", lambda: names_text(diagram)),
-        Form("name only", lambda: _short(diagram.name)),
+        (whole, structure_text(diagram, only)),
+        ("names only", names_text(diagram)),
+        ("name only", _short(diagram.name)),
     )
-    return Readable(forms, tuple(diagram_thresholds(diagram, only)), tuple(_modes(diagram)))
+    return Readable(forms, (*_modes(diagram), *diagram_thresholds(diagram, only)))
 
 
 def source_of(text: str, shown: str) -> Source | None:
@@ -102,7 +87,7 @@ def of_source(
         signals: all signals of the model.
         is_named: whether the user named this file; other sources are told only if they set one of ``seeds``.
     """
-    short = Form("size only", lambda: counted(source.text.count("\n") + 1, "line"))
+    short = ("size only", counted(source.text.count("\n") + 1, "line"))
     if not is_named and roots_of(seeds).isdisjoint(source.names_set):
         return Readable((short,))
     alike = [each for each in library if each.is_modelica == source.is_modelica]
@@ -112,10 +97,10 @@ def of_source(
     stated = [f"{name} = {constants[name]}" for name in source.constants if constants.get(name)]
     whole = without_annotations(source.text) if source.is_modelica else source.text
     forms = (
-        Form("whole", whole.strip),
-        Form("parameters and comparisons", lambda: "\n".join([*stated, *compared])),
-        Form("comparisons", lambda: "\n".join(compared)),
-        Form("lines with the requirement's signals", lambda: "\n".join(_naming(source.text, "\n", seeds))),
+        ("whole", whole.strip()),
+        ("parameters and comparisons", "\n".join([*stated, *compared])),
+        ("comparisons", "\n".join(compared)),
+        ("lines with the requirement's signals", "\n".join(_naming(source.text, "\n", seeds))),
         short,
     )
     return Readable(forms, limits)
@@ -135,13 +120,13 @@ def of_text(text: str, shown: str, signals: Collection[str]) -> Readable:
     headings = [line for line in lines if _HEADING.match(line)]
     named = list(_naming(text, r"\n\s*\n", [name for name in signals if len(name) > 1]))
     forms = (
-        Form("whole", lambda: "\n".join(lines).strip()),
-        Form("headings, and paragraphs that name a signal", lambda: "\n".join([*headings, "", *named])),
-        Form("paragraphs that name a signal", lambda: "\n".join(named)),
-        Form("headings", lambda: "\n".join(headings)),
-        Form("size only", lambda: counted(len(lines), "line")),
+        ("whole", "\n".join(lines).strip()),
+        ("headings, and paragraphs that name a signal", "\n".join([*headings, "", *named]).strip()),
+        ("paragraphs that name a signal", "\n".join(named)),
+        ("headings", "\n".join(headings)),
+        ("size only", counted(len(lines), "line")),
     )
-    return Readable(tuple(form for form in forms if form.name == "size only" or form.text().strip()))
+    return Readable(tuple(form for form in forms if form[1]))
 
 
 def _short(name: str) -> str:
@@ -158,7 +143,7 @@ def _naming(text: str, end: str, signals: Collection[str]) -> Iterator[str]:
             yield " ".join(piece.split())
 
 
-def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
+def _modes(diagram: Diagram) -> Iterator[Threshold]:
     """Return the outputs of charts with the states between which the chart switches."""
     for chart in diagram.charts:
         states = [state.name for state in chart.states]
@@ -166,7 +151,8 @@ def _modes(diagram: Diagram) -> Iterator[tuple[str, str]]:
             if data.scope == "output" and states:
                 more = f", ... ({len(states)})" if len(states) > _SHOWN_NAMES else ""
                 listed = ", ".join(map(_short, states[:_SHOWN_NAMES]))
-                yield data.name, f"set by the chart {chart.name} with the states {listed}{more}"
+                text = f"set by the chart {chart.name} with the states {listed}{more}"
+                yield Threshold(frozenset([data.name]), text, (), "")
 
 
 def _without_tags(page: str) -> str:

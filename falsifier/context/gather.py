@@ -112,11 +112,10 @@ def gather(
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
         # Encodings may have hidden a secret before.
-        beside = [t.text for t in readable.found] + [told for _, told in readable.modes]
-        whole = "\n".join((text, *beside))
+        whole = "\n".join((text, *(t.text for t in readable.found)))
         otherwise = _LEAVE_OUT if file.is_named else NAME_THEM
         sentry.look(whole, f"{file.path}, as it is told", file.path, otherwise)
-        form = f"{readable.forms[i].name}{', because the rest is too long' if i else ''}"
+        form = f"{readable.forms[i][0]}{', because the rest is too long' if i else ''}"
         excerpts.append(Excerpt(file.path, file.name, file.sha256, form, text))
     sentry.refuse_unused()
     return Context(tuple(excerpts), compared, crossings, (*notes, *sentry.notes))
@@ -160,23 +159,27 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
     The last form of each file is some words long, so that it fits in any case.
     """
     forms = [readable.forms for _, readable in contents]
-    chosen = []
-    for each in forms:
-        texts = ((i, form.text()) for i, form in enumerate(each))
-        last = len(each) - 1
-        chosen.append(next((i, t) for i, t in texts if 0 < len(t) <= MAX_CHARACTERS or i == last))
-    around = sum(len(file.name) + max(len(f.name) for f in readable.forms) for file, readable in contents)
-    while sum(len(text) for _, text in chosen) + around > room:
-        shrinkable = [k for k, (i, _) in enumerate(chosen) if i + 1 < len(forms[k])]
+    chosen = [
+        next(i for i, (_, text) in enumerate(each) if _fits(text) or i == len(each) - 1) for each in forms
+    ]
+    around = sum(len(file.name) + max(len(name) for name, _ in readable.forms) for file, readable in contents)
+
+    def size(k: int) -> int:
+        return len(forms[k][chosen[k]][1])
+
+    while sum(map(size, range(len(forms)))) + around > room:
+        shrinkable = [k for k, i in enumerate(chosen) if i + 1 < len(forms[k])]
         if not shrinkable:
             raise SpecError(
                 f"context: {counted(len(contents), 'file')} are too many even with only their names told; "
                 "name fewer"
             )
-        longest = max(shrinkable, key=lambda k: len(chosen[k][1]))
-        i = chosen[longest][0] + 1
-        chosen[longest] = (i, forms[longest][i].text())
-    return chosen
+        chosen[max(shrinkable, key=size)] += 1
+    return [(i, each[i][1]) for i, each in zip(chosen, forms, strict=True)]
+
+
+def _fits(text: str) -> bool:
+    return 0 < len(text) <= MAX_CHARACTERS
 
 
 def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -> list[Crossing]:
@@ -193,17 +196,17 @@ def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -
 
 
 def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:
-    """Return what sets signals of the model, then thresholds, those of signals first."""
+    """Return what is said of signals of the model, then other thresholds."""
     ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
     for name in signals:
         words = name.split(".")
         for i in range(len(words)):
             ends.setdefault(".".join(words[i:]).strip("'"), []).append(name)
-    modes = [m for _, readable in contents for m in readable.modes if m[0] in ends]
     limits = []
     for threshold in (t for _, readable in contents for t in readable.found):
         met = ends.keys() & {name.strip("'") for name in threshold.names}
         names = tuple(sorted(name for end in met for name in ends[end]))
-        limits.append(Compared(names, threshold.text, threshold.place))
+        if names or threshold.place:  # a mode that sets no signal says nothing
+            limits.append(Compared(names, threshold.text, threshold.place))
     limits.sort(key=lambda each: not each.signals)
-    return [*(Compared(tuple(ends[name]), text, "") for name, text in modes), *limits[:_MAX_COMPARISONS]]
+    return limits[:_MAX_COMPARISONS]

@@ -102,7 +102,7 @@ def test_conditions_of_modelica_whatever_class_they_belong_to() -> None:
     ],
 )
 def test_what_is_not_closed_or_nested_deep_is_told_all_the_same(text: str, shown: str) -> None:
-    assert read(text, shown).forms[0].text() == text.removesuffix(" annotation(").strip()
+    assert read(text, shown).forms[0][1] == text.removesuffix(" annotation(").strip()
 
 
 def test_every_bundled_source_is_read() -> None:
