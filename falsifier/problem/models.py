@@ -34,15 +34,21 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
         SpecError: naming the file, the key and the remedy.
         ModelError: if an FMU cannot be read.
     """
-    stated = [layer.logging for layer in layers if layer.logging is not None]
-    logging = stated[-1] if stated else spec.model.logging
+    logging = next((each.logging for each in layers[::-1] if each.logging is not None), spec.model.logging)
+    interface = next((each.interface for each in layers[::-1] if each.interface), spec.model.interface)
     allow, deny = rights_of(path, layers, spec.model)
     if is_system(spec):
-        _check_interface(spec, layers)
+        if interface == "model-exchange":
+            raise SpecError(
+                "components of a system have interfaces of their own; set components.NAME.interface and "
+                "remove this key",
+                key="model.interface",
+            )
         return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
     fmu = _existing(path, spec.model.fmu or "", "model.fmu")
-    interface = _interface(spec, layers, read_info(fmu))
-    return FmuModel(fmu, interface=interface, logging=logging, allow=allow, deny=deny)
+    return FmuModel(
+        fmu, interface=_interface(interface, read_info(fmu)), logging=logging, allow=allow, deny=deny
+    )
 
 
 def rights_of(
@@ -86,7 +92,7 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
             package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
             return replace(package, logging=logging)
         components = {
-            name: Component(_single(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface)
+            name: Component(_existing(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface)
             for name, part in spec.components.items()
         }
         connections = {
@@ -96,30 +102,15 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         return System(components, connections, coupling=coupling, name=path.stem, logging=logging)
 
 
-def _single(path: Path, fmu: str, key: str) -> Path:
-    if is_package(fmu):
-        raise SpecError(
-            "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here",
-            key=key,
-        )
-    return _existing(path, fmu, key)
-
-
 def _existing(path: Path, fmu: str, key: str) -> Path:
+    if is_package(fmu) and key != "model.fmu":
+        raise SpecError(
+            "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here", key=key
+        )
     found = path.parent / fmu
     if not found.is_file():
         raise SpecError(f"no such FMU: {found}; give its path relative to the spec file", key=key)
     return found
-
-
-def _check_interface(spec: Spec, layers: Sequence[ModelChanges]) -> None:
-    stated = [spec.model.interface, *(layer.interface for layer in layers)]
-    if "model-exchange" in stated:
-        raise SpecError(
-            "components of a system have interfaces of their own; set components.NAME.interface and remove "
-            "this key",
-            key="model.interface",
-        )
 
 
 def default_interface(info: ModelInfo) -> Interface | None:
@@ -129,8 +120,8 @@ def default_interface(info: ModelInfo) -> Interface | None:
     return info.interfaces[0] if info.interfaces else None
 
 
-def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo) -> Interface:
-    stated = next((layer.interface for layer in reversed(layers) if layer.interface), spec.model.interface)
+def _interface(stated: Interface | None, info: ModelInfo) -> Interface:
+    """Return the stated interface, if the FMU offers it, or the only one that it offers."""
     if not info.interfaces:
         raise ModelError(
             f"{info.name}: the FMU offers neither co-simulation nor model exchange, and scheduled execution "
@@ -138,8 +129,7 @@ def _interface(spec: Spec, layers: Sequence[ModelChanges], info: ModelInfo) -> I
         )
     if stated is None and len(info.interfaces) == 1:
         return info.interfaces[0]
-    offered = " and ".join(info.interfaces)
     if stated is None or stated not in info.interfaces:
         advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
-        raise SpecError(f"the FMU offers {offered}{advice}", key="model.interface")
+        raise SpecError(f"the FMU offers {' and '.join(info.interfaces)}{advice}", key="model.interface")
     return stated

@@ -10,7 +10,6 @@ from falsifier.errors import SpecError
 from falsifier.problem.grid import default_freedom
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection, InputSection, ModelChanges
-from falsifier.problem.source import ProblemSource
 
 # The middle level has this many times the pieces of an input's own control points; each level after it that
 # an engine on fixed control points searches has as many times more again.
@@ -74,20 +73,16 @@ def level_spaces(space: SearchSpace, *, free: bool) -> tuple[SearchSpace, ...]:
 
 
 def _freed(problem: Problem, names: set[str], limits: FreeSection) -> Problem:
+    """Return the problem with the limits, also among its source's changes, so that it can be loaded again."""
     freedom = Freedom(limits.max_control_points, limits.min_interval)
     space = _each(problem.space, lambda r: replace(r, free=freedom) if r.name in names else r)
-    source = None if problem.source is None else _freed_source(problem.source, names, limits)
+    source = problem.source
+    if source is not None:
+        stated = source.changes.inputs
+        freed = {n: stated.get(n, InputSection()).model_copy(update={"free": limits}) for n in sorted(names)}
+        changes = source.changes.model_copy(update={"inputs": {**stated, **freed}})
+        source = source.model_copy(update={"changes": changes})
     return replace(problem, space=space, source=source)
-
-
-def _freed_source(source: ProblemSource, names: set[str], limits: FreeSection) -> ProblemSource:
-    """Return the source with the limits among its changes, so that the problem can be loaded again."""
-    stated = source.changes.inputs
-    freed = {
-        name: stated.get(name, InputSection()).model_copy(update={"free": limits}) for name in sorted(names)
-    }
-    changes = source.changes.model_copy(update={"inputs": {**stated, **freed}})
-    return source.model_copy(update={"changes": changes})
 
 
 def _each(space: SearchSpace, change: Callable[[InputRange], InputRange]) -> SearchSpace:

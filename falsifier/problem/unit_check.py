@@ -9,8 +9,6 @@ from falsifier.stl import Formula
 from falsifier.stl.expression import Arithmetic, Call, Expression, Number, unit_of
 from falsifier.stl.formula import Predicate
 
-# Units of signals by name.
-Known = Mapping[str, str]
 # What people write, in lower case, by the name that conversions know. Of a shaft, 1/min is a speed.
 _SPELLINGS = {
     spelling: name
@@ -92,20 +90,16 @@ def unit_conflicts(formula: Formula, info: ModelInfo, units: Units) -> Iterator[
     """
     known = {name: info[name].unit for name in formula.signals if name in info}
     for predicate in formula.predicates:
+        pairs = [(predicate.left, predicate.right)]
         for part in (*predicate.left.walk(), *predicate.right.walk()):
-            yield from ((predicate, text) for text in _conflict(part, known, units))
-        yield from ((predicate, text) for text in _compared(predicate.left, predicate.right, known, units))
+            match part:
+                case Arithmetic("+" | "-") | Call("min" | "max"):
+                    pairs += [(part.operands[0], other) for other in part.operands[1:]]
+        for one, other in pairs:
+            yield from ((predicate, text) for text in _compared(one, other, known, units))
 
 
-def _conflict(part: Expression, known: Known, units: Units) -> Iterator[str]:
-    if isinstance(part, Arithmetic) and part.operator in "+-":
-        yield from _compared(part.left, part.right, known, units)
-    if isinstance(part, Call) and part.function in ("min", "max"):
-        for other in part.operands[1:]:
-            yield from _compared(part.operands[0], other, known, units)
-
-
-def _compared(left: Expression, right: Expression, known: Known, units: Units) -> Iterator[str]:
+def _compared(left: Expression, right: Expression, known: Mapping[str, str], units: Units) -> Iterator[str]:
     one, other = unit_of(left, known), unit_of(right, known)
     if not one or not other or one == other or isinstance(left, Number) or isinstance(right, Number):
         return

@@ -54,16 +54,12 @@ def margin_words(robustness: float, predicate: str = "") -> str:
     >>> margin_words(on_limit(">"), "gear == 3")  # a condition: what followed from it failed
     'violated, by a margin of 0: gear == 3 holds exactly on its limit'
     """
-    if is_on_limit(robustness):
-        if robustness > 0:
-            return "holds: exactly on the limit, which is allowed"
-        return _violated_on_limit(predicate)
-    if robustness < 0:
-        return "violated by this margin"
-    return "holds with this margin; below 0 is a violation"
-
-
-def _violated_on_limit(predicate: str) -> str:
+    if not is_on_limit(robustness):
+        return (
+            "violated by this margin" if robustness < 0 else "holds with this margin; below 0 is a violation"
+        )
+    if robustness > 0:
+        return "holds: exactly on the limit, which is allowed"
     comparison = parse(predicate) if predicate else None
     if not isinstance(comparison, Predicate):
         return "violated: exactly on the limit"

@@ -145,7 +145,8 @@ class _Parser:
         formula = self._as_formula(self._climb(EQUIVALENCE), 0)
         rest = self._next
         if rest.kind != "end":
-            self._fail_after(rest)
+            hint = hint_after(rest, self.tokens[self.index - 1])
+            self._fail(f"unexpected {rest.shown} after a complete formula", rest.position, hint)
         if _depth(formula) > MAX_DEPTH:
             self._fail_depth(0)
         formula = without_constants(formula)
@@ -226,7 +227,10 @@ class _Parser:
                     f'is a parenthesis missing? Write a signal of that name as "{token.written}"',
                 )
             return self._prefix(token)
-        self._fail_operand(token)
+        problem = f"expected a formula, a signal or a number, not {token.shown}"
+        if token.kind == "end":
+            problem = "the formula ends too early"
+        self._fail(problem, token.position, hint_at(self.tokens, self.index - 1))
 
     def _prefix(self, token: Token) -> Formula:
         if token.text == "not":
@@ -301,7 +305,7 @@ class _Parser:
         is_rounded = start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED)
         if window.start > window.end and is_rounded:
             # [1.3333333s,0.0222222min] is one moment; the bound in the smaller unit is the more exact one.
-            moment = window.start if _factor(start_unit) < _factor(end_unit) else window.end
+            moment = window.start if UNITS[start_unit or "s"] < UNITS[end_unit or "s"] else window.end
             window = Window(moment, moment)
         if window.start > window.end:
             self._fail(
@@ -354,16 +358,6 @@ class _Parser:
             hint = "write a Boolean signal b as b or not b"
         self._fail("expected a number or a signal, got a formula", start, hint)
 
-    def _fail_operand(self, token: Token) -> NoReturn:
-        problem = f"expected a formula, a signal or a number, not {token.shown}"
-        if token.kind == "end":
-            problem = "the formula ends too early"
-        self._fail(problem, token.position, hint_at(self.tokens, self.index - 1))
-
-    def _fail_after(self, token: Token) -> NoReturn:
-        hint = hint_after(token, self.tokens[self.index - 1])
-        self._fail(f"unexpected {token.shown} after a complete formula", token.position, hint)
-
     def _fail_depth(self, position: int) -> NoReturn:
         self._fail(
             f"the formula has more than {MAX_DEPTH} levels", position, "split it into several requirements"
@@ -373,14 +367,10 @@ class _Parser:
         raise syntax_error(self.text, problem, position, hint)
 
 
-def _factor(unit: str) -> Decimal:
-    return UNITS[unit or "s"]
-
-
 def _seconds(bound: str, unit: str) -> float:
     """Return a bound in s without the rounding of a product: 0.29 min are 17.4 s."""
     value = float(bound)
-    return float(Decimal(bound) * _factor(unit)) if 0.0 < value < math.inf else value
+    return float(Decimal(bound) * UNITS[unit or "s"]) if 0.0 < value < math.inf else value
 
 
 def _depth(formula: Formula) -> int:
