@@ -48,23 +48,19 @@ def find_spec(target: str) -> tuple[Path, str | None]:
     if parts.kind == "spec":
         return Path(parts.file), parts.requirement or None
     name, requirement = target.partition(":")[0], parts.requirement
-    names: list[str] = []
-    for path in sorted(bundled("specs").glob("*.toml")):
-        if path.stem == "published":
-            continue
-        if path.stem == name:
-            spec = read_spec(path)
-            only = next(iter(spec.requirements)) if len(spec.requirements) == 1 else None
-            return path, requirement or only
-        names.append(path.stem)
-    for path in (bundled("specs") / f"{stem}.toml" for stem in tuple(names)):
+    specs = {path.stem: path for path in sorted(bundled("specs").glob("*.toml")) if path.stem != "published"}
+    if name in specs:
+        first, *others = read_spec(specs[name]).requirements
+        return specs[name], requirement or (None if others else first)
+    names = list(specs)
+    for stem, path in specs.items():
         requirements = read_spec(path).requirements
+        if name in requirements and requirement:
+            raise SpecError(
+                f"{target}: no requirement {requirement!r}: {name} is itself a requirement, of {stem}; give "
+                f"{name} or {stem}:NAME; {did_you_mean(requirement, requirements)}"
+            )
         if name in requirements:
-            if requirement:
-                raise SpecError(
-                    f"{target}: no requirement {requirement!r}: {name} is itself a requirement, of "
-                    f"{path.stem}; give {name} or {path.stem}:NAME; {did_you_mean(requirement, requirements)}"
-                )
             return path, name
         names.extend(requirements)
     if Path(target).is_dir():
@@ -165,10 +161,8 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 def spec_file(source: ProblemSource) -> Path | None:
     """Return the spec file or SSP package of a source; None for an FMU or a problem made in Python."""
-    if source.parts.kind == "fmu" and is_package(source.target):
-        return Path(source.target)
     if source.parts.kind in ("fmu", "python"):
-        return None
+        return Path(source.target) if is_package(source.target) else None
     return find_spec(source.target)[0]
 
 

@@ -217,17 +217,14 @@ class Subject:
         Raises:
             SpecError: with the position of the mistake, the unknown signal, or the window that does not fit.
         """
-        problem = self.problem
+        problem, experiment = self.problem, self.problem.experiment
         if self.free_grid:
             try:
-                fits = fitting_interval(
-                    parse(text), problem.experiment.stop_time, problem.experiment.output_interval
-                )
+                fits = fitting_interval(parse(text), experiment.stop_time, experiment.output_interval)
             except FormulaError as error:
                 raise SpecError(str(error)) from None
-            if fits is not None:
-                problem = replace(problem, experiment=replace(problem.experiment, output_interval=fits))
-        return parse_requirement(text, problem.info, problem.experiment), problem
+            experiment = replace(experiment, output_interval=fits or experiment.output_interval)
+        return parse_requirement(text, problem.info, experiment), replace(problem, experiment=experiment)
 
 
 def subject_of(target: str) -> Subject:
@@ -242,20 +239,15 @@ def subject_of(target: str) -> Subject:
     path, requirement = find_spec(target)
     spec = read_spec(path)
     name = requirement or next(iter(spec.requirements))
-    is_bundled = path.parent == bundled("specs")
     text = path.read_text(encoding="utf-8-sig")
-    if name == _STARTED and _has_placeholder(tomllib.loads(text)):
-        problem = problem_of_starter(text, path)
-    else:
-        problem = load_source(ProblemSource(target=f"{path}:{name}"))
-    intervals = [spec.model.output_interval, spec.requirements[name].output_interval]
+    is_started = name == _STARTED and _has_placeholder(tomllib.loads(text))
     return Subject(
-        problem,
-        None if is_bundled else path,
+        problem_of_starter(text, path) if is_started else load_source(ProblemSource(target=f"{path}:{name}")),
+        None if path.parent == bundled("specs") else path,
         path.parent,
         text,
         is_new=False,
-        free_grid=intervals == [None, None],
+        free_grid=spec.model.output_interval is None and spec.requirements[name].output_interval is None,
     )
 
 
@@ -263,10 +255,8 @@ def _of_model(fmu: Path) -> Subject:
     if not fmu.is_file():
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file, or a spec")
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
-    path = fmu.with_suffix(".toml")
-    text = starter_spec(Path(fmu.name), info)
-    problem = problem_of_starter(text, path)
-    return Subject(problem, path, path.parent, text, is_new=True, free_grid=True)
+    path, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
+    return Subject(problem_of_starter(text, path), path, path.parent, text, is_new=True, free_grid=True)
 
 
 def problem_of_starter(text: str, path: Path) -> Problem:

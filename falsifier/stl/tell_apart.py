@@ -75,20 +75,18 @@ def _batches(samples: int) -> list[int]:
 
 def _robustness(monitor: Monitor, columns: Mapping[str, Floats]) -> Floats:
     """Return the robustness of each trajectory; NaN for those outside the domain of a division or root."""
-    try:
+    with suppress(MonitorError):
         return monitor.batch(columns)
-    except MonitorError:
-        count = len(next(iter(columns.values())))
-        found = np.full(count, np.nan)
-        for k in range(count):
-            with suppress(MonitorError):
-                found[k] = monitor.batch({name: column[k : k + 1] for name, column in columns.items()})[0]
-        return found
+    found = np.full(len(next(iter(columns.values()))), np.nan)
+    for k in range(len(found)):
+        with suppress(MonitorError):
+            found[k] = monitor.batch({name: column[k : k + 1] for name, column in columns.items()})[0]
+    return found
 
 
 def _levels(formulas: tuple[Formula, ...], allowed: Interval) -> Floats:
     """Return values on both sides of each number in the formulas, within the range of the signal."""
-    sides = [side for f in formulas for p in f.predicates for side in (p.left, p.right)]
+    sides = (side for f in formulas for p in f.predicates for side in (p.left, p.right))
     numbers = [e.value for side in sides for e in side.walk() if isinstance(e, Number)]
     ends = [e for e in (allowed.low, allowed.high) if np.isfinite(e)]
     known = np.array(sorted({0.0, *numbers, *ends}))
@@ -119,7 +117,6 @@ def _steps(rng: np.random.Generator, levels: Floats, cuts: NDArray[np.int64], sa
 
 def _shortest(cuts: NDArray[np.int64], samples: int) -> NDArray[np.int64]:
     """Return the length of the shortest piece of each signal, in samples."""
-    count = len(cuts)
-    ends = np.hstack([np.zeros((count, 1)), np.sort(cuts, axis=1), np.full((count, 1), samples)])
-    shortest: NDArray[np.int64] = np.diff(ends, axis=1).min(axis=1).astype(np.int64)
+    ends = np.pad(np.sort(cuts, axis=1), ((0, 0), (1, 1)), constant_values=(0, samples))
+    shortest: NDArray[np.int64] = np.diff(ends, axis=1).min(axis=1)
     return shortest
