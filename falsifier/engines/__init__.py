@@ -1,5 +1,119 @@
-"""Search engines, one file each (``surrogate`` is a folder); ``make_engine`` creates them by name."""
+"""Search engines by name; the module of an engine is imported when the engine is first created."""
 
-from falsifier.engines.registry import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["DEFAULT_ENGINE", "ENGINES", "check_engine", "make_engine"]
+from falsifier.engines.protocol import Engine
+from falsifier.errors import SpecError, did_you_mean
+
+if TYPE_CHECKING:
+    from falsifier.problem.problem import Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Registered:
+    """One registered engine.
+
+    Attributes:
+        target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
+        summary: one line for ``--help``.
+        extra: extra of this project that installs the package which the engine needs; it has the engine's
+            name.
+        is_free: whether it chooses control points itself if the space allows it; the others search the fixed
+            parameterization.
+        uses_context: whether it tries the levels that context files give.
+    """
+
+    target: str
+    summary: str
+    extra: str = ""
+    is_free: bool = False
+    uses_context: bool = False
+
+    def load(self) -> Any:
+        """Import the engine's class.
+
+        Raises:
+            SpecError: if the package that it needs is not installed.
+        """
+        module, _, name = self.target.partition(":")
+        try:
+            return getattr(import_module(module), name)
+        except ImportError as error:
+            if not self.extra:
+                raise
+            raise SpecError(
+                f"the engine {self.extra!r} needs a package that is not installed ({error}); "
+                f"install it with pip install 'falsifier[{self.extra}]'"
+            ) from None
+
+
+ENGINES: Mapping[str, Registered] = MappingProxyType(
+    {
+        "surrogate": Registered(
+            "falsifier.engines.surrogate:Surrogate",
+            "learns the dynamics and searches on its predictions",
+            is_free=True,
+            uses_context=True,
+        ),
+        "coverage": Registered(
+            "falsifier.engines.coverage:Coverage",
+            "goes on from inputs that reached something new; does not use robustness",
+            is_free=True,
+        ),
+        "uniform": Registered("falsifier.engines.simple:Uniform", "uniform random points"),
+        "sobol": Registered("falsifier.engines.simple:Sobol", "scrambled Sobol sequence"),
+        "corners": Registered("falsifier.engines.simple:Corners", "constant extremes first, then random"),
+        "annealing": Registered("falsifier.engines.optimisers.annealing:Annealing", "scipy's dual annealing"),
+        "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
+        "bayesian": Registered(
+            "falsifier.engines.optimisers.bayesian:Bayesian", "Gaussian process with expected improvement"
+        ),
+        "optuna": Registered(
+            "falsifier.engines.optimisers.optuna_tpe:TPE",
+            "optuna's tree-structured Parzen estimator",
+            extra="optuna",
+        ),
+        "botorch": Registered(
+            "falsifier.engines.optimisers.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
+        ),
+        "hybrid": Registered(
+            "falsifier.engines.hybrid:Hybrid", "a language model with the surrogate", is_free=True
+        ),
+    }
+)
+
+DEFAULT_ENGINE = "surrogate"
+
+
+def check_engine(name: str) -> None:
+    """Check that an engine of this name exists.
+
+    Raises:
+        SpecError: if there is none; lists the known names.
+    """
+    if name not in ENGINES:
+        raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
+
+
+def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> Engine:
+    """Create the engine with this name for a problem.
+
+    Args:
+        name: one of ENGINES.
+        problem: the problem to search.
+        seed: the same seed and the same sequence of calls give the same candidates.
+        options: further arguments of the engine; ``hybrid`` requires ``adviser``.
+
+    Raises:
+        SpecError: if the name is unknown, the engine's package is not installed, or the problem has nothing
+            to search.
+    """
+    check_engine(name)
+    if not problem.space.names:
+        raise SpecError("nothing to search; give at least one input or parameter a range")
+    engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)
+    return engine

@@ -5,9 +5,8 @@ from dataclasses import replace
 import pytest
 
 from falsifier.core.model import FunctionModel, Variable
-from falsifier.engines import make_engine
+from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.engines.registry import ENGINES
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem

@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from falsifier.engines import make_engine
-from falsifier.engines.registry import ENGINES
+from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import FREE, START, Array, Response, lag, lag_problem
