@@ -15,22 +15,9 @@ PROBLEM = lag_problem(inputs=2, limit=2.0, free=FREE, parameters=[START])
 BOX = fixed_layout(PROBLEM.space)
 
 
-def test_points_and_candidates_stand_for_each_other() -> None:
-    point = np.linspace(0.0, 1.0, BOX.dimension)
-    candidate = BOX.candidate(point, origin="o", rationale="r")
-    assert (candidate.origin, candidate.rationale) == ("o", "r")
-    assert candidate.signals["u"].values[0] == -2.0 and candidate.parameters["x0"] == 1.0
-    assert BOX.represents(candidate)
-    np.testing.assert_allclose(BOX.point(candidate), point, atol=1e-12)
-
-
 def test_points_outside_are_brought_to_the_bounds() -> None:
     candidate = BOX.candidate(np.full(BOX.dimension, 1.5), origin="", rationale="")
     assert set(candidate.signals["u"].values) == {2.0}
-
-
-def test_coordinates_are_grouped_by_input_and_parameter() -> None:
-    assert [group.tolist() for group in BOX.groups] == [[0, 1, 2, 3], [4, 5, 6, 7], [8]]
 
 
 def test_a_free_signal_is_read_at_the_fixed_control_points_and_does_not_represent_a_point() -> None:

@@ -1,8 +1,6 @@
 import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +17,9 @@ from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.conversation import OnExchange
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
+from falsifier.llm.messages import Chat
 from falsifier.llm.replay import ScriptedChat
-from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
-from falsifier.record.journal import holds_run
-from falsifier.record.run import falsify, resume
-from falsifier.search.result import Result
 from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem, simulated
 from tests.engines.support import HASTY, wide_problem
 
@@ -46,14 +40,7 @@ class Script(LLMEngine):
     def __post_init__(self) -> None:
         self.briefing = Briefing(self.problem)
 
-    def propose(
-        self,
-        count: int,
-        notes: Sequence[str] = (),
-        *,
-        what_if: WhatIf | None = None,
-        dispensable: bool = False,
-    ) -> list[Candidate]:
+    def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> list[Candidate]:
         self.notes.append(tuple(notes))
         answer = self.answers[min(len(self.notes), len(self.answers)) - 1]
         if isinstance(answer, Exception):
@@ -302,14 +289,7 @@ class Kind(Script):
     seed: int = 0
     has_seen_steps: bool = False
 
-    def propose(
-        self,
-        count: int,
-        notes: Sequence[str] = (),
-        *,
-        what_if: WhatIf | None = None,
-        dispensable: bool = False,
-    ) -> list[Candidate]:
+    def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> list[Candidate]:
         self.notes.append(tuple(notes))
         knows = {"second": len(self.notes) > 1, "never": False, "steps": self.has_seen_steps}[self.kind]
         level = -0.3 + 0.2 * float(np.random.default_rng((self.seed, len(self.notes))).random())
@@ -355,28 +335,3 @@ def test_it_needs_at_most_one_simulation_more_than_its_better_half(kind: str, su
             engine = Hybrid(problem, seed=seed, adviser=adviser, surrogate_settings=SETTINGS)
             both.append(simulations(engine, problem))
     assert np.mean(both) <= min(surrogate_alone, float(np.mean(alone))) + 1, (surrogate_alone, alone, both)
-
-
-class TestResume:
-    """A run that is resumed goes on as it would have."""
-
-    def search(self, directory: Path, problem: Problem, simulations: int) -> Result:
-        def script(request: ChatRequest) -> ChatReply:
-            count = len(re.findall(r"^Sample \d+", request.messages[-1].content, re.MULTILINE))
-            signals = [{"name": "u", "values": [0.1 * count]}]
-            text = json.dumps({"candidates": [{"rationale": "", "signals": signals}]})
-            return ChatReply(text=text, seconds=0.02, usage=Usage(cost=0.0))
-
-        adviser = LLMEngine(problem, ScriptedChat(script))
-        engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=SETTINGS)
-        if holds_run(directory):
-            return resume(directory, problems=[problem], engine=engine, budget=simulations)[0]
-        return falsify(problem, engine, budget=simulations, directory=directory)
-
-    def test_turns_are_the_same(self, tmp_path: Path) -> None:
-        problem = lag_problem("G[0,10] (x <= 9)", limit=2.0, free=FREE)
-        first = self.search(tmp_path / "run", problem, 8)
-        again = self.search(tmp_path / "run", problem, 12)
-        assert len(again.evaluations) == 12
-        for before, after in zip(first.evaluations, again.evaluations, strict=False):
-            assert before.candidate.key == after.candidate.key

@@ -357,16 +357,6 @@ def test_runs_share_one_client() -> None:
     assert server.most_at_once == 3
 
 
-def test_money_limit_with_unknown_price_is_an_error() -> None:
-    from falsifier.errors import SpecError
-
-    problem = lag_problem()
-    with serving(Step(reply([0.1] * 4)), Step(reply([0.2] * 4))) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url)
-        with pytest.raises(SpecError, match="price of this language model is unknown"):
-            falsify(problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(simulations=5, cost=1.0))
-
-
 def test_token_budget_ends_a_run() -> None:
     problem = lag_problem()
     with serving(*(Step(reply([0.01 * i] * 4)) for i in range(9))) as server:

@@ -102,38 +102,6 @@ def test_it_calls_twice_and_then_answers() -> None:
     assert any(re.fullmatch(r"best \[predicted robustness 7\.\d+\]", r) for r in rationales)
 
 
-def test_the_limit_of_calls() -> None:
-    def script(request: ChatRequest) -> Line:
-        if not request.tools:
-            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
-        return candidates(1.75) if "limit of 2 calls" in "".join(answers(request)) else call(1.0)
-
-    chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(promising=-9.0, what_if_calls=2)))
-    at = first_offer(chat.requests)
-    assert "At most 2 calls" in chat.requests[at].tools[0].description
-    told = answers(chat.requests[at + 3])
-    assert ["last call" in t for t in told] == [False, True, False]
-    assert "limit of 2 calls is reached" in told[2]
-
-
-def test_wrong_arguments_are_told_and_can_be_corrected() -> None:
-    def script(request: ChatRequest) -> Line:
-        if not request.tools:
-            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
-        told = answers(request)
-        if not told:
-            return call(7.0)
-        return call(1.5, name="u9") if len(told) == 1 else candidates(1.75)
-
-    chat, exchanges = ScriptedChat(script), list[Exchange]()
-    run(hybrid(chat, on_exchange=exchanges.append))
-    told = answers(chat.requests[first_offer(chat.requests) + 2])
-    assert "input 'u': 7 is outside its range [-2, 2]" in told[0]
-    assert "unknown input 'u9'" in told[1]
-    assert [bool(e.problem) for e in exchanges if e.reply and e.reply.tool_calls][:2] == [True, True]
-
-
 def test_no_tool_where_no_call_is_allowed() -> None:
     def script(request: ChatRequest) -> Line:
         return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from falsifier.core.space import Freedom
-from falsifier.engines.box import Array
 from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.testing import FREE, START, lag_problem
@@ -39,16 +38,6 @@ def test_what_follows_a_time_is_drawn_again_and_what_precedes_it_is_kept(time: f
     assert changed
 
 
-def pieces(values: Array) -> int:
-    return 1 + int(np.count_nonzero(np.diff(values)))
-
-
-def test_programs_have_few_and_many_pieces() -> None:
-    programs = Programs(layout_of(inputs=1))
-    counts = [pieces(programs.fresh(drawn(seed))[:50]) for seed in range(100)]
-    assert min(counts) == 1 and max(counts) > 20
-
-
 def test_discrete_inputs_take_their_values_only() -> None:
     layout = planning_layout(lock_problem(free=Freedom(100, 0.1)).space, GRID)
     programs = Programs(layout)
@@ -64,23 +53,6 @@ def test_a_span_is_repeated_after_a_pause() -> None:
     source[5:10] = 1.0
     found = programs.repeated(drawn(3), np.zeros(layout.dimension), 2.0, source, (1.0, 2.0))
     assert np.count_nonzero(found[11:50] == 1.0) >= 5
-
-
-def test_a_small_change_leaves_most_of_a_program() -> None:
-    layout = layout_of(inputs=1)
-    programs = Programs(layout)
-    point = programs.fresh(drawn(4))
-    assert any((programs.moved(drawn(seed), point) != point).any() for seed in range(5))
-    assert all(
-        pieces(programs.moved(drawn(seed), point)[:50]) <= pieces(point[:50]) + 2 for seed in range(50)
-    )
-
-
-def test_without_inputs_parameters_are_drawn() -> None:
-    layout = planning_layout(lag_problem(inputs=0, parameters=[START]).space, GRID)
-    programs = Programs(layout)
-    found = [programs.another_end(drawn(seed), np.zeros(1), 1.0).item() for seed in range(30)]
-    assert {0.0, 1.0} < set(found)
 
 
 def test_values_are_drawn_between_levels_that_are_known() -> None:

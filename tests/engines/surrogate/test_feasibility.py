@@ -29,22 +29,11 @@ def learned(points: box.Array, failed: Sequence[bool]) -> tuple[Feasibility, box
     return feasibility, feasibility.risk(layout, np.array([[0.0], [0.25], [0.75], [1.0]]))
 
 
-def test_nothing_is_risky_before_a_failure() -> None:
-    feasibility, risk = learned(np.array([[0.1], [0.9]]), [False, False])
-    assert not feasibility.has_failures
-    assert risk.tolist() == [0.0] * 4
-
-
 def test_the_risk_grows_towards_failures() -> None:
     points = np.linspace(0.0, 1.0, 9)[:, None]
     _, risk = learned(points, [bool(p > 0.6) for p in points[:, 0]])
     assert (np.diff(risk) > 0).all()
     assert risk[0] < 0.1 < 0.5 < risk[2]
-
-
-def test_one_failure_makes_its_surroundings_riskier_than_the_rest() -> None:
-    _, risk = learned(np.array([[1.0]]), [True])
-    assert risk[3] > 0.5 > risk[0]
 
 
 def test_the_engine_avoids_regions_in_which_simulations_fail() -> None:

@@ -18,15 +18,6 @@ def test_steps_down_count_by_how_far_they_go() -> None:
     assert brought == [0.0, 0.625, 0.75, 0.0, 0.0, 0.25, 1.0]
 
 
-def test_many_simulations_with_few_levels_are_a_staircase_and_with_one_a_plateau() -> None:
-    levels, _ = told(*[3.0] * 4)
-    assert levels.is_plateau and not levels.is_staircase
-    levels, _ = told(*[3.0, 2.0] * 4)
-    assert levels.is_staircase and not levels.is_plateau
-    levels, _ = told(*np.linspace(3.0, 2.0, 8).tolist())
-    assert not levels.is_staircase
-
-
 def shares(policy: Policy, arms: list[str], *, reserved: bool) -> dict[str, float]:
     rng = np.random.default_rng(0)
     drawn = [policy.choose(arms, rng, reserved=reserved) for _ in range(2000)]

@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.space import SearchSpace
 from falsifier.engines.layout import TimeGrid, planning_layout
-from falsifier.engines.surrogate.dynamics import Forecaster, LinearDynamics, ridge
+from falsifier.engines.surrogate.dynamics import Forecaster, LinearDynamics
 from falsifier.engines.surrogate.history import trace_of
 from falsifier.engines.surrogate.predicted_cost import PredictedCost, inner_windows, needs_several
 from falsifier.engines.surrogate.variation import random_points
@@ -125,15 +125,6 @@ def test_forecasts_are_judged_by_what_came_of_them() -> None:
     assert fitted.misses == 1
 
 
-def test_a_failed_simulation_leaves_no_sample() -> None:
-    problem = lag_problem(free=FREE)
-    history = history_of(problem, simulations=1)
-    point = np.ones(history.layout.dimension)
-    evaluation = evaluate(problem, history.layout.candidate(point, origin="t", rationale="t"))
-    object.__setattr__(evaluation, "trajectory", None)
-    assert history.add(evaluation, point) is None and len(history.samples) == 1
-
-
 def test_inputs_on_the_grid_are_those_of_the_point_and_times_beyond_the_horizon_teach_too() -> None:
     problem = lag_problem("G[0,5] (x <= 3)", free=FREE, parameters=[START])
     grid = TimeGrid.of(problem, cells=25)
@@ -144,8 +135,3 @@ def test_inputs_on_the_grid_are_those_of_the_point_and_times_beyond_the_horizon_
     trace = trace_of(problem.space, grid, ("x",), evaluation.candidate, evaluation.trajectory)
     assert trace.inputs[:25] == pytest.approx(layout.inputs(point[None], grid)[0])
     assert trace.states.shape == (51, 1) and len(trace.inputs) == 50
-
-
-def test_ridge_weighs_rows() -> None:
-    x, target = np.array([[1.0], [1.0]]), np.array([[0.0], [4.0]])
-    assert ridge(x, target, np.array([1.0, 3.0]), 1e-9)[0, 0] == pytest.approx(3.0)

@@ -1,4 +1,3 @@
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -94,11 +93,6 @@ def test_a_constant_of_someone_else_near_an_extreme_stands_for_it() -> None:
             assert candidate.signals["u"].values == (opposite,) * 4
 
 
-def test_uses_the_budget_up_without_a_false_claim_where_nothing_can_be_violated() -> None:
-    problem = lag_problem("G[0,10] (x <= 1.25)", free=FREE)
-    assert simulations_until_violation(problem, seed=0, budget=12) is None
-
-
 def arms(problem: Problem, *, rounds: int) -> Counter[str]:
     """How often each kind of reason was given, by its first words."""
     asked = drive(Surrogate(problem, seed=0, settings=HASTY), partial(evaluate, problem), rounds=rounds)
@@ -183,19 +177,6 @@ def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | Non
     assert any(candidate.rationale.startswith(why) for candidate in engine.ask(4))
 
 
-def test_switching_inputs_with_different_control_points_say_so_for_each() -> None:
-    problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", inputs=3, points=3)
-    u, v, w = problem.space.inputs
-    space = replace(problem.space, inputs=(u, replace(v, control_points=101), w))
-    engine = Surrogate(replace(problem, space=space), seed=0, settings=HASTY)
-    why = next(c.rationale for c in engine.ask(4) if "random bound" in c.rationale)
-    assert re.fullmatch(
-        r"inputs take a random bound: u and w at each control point, 5 s apart; "
-        r"v every (0\.5|1) s, a fraction of an inner window",
-        why,
-    )
-
-
 def narrow_problem(levels: tuple[Crossing, ...] = ()) -> Problem:
     """A counter of how often an input entered a band of 0.2 % of its range; three times violate."""
     info = ModelInfo(
@@ -231,10 +212,3 @@ def test_without_levels_nothing_changes() -> None:
     assert [c.key for c in engine.ask(5)] == [
         c.key for c in make_engine("surrogate", misplaced, seed=1).ask(5)
     ]
-
-
-def test_plans_try_fewer_candidates_where_there_are_many_signals() -> None:
-    problem = lag_problem(free=FREE)
-    engine = Surrogate(problem, seed=0)
-    few, many = (engine._plan_settings(outputs) for outputs in (3, 31))
-    assert (few.pool, many.pool) == (engine.settings.pool, engine.settings.pool // 4)

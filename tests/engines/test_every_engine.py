@@ -1,0 +1,131 @@
+"""Engines by name; each goes on whatever the formula names and whatever numbers a model puts out."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from falsifier.core.model import FunctionModel, Variable
+from falsifier.engines import ENGINES, make_engine
+from falsifier.engines.protocol import Engine
+from falsifier.engines.surrogate import Settings
+from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
+from falsifier.stl import parse
+from falsifier.testing import FREE, START, Array, Response, lag, lag_problem
+from tests.engines.support import HASTY, needs_botorch
+
+NAMES = [name for name in ENGINES if name not in ("hybrid", "botorch")]
+FORMULAS = (
+    "G[0,10] (x <= 3 or v >= 1)",
+    "F[0,10] (brake > 10 or x <= 100)",
+    "G[0,10] (u + brake <= 30)",
+    "G[0,10] (u <= 30)",
+    "G[0,10] (brake <= 30)",
+    "G[0,10] ((v <= 1) -> F[0,0] (locked or w >= 0))",
+    "(locked) U[0,5] (x >= 1)",
+)
+
+
+def make(name: str, problem: Problem) -> Engine:
+    options: dict[str, Settings] = {"settings": HASTY} if name == "surrogate" else {}
+    return make_engine(name, problem, seed=2, **options)
+
+
+def searched(problem: Problem, engine: Engine, *, simulations: int) -> list[Evaluation]:
+    found = []
+    for _ in range(simulations):
+        found.append(evaluate(problem, *engine.ask(1)))
+        engine.tell(found[-1:])
+    return found
+
+
+@pytest.mark.parametrize("name", [*NAMES, "botorch"])
+def test_every_engine_loads_and_bears_its_name(name: str) -> None:
+    if name == "botorch":
+        needs_botorch()
+    assert make_engine(name, lag_problem(), seed=0).name == name
+
+
+@pytest.mark.parametrize(("engine", "module"), [("optuna", "optuna_tpe"), ("botorch", "botorch_gp")])
+def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
+    engine: str, module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, engine, None)
+    monkeypatch.delitem(sys.modules, f"falsifier.engines.optimisers.{module}", raising=False)
+    with pytest.raises(SpecError, match=rf"'{engine}' needs a package.*pip install 'falsifier\[{engine}\]'"):
+        make_engine(engine, lag_problem(), seed=0)
+
+
+def test_a_wrong_name_and_nothing_to_vary_are_errors() -> None:
+    with pytest.raises(SpecError, match="did you mean 'sobol'"):
+        make_engine("sobl", lag_problem(), seed=0)
+    with pytest.raises(SpecError, match="nothing to search"):
+        make_engine("uniform", lag_problem(inputs=0), seed=0)
+
+
+def partly_searched(formula: str) -> Problem:
+    """u is searched; v and w are kept constant, brake and locked at their start values."""
+    problem = lag_problem(inputs=3, free=FREE)
+    assert isinstance(problem.model, FunctionModel)
+    held = (
+        Variable("brake", causality="input", start=20.0),
+        Variable("locked", kind="boolean", causality="input", start=1.0),
+    )
+    info = replace(problem.model.info, variables=(*problem.model.info.variables, *held))
+    return replace(
+        problem,
+        model=replace(problem.model, info=info),
+        requirement=Requirement("partly", parse(formula)),
+        space=replace(problem.space, inputs=problem.space.inputs[:1]),
+        parameters={"v": 2.0, "w": 0.5},
+    )
+
+
+@pytest.mark.parametrize("formula", FORMULAS)
+@pytest.mark.parametrize("name", NAMES)
+def test_signals_that_are_not_searched_are_no_obstacle(name: str, formula: str) -> None:
+    problem = partly_searched(formula)
+    problems = [problem]
+    if "x" not in problem.requirement.formula.signals:  # of inputs alone: nothing need be recorded
+        problems.append(replace(problem, experiment=replace(problem.experiment, outputs=())))
+    for each in problems:
+        for evaluation in searched(each, make(name, each), simulations=8):
+            assert evaluation.verdict is not None, evaluation.reason
+
+
+def constant(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    return {"x": np.zeros_like(times)}
+
+
+def at_the_end_of_the_range(
+    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
+) -> Mapping[str, Array]:
+    return {"x": 1.7e308 * np.sign(lag(times, inputs, parameters)["x"])}
+
+
+def with_spikes(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    x = lag(times, inputs, parameters)["x"].copy()
+    x[len(x) // 2] = 10.0 ** (300.0 * np.sin(1e6 * x[-1]))
+    return {"x": x}
+
+
+def often_failing(
+    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
+) -> Mapping[str, Array]:
+    x = lag(times, inputs, parameters)["x"]
+    if int(abs(x[-1]) * 1e6) % 2:
+        raise ValueError("it cannot be solved")
+    return {"x": x}
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("response", [constant, at_the_end_of_the_range, with_spikes, often_failing])
+@pytest.mark.parametrize("name", NAMES)
+def test_no_number_ends_a_search_or_warns(name: str, response: Response) -> None:
+    problem = lag_problem("G[0,10] (x <= 3)", free=FREE, points=2, parameters=[START], response=response)
+    assert len(searched(problem, make(name, problem), simulations=12)) == 12
