@@ -49,7 +49,8 @@ class CProgram:
         extracted = folder / path.stem
         archive.extract(path, extracted)
         identifier = description.identifiers["co-simulation"]
-        library = extracted / archive.library_file(description.info.fmi_version, identifier)
+        platform = archive.this_platform()
+        library = extracted / archive.library_file(description.info.fmi_version, identifier, platform)
         references = [str(description.slots[n].reference) for n in (*inputs, *outputs)]
         driven = references[: len(inputs)] or ["-1"]
         program = folder / "fmu_loop"

@@ -38,7 +38,7 @@ class Program:
         command: program and arguments; the path of the program is absolute.
         environment: its environment.
         output: descriptor of a file for what it prints.
-        policy: what the process that watches it is told.
+        rights: what the process that watches it is told.
         shared: descriptor of memory that it shares.
         replies: path of a named pipe for its replies, which is made here; None: they come from descriptor 3.
 
@@ -51,7 +51,7 @@ class Program:
         command: Sequence[str],
         environment: Mapping[str, str],
         output: int,
-        policy: bytes,
+        rights: bytes,
         shared: int,
         replies: Path | None = None,
     ) -> None:
@@ -78,7 +78,7 @@ class Program:
                 if descriptor >= 0:
                     os.close(descriptor)
         with contextlib.suppress(OSError):  # it has ended already
-            self._line.sendall(policy)
+            self._line.sendall(rights)
         self._life = _open_life(self.pid)
         self._waiting = select.poll()
         for watched in (self._replies, self._life):
@@ -103,24 +103,30 @@ class Program:
                 if not waiting.poll(max(0.0, until - time.monotonic()) * 1e3):
                     raise ConnectionError("the program does not read its requests") from None
 
-    def receive_now(self, most: int) -> bytes:
-        """Return at most this many bytes of replies that are there; none if the program has closed its end.
+    def read(self, most: int, seconds: float, polling: float = 0.0) -> bytes:
+        """Wait for replies; return at most this many bytes, none if it has ended or closed its end.
+
+        Args:
+            most: number of bytes, at least 1.
+            seconds: how long to wait.
+            polling: for how many seconds at first to poll, yielding to other processes.
 
         Raises:
-            BlockingIOError: if nothing is there.
+            TimeoutError: if nothing arrives in this time.
         """
-        return os.read(self._replies, most)
-
-    def wait(self, seconds: float) -> bool:
-        """Wait until there is something to receive; return False if the program has ended instead.
-
-        Raises:
-            TimeoutError: if neither happens in this time.
-        """
-        ready = [descriptor for descriptor, _ in self._waiting.poll(seconds * 1e3)]
-        if not ready:
-            raise TimeoutError
-        return self._replies in ready
+        until = time.perf_counter() + polling
+        while True:
+            try:
+                return os.read(self._replies, most)
+            except BlockingIOError:
+                if time.perf_counter() < until:
+                    os.sched_yield()
+                    continue
+            ready = [descriptor for descriptor, _ in self._waiting.poll(max(0.0, seconds) * 1e3)]
+            if not ready:
+                raise TimeoutError
+            if self._replies not in ready:
+                return b""
 
     def ends_within(self, seconds: float) -> bool:
         """Whether the program ends by itself within this time."""

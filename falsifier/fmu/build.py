@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 from falsifier.core.compiler import compile_c
 from falsifier.errors import ModelError
-from falsifier.fmu.description import extract, library_file, read_description, read_xml
+from falsifier.fmu.description import extract, library_file, read_description, read_xml, this_platform
 from falsifier.fmu.model import FmuModel
 
 __all__ = ["compile_sources"]
@@ -59,7 +59,7 @@ def compile_sources(path: Path, out: Path) -> Path:
         extract(path, folder)
         for identifier in sorted(set(description.identifiers.values())):
             sources = find_sources(path, folder, description.major, identifier)
-            target = folder / library_file(description.info.fmi_version, identifier)
+            target = folder / library_file(description.info.fmi_version, identifier, this_platform())
             target.parent.mkdir(parents=True, exist_ok=True)
             _compile(path, folder / "sources", sources, target, description.major)
         _write(path, folder, out)

@@ -25,17 +25,16 @@ def test_on_windows_the_import_says_where_to_install_it() -> None:
 def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
     """The shell takes the place of the worker; descriptors 0 and 3 are the connection."""
     script = "read line; echo here >&3; read line; exit 5"
-    policy = encoded(Rights(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", script))
+    rights = encoded(Rights(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", script))
     with posix_files.sealed_file(8) as output, posix_files.sealed_file(8) as shared:
         path = [str(worker_program(tmp_path))]
-        program = posix.Program(path, {}, output.fileno(), policy, shared.fileno())
-        with pytest.raises(BlockingIOError):
-            program.receive_now(100)
-        program.send(b"hello\n", HANG)
-        assert program.wait(HANG)
-        assert program.receive_now(100) == b"here\n"
+        program = posix.Program(path, {}, output.fileno(), rights, shared.fileno())
         with pytest.raises(TimeoutError):
-            program.wait(0.01)
+            program.read(100, 0.0)
+        program.send(b"hello\n", HANG)
+        assert program.read(100, HANG) == b"here\n"
+        with pytest.raises(TimeoutError):
+            program.read(100, 0.01)
         assert program.is_alive
         program.send(b"end\n", HANG)
         assert program.ends_within(HANG)

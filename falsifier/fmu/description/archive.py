@@ -59,8 +59,6 @@ _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
 # What is the machine's fault and not the archive's.
 _EXHAUSTED = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# Enough for the header of a Windows library, which comes after a program for DOS.
-_FIRST_BYTES = 4096
 _FORBIDDEN_KINDS = {
     stat.S_IFLNK: "symbolic link",
     stat.S_IFIFO: "named pipe",
@@ -106,21 +104,23 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         yield archive
 
 
-def read_entry(path: Path, name: str) -> bytes:
-    """Return the contents of one text file of an FMU.
+def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
+    """Return the contents of one text file of an FMU, or the first bytes of any file.
 
     Raises:
-        ModelError: if the archive is rejected or does not contain the file, or the file is too large.
+        ModelError: if the archive is rejected or does not contain the file, or the file is too large or
+            damaged.
     """
     with open_archive(path) as archive:
         try:
             size = archive.getinfo(name).file_size
-            if size > _MAX_TEXT_BYTES:
+            if first is None and size > _MAX_TEXT_BYTES:
                 raise ModelError(
                     f"{path}: {name} has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}; export the "
                     "model with fewer variables"
                 )
-            return archive.read(name)
+            with archive.open(name) as file:
+                return file.read() if first is None else file.read(first)
         except KeyError:
             raise ModelError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
@@ -152,20 +152,6 @@ def entry_names(path: Path) -> tuple[str, ...]:
         return tuple(archive.namelist())
 
 
-def first_bytes(path: Path, name: str) -> bytes:
-    """Return the first bytes of a file in an FMU, in which libraries say what they are for.
-
-    Raises:
-        ModelError: if the file is damaged.
-    """
-    with open_archive(path) as archive:
-        try:
-            with archive.open(name) as file:
-                return file.read(_FIRST_BYTES)
-        except UNREADABLE as error:
-            raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
-
-
 def platform_of(folder: str) -> str:
     """Return the FMI 3 name (``x86_64-linux``) of the platform of a folder below ``binaries``."""
     return _OLD_PLATFORMS.get(folder, folder)
@@ -177,24 +163,19 @@ def this_platform() -> str:
     return f"{_MACHINES.get(machine, machine)}-{sys.platform}"
 
 
-def binary_folder(fmi_version: str, platform: str = "") -> str:
-    """Return a platform's folder below ``binaries`` for an FMU of this version.
+def library_file(fmi_version: str, identifier: str, platform: str) -> PurePosixPath:
+    """Return the path of a library inside an FMU.
 
     Args:
         fmi_version: FMI version of the FMU.
-        platform: FMI 3 name of the platform; empty for this one.
+        identifier: its model identifier.
+        platform: FMI 3 name of the platform.
     """
-    platform = platform or this_platform()
-    if fmi_version.startswith("3"):
-        return platform
-    return next((old for old, new in _OLD_PLATFORMS.items() if new == platform), platform)
-
-
-def library_file(fmi_version: str, identifier: str, platform: str = "") -> PurePosixPath:
-    """Return the path of a platform's library inside an FMU; arguments as for binary_folder."""
-    platform = platform or this_platform()
+    folder = platform
+    if not fmi_version.startswith("3"):
+        folder = next((old for old, new in _OLD_PLATFORMS.items() if new == platform), platform)
     suffix = _LIBRARY_SUFFIX.get(platform.rpartition("-")[2], ".so")
-    return PurePosixPath("binaries", binary_folder(fmi_version, platform), identifier + suffix)
+    return PurePosixPath("binaries", folder, identifier + suffix)
 
 
 def _faults(entries: list[zipfile.ZipInfo]) -> Iterator[str]:

@@ -22,6 +22,8 @@ _ELF = {
     "aarch64-linux": (b"\2\1", b"\xb7\0"),
     "x86-linux": (b"\1\1", b"\3\0"),
 }
+# Enough for the header of a Windows library, which comes after a program for DOS.
+_FIRST_BYTES = 4096
 _PE_X86_64 = b"\x64\x86"
 # These are not part of a name, or of no name that Wine finds.
 _UNKNOWN = frozenset('\\"')
@@ -53,10 +55,10 @@ def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface,
         identifiers: model identifier by interface.
     """
     names = archive.entry_names(path)
-    places = {i: archive.library_file(fmi_version, name) for i, name in identifiers.items()}
-    windows_places = {
-        i: archive.library_file(fmi_version, name, archive.WINDOWS) for i, name in identifiers.items()
-    }
+    places, windows_places = (
+        {i: archive.library_file(fmi_version, name, platform) for i, name in identifiers.items()}
+        for platform in (archive.this_platform(), archive.WINDOWS)
+    )
     here, windows = _found(names, places), _found(names, windows_places)
     through_wine = [i for i in windows if i not in here and can_run_windows()]
     lacking = {
@@ -79,7 +81,7 @@ def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface,
     loaded = [(library, archive.this_platform()) for library in here.values()]
     loaded += [(windows[i], archive.WINDOWS) for i in through_wine]
     for library, platform in loaded:
-        if not _is_for(archive.first_bytes(path, str(library)), platform):
+        if not _is_for(archive.read_entry(path, str(library), _FIRST_BYTES), platform):
             notes.append(f"{library.name} is not a library for {platform}; export the FMU again for it")
     return Libraries(here, windows, lacking, tuple(dict.fromkeys(notes)))
 

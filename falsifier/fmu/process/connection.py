@@ -5,7 +5,6 @@ whatever does not look like one ends the connection.
 """
 
 import math
-import os
 import struct
 import time
 from dataclasses import dataclass
@@ -144,30 +143,16 @@ def receive(program: posix.Program, limit: float, *, polling: float = 0.0) -> Re
 
 def _exactly(program: posix.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
     """Receive this many bytes, at least one; the limit in s is for the first of them."""
-    data = _some(program, count, limit, polling)
+    data = program.read(count, limit, polling)
     until = time.perf_counter() + _REST_SECONDS
-    while len(data) < count:
-        left = until - time.perf_counter()
-        if left <= 0:
+    while data and len(data) < count:
+        if time.perf_counter() > until:
             raise Garbled
         try:
-            data += _some(program, count - len(data), left)
+            more = program.read(count - len(data), until - time.perf_counter())
         except TimeoutError:
             raise Garbled from None
+        data = data + more if more else b""
+    if not data:
+        raise Closed
     return data
-
-
-def _some(program: posix.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
-    until = time.perf_counter() + polling
-    while True:
-        try:
-            data = program.receive_now(count)
-        except BlockingIOError:
-            if time.perf_counter() < until:
-                os.sched_yield()
-            elif not program.wait(max(0.0, limit)):
-                raise Closed from None
-            continue
-        if not data:
-            raise Closed
-        return data
