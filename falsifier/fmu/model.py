@@ -15,7 +15,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.description import WINDOWS, Description, describe, file_hash, needed_tool_text
-from falsifier.fmu.process import FmuOrder, Isolated, load, simulate
+from falsifier.fmu.process import FmuOrder, Isolated, Request, load, simulate
 from falsifier.fmu.systems import System
 
 
@@ -136,14 +136,17 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 @lru_cache(maxsize=64)
 def _order(model: FmuModel) -> FmuOrder:
     description = describe(model.path, model.sha256)
-    return FmuOrder.of(
-        model.path,
-        model.sha256,
-        description,
-        model.interface,
+    through_wine = model.windows or description.needs_wine(model.interface)
+    return FmuOrder(
+        description=description,
+        shown=str(model.path),
+        key=(model.sha256, model.interface, model.logging, through_wine, model.rights),
+        archives={"": (model.path, model.sha256)},
+        kind=Request.LOAD,
         logging=model.logging,
-        through_wine=model.windows or description.needs_wine(model.interface),
         rights=model.rights,
+        through_wine=through_wine,
+        interface=model.interface,
     )
 
 

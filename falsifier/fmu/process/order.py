@@ -14,8 +14,6 @@ from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.plan import Plan, solver_tolerance
 from falsifier.fmu.process.rights import Rights
 
-_DEFAULT = Rights()
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Order(ABC):
@@ -72,31 +70,6 @@ class FmuOrder(Order):
     """
 
     interface: Interface
-
-    @classmethod
-    def of(
-        cls,
-        path: Path,
-        sha256: str,
-        description: Description,
-        interface: Interface,
-        *,
-        logging: bool = False,
-        through_wine: bool = False,
-        rights: Rights = _DEFAULT,
-    ) -> "FmuOrder":
-        """Return the order for an FMU whose file had this hash when the model was loaded."""
-        return cls(
-            description=description,
-            shown=str(path),
-            key=(sha256, interface, logging, through_wine, rights),
-            archives={"": (path, sha256)},
-            kind=Request.LOAD,
-            logging=logging,
-            rights=rights,
-            through_wine=through_wine,
-            interface=interface,
-        )
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""

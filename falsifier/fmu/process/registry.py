@@ -73,7 +73,11 @@ class Registry:
             runner.close()
 
     def stop(self, threads: Collection[int]) -> None:
-        """End the workers of some threads, also in the middle of a simulation."""
+        """End the workers of threads of this process, also in the middle of a simulation.
+
+        Args:
+            threads: their identifiers (threading.get_ident); they start no other simulation.
+        """
         with self._lock:
             found = [self._runners.pop(each) for each in list(self._runners) if each[1] in threads]
         for runner in found:
@@ -108,6 +112,7 @@ class Registry:
 
 
 REGISTRY = Registry()
+stop_simulations = REGISTRY.stop
 
 
 def simulate(
@@ -228,12 +233,3 @@ def rights_text(allow: Collection[str] = (), deny: Collection[str] = ()) -> str:
         time.sleep(_LOOKING_SECONDS)
     started.end()
     return described(wanted, read_told(told).enforced)
-
-
-def stop_simulations(threads: Collection[int]) -> None:
-    """End the workers of threads of this process, also in the middle of a simulation.
-
-    Args:
-        threads: their identifiers (threading.get_ident); they start no other simulation.
-    """
-    REGISTRY.stop(threads)

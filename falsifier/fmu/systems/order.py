@@ -12,8 +12,6 @@ from falsifier.fmu.process import (
     Order,
     Plan,
     Reply,
-    Request,
-    Rights,
     Where,
     encoding,
     is_held,
@@ -32,20 +30,6 @@ class SystemOrder(Order):
     """
 
     network: Network
-
-    @classmethod
-    def of(cls, network: Network, system: str, *, logging: bool, rights: Rights) -> "SystemOrder":
-        """Return the order for a system; its hash stands for all that determines its trajectories."""
-        return cls(
-            description=network.description,
-            shown=network.name,
-            key=(system, logging, rights),
-            archives={str(k): (m.path, m.sha256) for k, m in enumerate(network.members)},
-            kind=Request.LOAD_SYSTEM,
-            logging=logging,
-            rights=rights,
-            network=network,
-        )
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """See Order."""

@@ -12,7 +12,7 @@ from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.process import Isolated, simulate
+from falsifier.fmu.process import Isolated, Request, simulate
 from falsifier.fmu.systems.network import (
     Component,
     Connection,
@@ -170,7 +170,17 @@ def _key(system: System) -> str:
 
 @lru_cache(maxsize=64)
 def _order(system: System) -> SystemOrder:
-    return SystemOrder.of(system.network, system.key, logging=system.logging, rights=system.rights)
+    network = system.network
+    return SystemOrder(
+        description=network.description,
+        shown=network.name,
+        key=(system.key, system.logging, system.rights),
+        archives={str(k): (m.path, m.sha256) for k, m in enumerate(network.members)},
+        kind=Request.LOAD_SYSTEM,
+        logging=system.logging,
+        rights=system.rights,
+        network=network,
+    )
 
 
 @lru_cache(maxsize=32)

@@ -5,6 +5,7 @@ import re
 import signal
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from threading import Thread
 
@@ -12,7 +13,6 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import read_description
 from falsifier.fmu.process import FmuOrder
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from falsifier.fmu.process.runner import Runner
@@ -186,8 +186,7 @@ except KeyboardInterrupt:
 
 
 def orders(number: int) -> list[FmuOrder]:
-    description = read_description(fixtures.path("Lag_2"))
-    return [FmuOrder.of(Path("Lag"), f"{k:064d}", description, "co-simulation") for k in range(number)]
+    return [replace(isolated("Lag_2").order, key=k) for k in range(number)]
 
 
 @pytest.fixture

@@ -8,9 +8,8 @@ from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Connection, Coupling, System
 from falsifier.fmu.description import libraries
-from falsifier.fmu.process import Reply, Rights, Where
+from falsifier.fmu.process import Reply, Where
 from falsifier.fmu.process.plan import make_plan
-from falsifier.fmu.systems.order import SystemOrder
 from tests.fmu import fixtures
 from tests.fmu.small_systems import LOOP, solved, system
 
@@ -170,7 +169,7 @@ def test_an_output_that_feeds_its_own_component_directly_is_a_loop() -> None:
 
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
-ORDER = SystemOrder.of(MODEL.network, MODEL.key, logging=False, rights=Rights())
+ORDER = MODEL.order
 STRINGS = (("table.fileName", "a.txt"),)
 PLAN = make_plan(
     MODEL.network.description, Experiment(1.0, 0.1, ("plant.y",), strings=STRINGS), (), (), pieces=1
