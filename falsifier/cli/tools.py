@@ -20,7 +20,8 @@ from falsifier.core.words import counted
 from falsifier.counterexamples.store import load
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.spec import Spec
-from falsifier.record.journal import holds_run, set_aside
+from falsifier.record.files import set_aside
+from falsifier.record.journal import holds_run
 from falsifier.record.journal import repair as repair_run
 from falsifier.record.manifest import Manifest
 from falsifier.record.records import RECORDS

@@ -1,10 +1,12 @@
-"""The files of a run directory that are written once: sealed values, trajectories, and the lock."""
+"""Files and folders of a run: sealed values, trajectories, locks, and what is set aside."""
 
+import errno
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,6 +23,9 @@ _LOG = logging.getLogger(__name__)
 TRAJECTORIES = "trajectories"
 # Names of files that are complete.
 TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
+
+# Errors of the operating system that say that a path can never be a folder.
+_NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 
 Content = TypeVar("Content", bound=BaseModel)
 
@@ -117,3 +122,31 @@ def _tell_lost(path: Path, why: str) -> None:
 def is_intact(path: Path, content: bytes) -> bool:
     """Whether the content of a trajectory's file matches the checksum in its name."""
     return path.stem.rpartition("-")[2] == checksum(content)
+
+
+@contextmanager
+def can_be_a_folder(directory: Path) -> Iterator[None]:
+    """Name a path that can never be a folder.
+
+    Raises:
+        JournalError: in place of the error of the operating system that says so.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in _NO_FOLDER:
+            raise
+        raise JournalError(
+            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
+        ) from None
+
+
+def set_aside(path: Path) -> Path:
+    """Rename a damaged file or folder, so that it is kept but no longer read; return its new path."""
+    return path.rename(free_name(path))
+
+
+def free_name(path: Path) -> Path:
+    """Return a name beside a damaged file that nothing has yet."""
+    names = (path.with_name(f"{path.name}.damaged-{i}") for i in count(1))
+    return next(name for name in names if not name.exists())

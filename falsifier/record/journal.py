@@ -14,14 +14,12 @@ a checksum, lines are numbered, and SUM in the name of a trajectory is that file
 is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops what is damaged.
 """
 
-import errno
 import os
 import re
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from itertools import count
 from pathlib import Path
 from shutil import copy2
 from time import monotonic
@@ -35,10 +33,13 @@ from falsifier.record import manifest
 from falsifier.record.files import (
     TRAJECTORIES,
     TRAJECTORY_NAMES,
+    can_be_a_folder,
+    free_name,
     is_intact,
     locked,
     recorded_trajectory,
     save_trajectory,
+    set_aside,
 )
 from falsifier.record.records import (
     AskedRecord,
@@ -63,8 +64,6 @@ _SYNC_PERIOD = 1.0
 _AT_ONCE = (ExchangeRecord, ConfirmedRecord, EndedRecord)
 # With Keep "history" the first so many trajectories are kept, then each that improves on the best.
 _KEPT_TRAJECTORIES = 200
-# Errors of the operating system that say that a path can never be a folder.
-_NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 # Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
 _ASKED = b'"kind":"asked"'
 _KIND_WITHIN = 40
@@ -199,7 +198,7 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
     Raises:
         JournalError: if another process still writes here after that time, or a line is damaged.
     """
-    with _can_be_a_folder(directory):
+    with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
         (directory / TRAJECTORIES).mkdir(exist_ok=True)
     with run_lock(directory, patience):
@@ -220,18 +219,6 @@ def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[N
     return locked(directory / LOCK, busy=busy, patience=patience)
 
 
-@contextmanager
-def _can_be_a_folder(directory: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in _NO_FOLDER:
-            raise
-        raise JournalError(
-            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
-        ) from None
-
-
 def _check_is_file(path: Path) -> None:
     if path.is_dir():
         raise JournalError(
@@ -242,7 +229,7 @@ def _check_is_file(path: Path) -> None:
 
 def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
-    with _can_be_a_folder(directory):
+    with can_be_a_folder(directory):
         return (directory / manifest.MANIFEST).exists()
 
 
@@ -412,16 +399,6 @@ def repair(directory: Path) -> list[str]:
         ]
 
 
-def set_aside(path: Path) -> Path:
-    """Rename a damaged file or folder, so that it is kept but no longer read; return its new path."""
-    return path.rename(_free(path))
-
-
-def _free(path: Path) -> Path:
-    names = (path.with_name(f"{path.name}.damaged-{i}") for i in count(1))
-    return next(name for name in names if not name.exists())
-
-
 def _repaired_journal(path: Path) -> list[str]:
     if path.is_dir():
         return [f"{path}: a folder, not a journal; kept as {set_aside(path).name}"]
@@ -431,7 +408,7 @@ def _repaired_journal(path: Path) -> list[str]:
             pass
     except JournalError:
         lost = path.read_bytes()[reader.offset :].count(b"\n")
-        copy = Path(copy2(path, _free(path)))
+        copy = Path(copy2(path, free_name(path)))
         with path.open("r+b") as file:
             file.truncate(reader.offset)
         return [

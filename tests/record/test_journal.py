@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import JournalError
+from falsifier.record.files import set_aside
 from falsifier.record.journal import (
     JournalReader,
     open_journal,
     read_journal,
     recorded_evaluations,
     repair,
-    set_aside,
 )
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify, resume
