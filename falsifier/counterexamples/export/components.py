@@ -25,7 +25,6 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
 from falsifier.core.model import Variable
-from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export.tables import (
     InputTable,
     parameter_set,
@@ -76,11 +75,6 @@ class Seen:
     step: float
 
 
-def copy_of(member: Member) -> Path:
-    """Return the path of the copy of a component's FMU in an export."""
-    return Path(FOLDER, file_name(member.name), member.path.name)
-
-
 def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
     """Write a folder per component of a problem's system; return the files.
 
@@ -91,13 +85,14 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
     """
     assert isinstance(problem.model, System), "only systems have components"
     files = []
-    for member, seen in zip(problem.model.network.members, all_seen(problem, candidate), strict=True):
-        fmu = directory / copy_of(member)
-        folder = fmu.parent
+    reader = _Reader(problem, problem.model, candidate)
+    for position, member in enumerate(problem.model.network.members):
+        seen = reader.seen(position)
+        folder = directory / FOLDER / file_name(member.name)
         folder.mkdir(parents=True, exist_ok=True)
         model = FmuModel(member.path, member.interface)
-        shutil.copyfile(member.path, fmu)
-        files += [fmu, write_json(seen.start, folder / "start_values.json", model)]
+        shutil.copyfile(member.path, folder / member.path.name)
+        files += [folder / member.path.name, write_json(seen.start, folder / "start_values.json", model)]
         if seen.inputs.columns:
             files.append(write_csv(seen.inputs, folder / "input.csv", model))
         if seen.outputs.columns:
@@ -109,42 +104,27 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
     return files
 
 
-def all_seen(problem: Problem, candidate: Candidate) -> list[Seen]:
-    """Simulate and return what each component saw, in the order of the network's members."""
-    model = problem.model
-    assert isinstance(model, System), "only systems have components"
-    network, experiment = model.network, problem.experiment
-    step = experiment.stop_time / round(
-        experiment.stop_time / (experiment.step_size or experiment.output_interval)
-    )
-    outputs = tuple(v.name for v in model.info.outputs if v.kind != "string")
-    sources = tuple(network.title(n.source) for n in network.links if n.source.member != SYSTEM)
-    recorded = model.simulate(
-        candidate.signals,
-        {**problem.parameters, **candidate.parameters},
-        replace(
-            experiment,
-            outputs=tuple(dict.fromkeys((*outputs, *sources))),
-            output_interval=step,
-            step_size=None,
-        ),
-    )
-    reader = _Reader(problem, candidate, network, recorded, step)
-    return [reader.seen(position) for position in range(len(network.members))]
-
-
 class _Reader:
-    """Finds what a component saw in what was recorded at all communication points."""
+    """Finds what a component saw in what is recorded at all communication points of one simulation."""
 
-    def __init__(
-        self, problem: Problem, candidate: Candidate, network: Network, recorded: Trajectory, step: float
-    ) -> None:
-        self._problem, self._candidate, self._network = problem, candidate, network
-        self._recorded, self._step = recorded, step
+    def __init__(self, problem: Problem, system: System, candidate: Candidate) -> None:
+        network, experiment = system.network, problem.experiment
+        self._problem, self._system, self._candidate, self._network = problem, system, candidate, network
         self._position = {member: k for k, member in enumerate(network.order)}
         self._links = {n.target: n for n in network.links}
+        stop_time = experiment.stop_time
+        self._step = stop_time / round(stop_time / (experiment.step_size or experiment.output_interval))
+        outputs = [v.name for v in system.info.outputs if v.kind != "string"]
+        outputs += [network.title(n.source) for n in network.links if n.source.member != SYSTEM]
+        everything = tuple(dict.fromkeys(outputs))
+        self._recorded = system.simulate(
+            candidate.signals,
+            {**problem.parameters, **candidate.parameters},
+            replace(experiment, outputs=everything, output_interval=self._step, step_size=None),
+        )
 
     def seen(self, position: int) -> Seen:
+        """Return what the component at this position among the network's members saw."""
         member, own = self._network.members[position], self._every(position)
         ends = np.arange(own, len(self._recorded.times), own)
         times = self._recorded.times
@@ -173,9 +153,7 @@ class _Reader:
         return 1 if step is None else round(step / self._step)
 
     def _start(self, position: int) -> dict[str, float | str]:
-        model = self._problem.model
-        assert isinstance(model, System), "only systems have components"
-        named = {**dict(model.frame.values), **start_values(self._problem, self._candidate)}
+        named = {**dict(self._system.frame.values), **start_values(self._problem, self._candidate)}
         places = ((self._network.places.get(name), value) for name, value in named.items())
         variables = self._network.members[position].description.info
         return {
@@ -324,7 +302,13 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
     for link in network.links:
         _connection(connections, link, network)
     SubElement(root, f"{_SSD}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(stop_time)})
-    _write(path, root, {sources[m.name]: m for m in network.members}, resources)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
+        text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
+        package.writestr("SystemStructure.ssd", text)
+        for member in network.members:
+            package.write(member.path, sources[member.name])
+        for name, file in resources.items():
+            package.write(file, f"resources/{name}")
     return path
 
 
@@ -364,13 +348,3 @@ def _connection(parent: Element, link: Link, network: Network) -> None:
     if (link.factor, link.offset) != (1.0, 0.0):
         numbers = {"factor": repr(link.factor), "offset": repr(link.offset)}
         SubElement(connection, f"{_SSC}LinearTransformation", numbers)
-
-
-def _write(path: Path, root: Element, fmus: Mapping[str, Member], resources: Mapping[str, Path]) -> None:
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
-        text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
-        package.writestr("SystemStructure.ssd", text)
-        for source, member in fmus.items():
-            package.write(member.path, source)
-        for name, file in resources.items():
-            package.write(file, f"resources/{name}")
