@@ -3,7 +3,6 @@
 from falsifier.fmu.description.archive import (
     UNREADABLE,
     WINDOWS,
-    entry_names,
     extract,
     file_hash,
     library_file,
@@ -46,7 +45,6 @@ __all__ = [
     "Units",
     "conversion",
     "describe",
-    "entry_names",
     "extract",
     "file_hash",
     "find_wine",

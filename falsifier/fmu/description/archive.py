@@ -143,7 +143,7 @@ def extract(path: Path, folder: Path) -> None:
             if isinstance(error, OSError) and error.errno in _EXHAUSTED:
                 error.filename = f"{folder}, to which {path} is unpacked"
                 raise
-            raise ModelError(f"{path}: cannot unpack the FMU into {folder} ({error})") from error
+            raise ModelError(f"{path}: cannot be unpacked into {folder} ({error})") from error
 
 
 def entry_names(path: Path) -> tuple[str, ...]:
