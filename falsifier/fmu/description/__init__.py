@@ -7,7 +7,6 @@ from falsifier.fmu.description.archive import (
     file_hash,
     library_file,
     open_archive,
-    read_entry,
     this_platform,
 )
 from falsifier.fmu.description.libraries import (
@@ -54,7 +53,6 @@ __all__ = [
     "needed_tool_text",
     "open_archive",
     "read_description",
-    "read_entry",
     "read_info",
     "read_structure",
     "read_units",
