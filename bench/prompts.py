@@ -22,7 +22,7 @@ from falsifier.engines.briefing import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, View
-from falsifier.llm.prompts.courses import coarse_clock
+from falsifier.llm.prompts.numbers import coarse_clock
 from falsifier.llm.prompts.observations import (
     CLOSE_TOLERANCE,
     close_up_times,

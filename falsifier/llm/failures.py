@@ -117,12 +117,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
     # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
-    (
-        (400, 404, 422, 500, 501),
-        ("tool", "function call", "function_call"),
-        ToolsUnsupportedError,
-        "{detail}",
-    ),
+    ((400, 404, 422, 500, 501), _TOOL_WORDS, ToolsUnsupportedError, "{detail}"),
     (
         (400, 422),
         (),

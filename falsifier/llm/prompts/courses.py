@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.llm.prompts.numbers import decimals_for, plain
-from falsifier.stl.margins import is_on_limit
 
 Array = NDArray[np.float64]
 # Time in s, value, and how far the value may be off.
@@ -379,15 +378,6 @@ def _index(times: Array, time: float) -> int:
     return int(np.abs(times - time).argmin())
 
 
-def coarse_clock(stop_time: float) -> int:
-    """Decimals of times that show a hundredth of the stop time, or less.
-
-    >>> coarse_clock(50.0), coarse_clock(100.0), coarse_clock(3.0)
-    (1, 1, 2)
-    """
-    return decimals_for(stop_time / 2, 3)
-
-
 def _pairs(points: Points, clock: int) -> str:
     """Points as ``time:value``; no two that read as different values have the same time."""
     values = [_value(value, allowed) for _, value, allowed in points]
@@ -401,12 +391,3 @@ def _pairs(points: Points, clock: int) -> str:
 def _value(value: float, allowed: float) -> str:
     """A value with the digits that what it may be off by leaves."""
     return plain(value, decimals_for(_OF_DIGITS * allowed, 1)) if allowed else f"{value:.9g}"
-
-
-def column_decimals(column: Array, *, margin: float | None = None) -> int:
-    """Decimals needed to show a column's values, and a margin of this size between two of them."""
-    usual = decimals_for(float(np.abs(column).max()))
-    if margin is None or is_on_limit(margin):
-        return usual
-    limit = decimals_for(float(np.abs(column).max()), 9)
-    return min(max(usual, decimals_for(margin, 3)), limit)

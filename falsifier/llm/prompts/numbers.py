@@ -4,6 +4,11 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from math import floor, isfinite, log10
 
+import numpy as np
+from numpy.typing import NDArray
+
+from falsifier.stl.margins import is_on_limit
+
 # Significant digits of the largest value in a column of numbers.
 _COLUMN_DIGITS = 4
 _BOUND_DIGITS = 10
@@ -19,6 +24,24 @@ def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
     if not isfinite(scale) or scale == 0:
         return 0
     return max(0, digits - 1 - floor(log10(abs(scale))))
+
+
+def column_decimals(column: NDArray[np.float64], *, margin: float | None = None) -> int:
+    """Decimals needed to show a column's values, and a margin of this size between two of them."""
+    usual = decimals_for(float(np.abs(column).max()))
+    if margin is None or is_on_limit(margin):
+        return usual
+    limit = decimals_for(float(np.abs(column).max()), 9)
+    return min(max(usual, decimals_for(margin, 3)), limit)
+
+
+def coarse_clock(stop_time: float) -> int:
+    """Decimals of times that show a hundredth of the stop time, or less.
+
+    >>> coarse_clock(50.0), coarse_clock(100.0), coarse_clock(3.0)
+    (1, 1, 2)
+    """
+    return decimals_for(stop_time / 2, 3)
 
 
 def plain(value: float, decimals: int) -> str:

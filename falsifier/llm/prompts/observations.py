@@ -14,14 +14,12 @@ from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
     Array,
     change_list,
-    coarse_clock,
-    column_decimals,
     course,
     dwell_list,
     longest_stretch,
     oscillations,
 )
-from falsifier.llm.prompts.numbers import decimals_for, number, plain
+from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
 from falsifier.stl.formula import And, Iff, Implies, Or

@@ -93,7 +93,7 @@ class _Sample:
 
     number: int
     texts: tuple[str, str, str]
-    tokens: tuple[int, int, int]
+    tokens: tuple[int, ...]
     depth: int
     robustness: float | None
     progress: Progress = field(default_factory=Progress)
@@ -301,7 +301,7 @@ class Questions:
         notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
         if verdict is None:
             text = _text(inputs, _failure(evaluation), *notes)
-            return self._counted((text,) * 3, _LINE, None)
+            return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         progress = Progress.of(self.view, evaluation.trajectory) if evaluation.trajectory else Progress()
         news = self._reached.news(progress)
         predicates = self.view.requirement.formula.predicates
@@ -318,22 +318,9 @@ class Questions:
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
-        is_better = best is None or verdict.robustness < best
-        return self._counted(
-            texts, _FULL if is_better or news else _SHORT, verdict.robustness, progress, news
-        )
-
-    def _counted(
-        self,
-        texts: tuple[str, str, str],
-        depth: int,
-        robustness: float | None,
-        progress: Progress | None = None,
-        news: Sequence[str] = (),
-    ) -> _Sample:
-        full, short, line = map(self._count, texts)
-        tokens = (full, short, line)
-        return _Sample(self._told, texts, tokens, depth, robustness, progress or Progress(), bool(news))
+        depth = _FULL if news or best is None or verdict.robustness < best else _SHORT
+        tokens = tuple(map(self._count, texts))
+        return _Sample(self._told, texts, tokens, depth, verdict.robustness, progress, bool(news))
 
     def _alike(self, inputs: str) -> str:
         """That a sample looks like an earlier one, if it does: numbers are rounded."""

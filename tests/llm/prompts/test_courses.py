@@ -8,13 +8,12 @@ from bench.prompts import samples, told_courses
 from falsifier.llm.prompts.courses import (
     breakpoints,
     change_list,
-    coarse_clock,
-    column_decimals,
     course,
     dwell_list,
     longest_stretch,
     oscillations,
 )
+from falsifier.llm.prompts.numbers import coarse_clock, column_decimals
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
 
