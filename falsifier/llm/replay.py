@@ -25,16 +25,11 @@ class Recording:
 
     def __init__(self, exchanges: Iterable[Exchange]) -> None:
         self._exchanges = list(exchanges)
-        self._played = 0
+        self._rest = iter(self._exchanges)
         self._lock = threading.Lock()
 
     def __len__(self) -> int:
         return len(self._exchanges)
-
-    @property
-    def remaining(self) -> int:
-        """Number of recorded replies not played yet."""
-        return len(self._exchanges) - self._played
 
     @property
     def llm(self) -> str:
@@ -44,9 +39,7 @@ class Recording:
     def next(self) -> Exchange | None:
         """Play the next exchange; None at the end."""
         with self._lock:
-            found = self._exchanges[self._played] if self.remaining else None
-            self._played += found is not None
-        return found
+            return next(self._rest, None)
 
 
 class RecordedChat:
@@ -69,11 +62,6 @@ class RecordedChat:
     @property
     def parameters(self) -> Mapping[str, Any]:
         return {} if self._inner is None else self._inner.parameters
-
-    @property
-    def remaining(self) -> int:
-        """Number of recorded replies not played yet."""
-        return self.recording.remaining
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next recorded reply.
@@ -110,7 +98,7 @@ class ScriptedChat:
     requests: list[ChatRequest] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._lines: Iterator[Line] | None = None if callable(self.script) else iter(self.script)
+        self._lines: Iterator[Line] = iter(() if callable(self.script) else self.script)
         self._lock = threading.Lock()
 
     @property
@@ -126,7 +114,13 @@ class ScriptedChat:
         """
         with self._lock:
             self.requests.append(request)
-            line = self._next(request)
+            asked = len(self.requests)
+            line = self.script(request) if callable(self.script) else next(self._lines, None)
+        if line is None:
+            raise ChatError(
+                f"the script of {self.llm!r} contains only {counted(asked - 1, 'line')}, but request {asked} "
+                "was made: add lines, or use a function"
+            )
         if isinstance(line, Exception):
             raise line
         if isinstance(line, ChatReply):
@@ -135,16 +129,3 @@ class ScriptedChat:
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Do nothing: a script's replies are not worth storing."""
-
-    def _next(self, request: ChatRequest) -> Line:
-        if callable(self.script):
-            return self.script(request)
-        assert self._lines is not None
-        try:
-            return next(self._lines)
-        except StopIteration:
-            asked = len(self.requests)
-            raise ChatError(
-                f"the script of {self.llm!r} contains only {counted(asked - 1, 'line')}, but request {asked} "
-                "was made: add lines, or use a function"
-            ) from None

@@ -150,16 +150,10 @@ def count_tokens(text: str, llm: str = "") -> int:
     if encoding is None:
         return ceil(len(text) / _CHARACTERS_PER_TOKEN)
     count = len(encoding.encode_ordinary(text))
-    return count if _groups_digits(llm) else count + _single_digits(text)
-
-
-def _groups_digits(llm: str) -> bool:
-    return not llm or any(part in llm.lower() for part in _GROUPS_DIGITS)
-
-
-def _single_digits(text: str) -> int:
-    """How many more tokens there are if each digit is one."""
-    return sum(len(found[0]) - -(-len(found[0]) // 3) for found in _DIGITS.finditer(text))
+    if not llm or any(part in llm.lower() for part in _GROUPS_DIGITS):
+        return count
+    # So many more there are if each digit is a token.
+    return count + sum(len(found[0]) - -(-len(found[0]) // 3) for found in _DIGITS.finditer(text))
 
 
 @cache

@@ -1,6 +1,5 @@
 """The inputs and parameters of a sample, written the way an LLM would write them in a reply."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -30,14 +29,14 @@ def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> t
         candidate: what was or will be simulated.
         in_brief: whether signals of many pieces are only described.
     """
-    stop_time = view.space.stop_time
-    return (
-        *(
-            f"{r.name}: {_signal_text_in(r, candidate.signals[r.name], stop_time, in_brief=in_brief)}"
-            for r in view.space.inputs
-        ),
-        *_parameters(view, candidate),
-    )
+    lines = []
+    for r in view.space.inputs:
+        told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time, in_brief=in_brief)
+        lines.append(f"{r.name}: {told}")
+    for p in view.space.parameters:
+        decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
+        lines.append(f"{p.name} = {plain(candidate.parameters[p.name], decimals)}")
+    return tuple(lines)
 
 
 def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:
@@ -67,14 +66,8 @@ def _described(signal: Signal, stop_time: float, decimals: int) -> str:
 
 def _merged(signal: Signal, tolerance: float) -> Signal:
     """Constant pieces, those whose values differ from the first of them by no more than this as one."""
-    kept = [(signal.times[0], signal.values[0])]
-    kept += [
-        (time, value)
-        for before, time, value in zip(signal.values, signal.times[1:], signal.values[1:], strict=False)
-        if before != value
-    ]
-    merged = kept[:1]
-    for time, value in kept[1:]:
+    merged = [(signal.times[0], signal.values[0])]
+    for time, value in zip(signal.times[1:], signal.values[1:], strict=True):
         if abs(value - merged[-1][1]) > tolerance:
             merged.append((time, value))
     times, values = zip(*merged, strict=True)
@@ -100,9 +93,3 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
         points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
     shown = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
     return f"{manner} from [time, value] points [{shown}]"
-
-
-def _parameters(view: View, candidate: Candidate) -> Iterator[str]:
-    for p in view.space.parameters:
-        decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
-        yield f"{p.name} = {plain(candidate.parameters[p.name], decimals)}"
