@@ -34,7 +34,7 @@ _MOST_BYTES = 16 << 20
 _GRACE = 0.5
 _GIVEN_UP: WeakSet[Thread] = WeakSet()
 _REDIRECTS = frozenset({301, 302, 303, 307, 308})
-
+_TOO_LONG = f"the reply has more than {_MOST_BYTES >> 20} MiB"
 
 # Maximum number of characters of a reply that an error repeats.
 _LONGEST_BEGINNING = 80
@@ -172,7 +172,14 @@ class _Call:
         self.fault = ""
         with self._noting_faults():
             response = handle(request)
-        self._check(request, response)
+        encoding = response.headers.get("content-encoding", "identity").lower()
+        length = response.headers.get("content-length", "")
+        if response.status_code in _REDIRECTS:
+            self.refuse(_redirection(request.url, response.headers.get("location")))
+        if encoding != "identity":
+            self.refuse(f"the reply is compressed ({encoding[:20]}), which was not asked for")
+        if length.isascii() and length.isdigit() and float(length) > _MOST_BYTES:
+            self.refuse(_TOO_LONG)
         response.stream = self._read(response)
         return response
 
@@ -213,16 +220,6 @@ class _Call:
             self.fault = self.refusal or _fault_of(error)
             raise
 
-    def _check(self, request: "httpx.Request", response: "httpx.Response") -> None:
-        if response.status_code in _REDIRECTS:
-            self.refuse(_redirection(request.url, response.headers.get("location")))
-        encoding = response.headers.get("content-encoding", "identity").lower()
-        if encoding != "identity":
-            self.refuse(f"the reply is compressed ({encoding[:20]}), which was not asked for")
-        length = response.headers.get("content-length", "")
-        if length.isascii() and length.isdigit() and float(length) > _MOST_BYTES:
-            self.refuse(_too_long())
-
     def _read(self, response: "httpx.Response") -> "httpx.SyncByteStream":
         """Return the response's stream, which ends at the limit and says if what came is no reply."""
         import httpx
@@ -236,7 +233,7 @@ class _Call:
                     for part in inner:  # type: ignore[union-attr]
                         received += part
                         if len(received) > _MOST_BYTES:
-                            call.refuse(_too_long())
+                            call.refuse(_TOO_LONG)
                         yield part
                 if response.is_success:
                     call.fault = _unreadable(bytes(received))
@@ -279,32 +276,30 @@ def _fault_of(error: Exception) -> str:
 
 def _unreadable(body: bytes) -> str:
     """What is wrong with the body of a reply; said only if the client library cannot read it either."""
+    text = body.decode(errors="replace")
+    begins = text[:_LONGEST_BEGINNING].strip()
+    found = f"it begins with {begins!r}" if begins else "it is empty"
     try:
-        text = body.decode()
-        sent = json.loads(text)
+        sent = json.loads(body.decode())
     except UnicodeDecodeError:
         return f"the reply is not text in UTF-8: {_NO_LLM}"
     except RecursionError:
         return f"the reply is nested too deeply to be read: {_NO_LLM}"
     except ValueError:
-        begins = text[:_LONGEST_BEGINNING].strip()
-        found = f"it begins with {begins!r}" if begins else "it is empty"
         return (
             f"the reply is not JSON ({found}): check --api-base, which for most servers ends with /v1, and "
             "the server's log; a proxy or a page for signing in may answer in its place"
         )
-    error = sent.get("error") if isinstance(sent, dict) else None
-    if error:
+    if isinstance(sent, dict) and (error := sent.get("error")):
         return f"the server reports: {error}" if isinstance(error, str) else ""
     if isinstance(sent, dict) and sent.get("choices") == []:
         return (
             "the server answers without any choice; its log, or the provider's page on the state of the "
             "service, says why"
         )
-    begins = text[:_LONGEST_BEGINNING].strip()
     return (
-        f"the reply does not have the form of an LLM's (it begins with {begins!r}): check --api-base, and "
-        "that the LLM's name begins with the provider whose interface the server has"
+        f"the reply does not have the form of an LLM's ({found}): check --api-base, and that the LLM's name "
+        "begins with the provider whose interface the server has"
     )
 
 
@@ -333,7 +328,3 @@ def guarded_client(*, verify: Any = True) -> "httpx.Client":
             plain.close()
 
     return httpx.Client(transport=Guarded(), cookies=none)
-
-
-def _too_long() -> str:
-    return f"the reply has more than {_MOST_BYTES >> 20} MiB"
