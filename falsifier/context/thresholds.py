@@ -1,7 +1,7 @@
 """Which constants are compared with which signals, in conditions of any of the languages that are read."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
 from math import isinf
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 _RELATIONS = ("<", "<=", ">", ">=", "==", "!=", "<>")
 # What ends an operand at its own depth of brackets.
-_BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := { } return"
+_BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop , ; ? : = := return"
 _BOUNDARIES = frozenset(_BOUNDING.split())
 _DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
@@ -88,17 +88,13 @@ def thresholds(
     seen = set()
     line, at = 1, 0
     for tokens in statements(text):
-        for i, token in enumerate(tokens):
-            if token.text not in _RELATIONS:
+        for sign, first, end in sorted(_compared(tokens)):
+            if tokens[end - 1].end - tokens[first].start > _MAX_LENGTH:
                 continue
-            first, last = _first(tokens, i), _last(tokens, i)
-            if first is None or last is None:
-                continue
-            line, at = line + text.count("\n", at, token.start), token.start
+            line, at = line + text.count("\n", at, tokens[sign].start), tokens[sign].start
             shown = f"{place}:{line}" if has_lines else place
-            found = _threshold(
-                text, tokens[first : last + 1], i - first, constants, shown, is_dotted=is_dotted
-            )
+            sides = tokens[first:sign], tokens[sign + 1 : end]
+            found = _threshold(text, sides, constants, shown, is_dotted=is_dotted)
             if found is not None and found.text not in seen:
                 seen.add(found.text)
                 yield found
@@ -146,21 +142,40 @@ def number_in(text: str) -> float | None:
     return -number if sign == "-" else number
 
 
+def _compared(tokens: Sequence[Token]) -> Iterator[tuple[int, int, int]]:
+    """Return where the sign of each comparison is, where its left side begins and its right side ends.
+
+    Comparisons in brackets that are not closed end with the tokens.
+    """
+    # Of each bracket around: where the operand begins, and the comparison that it ends, if any.
+    opened: list[tuple[int, tuple[int, int] | None]] = [(0, None)]
+    for i, token in enumerate(tokens):
+        is_closing, is_sign = token.text in CLOSING, token.text in _RELATIONS
+        if token.text in OPENING:
+            opened.append((i + 1, None))
+        elif is_closing or is_sign or token.text in _BOUNDARIES or token.kind == "directive":
+            first, begun = opened.pop()
+            if begun is not None and first < i:
+                yield *begun, i
+            if is_sign:
+                opened.append((i + 1, (i, first) if first < i else None))
+            elif not is_closing or not opened:
+                opened.append((i + 1, None))
+    yield from ((*begun, len(tokens)) for first, begun in opened if begun is not None and first < len(tokens))
+
+
 def _threshold(
     text: str,
-    tokens: Sequence[Token],
-    at: int,
+    sides: tuple[Sequence[Token], Sequence[Token]],
     constants: Mapping[str, str],
     place: str,
     *,
     is_dotted: bool,
 ) -> Threshold | None:
-    """Return the comparison that some tokens are, the relation being at a place among them."""
-    sides = tokens[:at], tokens[at + 1 :]
-    shown = _written(text, tokens)
-    if not all(sides) or len(shown) > _MAX_LENGTH:
-        return None
-    paths = dict(_variables(tokens, is_dotted=is_dotted))
+    """Return what is compared; None if that is no variable, or with no constant."""
+    tokens = [*sides[0], *sides[1]]
+    shown = " ".join(text[tokens[0].start : tokens[-1].end].split())
+    paths = {path: name for side in sides for path, name in _variables(side, is_dotted=is_dotted)}
     known = {path: constants[name] for path, name in sorted(paths.items()) if name in constants}
     named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
     stated_values = [value for stated in named.values() for value in stated.split(" or ")]
@@ -187,10 +202,6 @@ def _is_name(side: Sequence[Token]) -> bool:
     return not is_called and all(t.kind == "name" or t.text in (".", "->", "(", ")") for t in side)
 
 
-def _written(text: str, tokens: Sequence[Token]) -> str:
-    return " ".join(text[tokens[0].start : tokens[-1].end].split())
-
-
 def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[str, str]]:
     """Names that are no functions, with the last part of each: of ``a->b`` the name is ``b``, too."""
     path = ""
@@ -202,36 +213,6 @@ def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[st
             path = ""
         else:
             path = f"{path}{token.text}" if after.text == "." else ""
-
-
-def _first(tokens: Sequence[Token], i: int) -> int | None:
-    """Return where the operand before a sign begins; None if it is long."""
-    depth, first = 0, i
-    while first and not _ends(tokens[first - 1], depth, OPENING):
-        first -= 1
-        depth += (tokens[first].text in CLOSING) - (tokens[first].text in OPENING)
-        if tokens[i].start - tokens[first].start > _MAX_LENGTH:
-            return None
-    return first
-
-
-def _last(tokens: Sequence[Token], i: int) -> int | None:
-    """Return where the operand behind a sign ends; None if it is long."""
-    depth, last = 0, i
-    while last + 1 < len(tokens) and not _ends(tokens[last + 1], depth, CLOSING):
-        last += 1
-        depth += (tokens[last].text in OPENING) - (tokens[last].text in CLOSING)
-        if tokens[last].end - tokens[i].end > _MAX_LENGTH:
-            return None
-    return last
-
-
-def _ends(token: Token, depth: int, closing: Collection[str]) -> bool:
-    """Whether an operand ends before a token."""
-    text = token.text
-    return depth == 0 and (
-        text in closing or text in _BOUNDARIES or text in _RELATIONS or token.kind == "directive"
-    )
 
 
 def tokens_of(text: str, at: int = 0) -> Iterator[Token]:
