@@ -54,7 +54,7 @@ class Schedule:
         while self._running or (proceed and (self._waiting or self._suspects)):
             is_served = self._check_served()
             if not (proceed or is_served):
-                self._workers.executor.shutdown(wait=False, cancel_futures=True)
+                self._workers.shutdown(wait=False, cancel_futures=True)
                 self._running.clear()
                 return
             if proceed:
@@ -101,11 +101,7 @@ class Schedule:
         return None
 
     def _start(self, task: RunTask, files: dict[str, bytes] | None = None) -> None:
-        try:
-            self._running[self._workers.executor.submit(run_task, task, files or {})] = task
-        except BrokenExecutor:  # a worker died while idle
-            self._workers.restart()
-            self._running[self._workers.executor.submit(run_task, task, files or {})] = task
+        self._running[self._workers.submit(run_task, task, files or {})] = task
 
     def _settle(self, future: Future[Done | Missing], report: Report) -> None:
         task = self._running.pop(future, None)

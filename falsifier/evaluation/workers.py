@@ -5,7 +5,6 @@ import sys
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -30,6 +29,44 @@ _FMU_LOGGER = "falsifier.fmu"
 _CONNECT_TIMEOUT = 20
 # Filter in the format of python -W: warnings whose message starts with this word.
 _TRACKER_FILTER = "ignore:resource_tracker"
+
+
+class Workers(Executor):
+    """An executor that makes another one if the processes of the present one have died.
+
+    Args:
+        make: makes an executor.
+        slots: returns the number of tasks that can currently run at the same time.
+    """
+
+    def __init__(self, make: Callable[[], Executor], slots: Callable[[], int]) -> None:
+        self._make, self.slots = make, slots
+        self._executor = make()
+        self._futures: set[Future[Any]] = set()
+
+    def is_busy(self) -> bool:
+        """Whether a task is being carried out; what waits for a process is cancelled."""
+        return any(not (future.cancel() or future.done()) for future in list(self._futures))
+
+    def restart(self) -> None:
+        """Replace the present executor; its unfinished tasks are lost."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        self._executor = self._make()
+
+    def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
+        """Start a task."""
+        try:
+            future = self._executor.submit(function, *args, **options)
+        except BrokenExecutor:
+            self.restart()
+            future = self._executor.submit(function, *args, **options)
+        self._futures.add(future)
+        future.add_done_callback(self._futures.discard)
+        return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - as in the base class
+        """End the present executor."""
+        self._executor.shutdown(wait, cancel_futures=cancel_futures)
 
 
 @contextmanager
@@ -70,7 +107,7 @@ def _processes(jobs: int) -> Iterator[Executor]:
     from multiprocessing import Pipe
 
     ending, end = Pipe(duplex=False)
-    executor = Renewing(lambda: _process_pool(jobs, ending))
+    executor = Workers(lambda: _process_pool(jobs, ending), lambda: jobs)
     try:
         yield executor
     finally:
@@ -79,26 +116,6 @@ def _processes(jobs: int) -> Iterator[Executor]:
         executor.shutdown(cancel_futures=True)
         end.close()
         ending.close()
-
-
-@dataclass(slots=True)
-class Workers:
-    """An executor that can be replaced if its workers have died.
-
-    Attributes:
-        executor: the current executor.
-        slots: returns the number of tasks that can currently run at the same time.
-        make: creates another executor.
-    """
-
-    executor: Executor
-    slots: Callable[[], int]
-    make: Callable[[], Executor]
-
-    def restart(self) -> None:
-        """Replace the executor; its unfinished tasks are lost."""
-        self.executor.shutdown(wait=False, cancel_futures=True)
-        self.executor = self.make()
 
 
 @contextmanager
@@ -120,47 +137,14 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
                 executor.check()
                 return executor
 
-            yield Workers(executor, executor.slots, again)
+            yield Workers(again, executor.slots)
         return
     _check_jobs(jobs)
-    workers = Workers(_process_pool(jobs), lambda: jobs, lambda: _process_pool(jobs))
+    workers = Workers(lambda: _process_pool(jobs), lambda: jobs)
     try:
         yield workers
     finally:
-        workers.executor.shutdown(cancel_futures=True)
-
-
-class Renewing(Executor):
-    """An executor that makes another one if the processes of the present one have died.
-
-    Args:
-        make: makes an executor.
-    """
-
-    def __init__(self, make: Callable[[], Executor]) -> None:
-        self._make = make
-        self._executor = make()
-        self._futures: set[Future[Any]] = set()
-
-    def is_busy(self) -> bool:
-        """Whether a task is being carried out; what waits for a process is cancelled."""
-        return any(not (future.cancel() or future.done()) for future in list(self._futures))
-
-    def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
-        """Start a task."""
-        try:
-            future = self._executor.submit(function, *args, **options)
-        except BrokenExecutor:
-            self._executor.shutdown(wait=False)
-            self._executor = self._make()
-            future = self._executor.submit(function, *args, **options)
-        self._futures.add(future)
-        future.add_done_callback(self._futures.discard)
-        return future
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - as in the base class
-        """End the present executor."""
-        self._executor.shutdown(wait, cancel_futures=cancel_futures)
+        workers.shutdown(cancel_futures=True)
 
 
 def start(

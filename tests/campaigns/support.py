@@ -42,8 +42,8 @@ def work_in_threads(patch: pytest.MonkeyPatch) -> None:
 
     @contextmanager
     def pool(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
-        with ThreadPoolExecutor(jobs) as executor:
-            yield Workers(executor, lambda: jobs, lambda: ThreadPoolExecutor(jobs))
+        with Workers(lambda: ThreadPoolExecutor(jobs), lambda: jobs) as workers:
+            yield workers
 
     patch.setattr("falsifier.campaigns.runner.open_workers", pool)
 

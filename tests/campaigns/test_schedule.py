@@ -45,7 +45,7 @@ def run(
 
 
 def threads(slots: int) -> Workers:
-    return Workers(ThreadPoolExecutor(8), lambda: slots, lambda: ThreadPoolExecutor(8))
+    return Workers(lambda: ThreadPoolExecutor(8), lambda: slots)
 
 
 class Gauge:
@@ -140,7 +140,7 @@ def test_only_the_run_that_kills_workers_fails(monkeypatch: pytest.MonkeyPatch) 
         return made[-1]
 
     names = ["a", "b", "deadly", "c", "last"]
-    done = run([task(n) for n in names], Workers(make(), lambda: 3, make), monkeypatch, lambda *_: None)
+    done = run([task(n) for n in names], Workers(make, lambda: 3), monkeypatch, lambda *_: None)
     assert {name: d.status for name, d in done.items()} == {
         **dict.fromkeys(["a", "b", "c", "last"], "not falsified"),
         "deadly": "failed",
@@ -153,7 +153,7 @@ def test_a_cluster_without_workers_is_reported_once(
 ) -> None:
     monkeypatch.setattr("falsifier.campaigns.schedule._ALONE_SECONDS", 0.0)
     counts = iter([0, 0, 0, 0, 0, 0])
-    workers = Workers(ThreadPoolExecutor(1), lambda: next(counts, 1), lambda: ThreadPoolExecutor(1))
+    workers = Workers(lambda: ThreadPoolExecutor(1), lambda: next(counts, 1))
     done = run([task("a")], workers, monkeypatch, lambda *_: Done("not falsified", ""))
     assert list(done) == ["a"]
     assert [r.message for r in caplog.records if "no workers" in r.message] == [caplog.messages[0]]
@@ -171,7 +171,7 @@ def test_a_stopped_campaign_does_not_wait_for_workers_that_have_gone(monkeypatch
             self.given_up = cancel_futures and not wait
 
     executor, goes_on, counts = Silent(), iter([True, True, False]), iter([1, 1, 0])
-    workers = Workers(executor, lambda: next(counts, 0), lambda: executor)
+    workers = Workers(lambda: executor, lambda: next(counts, 0))
     done: dict[str, Done] = {}
     schedule = Schedule([task("a")], workers, calls=1)
     schedule.run(lambda t, d: done.__setitem__(t.name, d), lambda: next(goes_on, False))

@@ -19,7 +19,7 @@ import pytest
 from falsifier.campaigns import run_campaign
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.workers import ClusterExecutor, Renewing, local_executor, open_workers, start
+from falsifier.evaluation.workers import ClusterExecutor, Workers, local_executor, open_workers, start
 from falsifier.testing import lag_problem
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.fmu import support
@@ -160,7 +160,7 @@ def test_processes_that_died_are_replaced() -> None:
         made.append(Mortal())
         return made[-1]
 
-    executor = Renewing(make)
+    executor = Workers(make, lambda: 1)
     assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
     assert len(made) == 3
     executor.shutdown()
