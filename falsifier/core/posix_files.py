@@ -4,7 +4,6 @@ import contextlib
 import fcntl
 import os
 import pwd
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -26,23 +25,19 @@ def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
     Raises:
         OSError: if it is larger than files of this process may be, or there is no room.
     """
+    if can_seal():
+        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
+    else:
+        with tempfile.TemporaryFile() as named:
+            file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
     try:
-        return _sealed_file(size, may_grow=may_grow)
+        file.truncate(size)
     except OSError as error:
         error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
         raise
-
-
-def _sealed_file(size: int, *, may_grow: bool) -> IO[bytes]:
-    if sys.platform == "linux" and hasattr(os, "memfd_create"):
-        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
-        file.truncate(size)
+    if can_seal():
         growth = 0 if may_grow else fcntl.F_SEAL_GROW
         fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | growth | fcntl.F_SEAL_SEAL)
-        return file
-    with tempfile.TemporaryFile() as named:
-        file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
-    file.truncate(size)
     return file
 
 
@@ -83,9 +78,6 @@ def forbids_programs(folder: Path) -> bool:
 
 def remove_tree(path: Path) -> None:
     """Remove a folder with all its contents, however deep and whatever its permissions; ignore errors."""
-    if os.scandir not in os.supports_fd or os.rename not in os.supports_dir_fd:
-        shutil.rmtree(path, ignore_errors=True)
-        return
     try:
         folder = _opened(path)
     except OSError:

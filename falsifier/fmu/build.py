@@ -171,21 +171,16 @@ def _listed_3(path: Path, root: Path, identifier: str) -> Sources:
     own = [c for c in configurations if c.get("modelIdentifier", identifier) == identifier]
     # A configuration for another platform lists that platform's own files.
     general = [c for c in own if "platform" not in c.attrib] or own
-    sets = general[0].findall("SourceFileSet") if general else []
+    stated = {
+        tag: [element.attrib for each in general[:1] for element in each.findall(f"SourceFileSet/{tag}")]
+        for tag in ("SourceFile", "PreprocessorDefinition", "IncludeDirectory")
+    }
     return Sources(
-        tuple(_attributes(sets, "SourceFile")),
-        {
-            macro.attrib["name"]: macro.get("value", "")
-            for each in sets
-            for macro in each.findall("PreprocessorDefinition")
-        },
-        tuple(_attributes(sets, "IncludeDirectory")),
+        tuple(file["name"] for file in stated["SourceFile"]),
+        {macro["name"]: macro.get("value", "") for macro in stated["PreprocessorDefinition"]},
+        tuple(folder["name"] for folder in stated["IncludeDirectory"]),
     )
 
 
 def _xml(path: Path, described: Path) -> Element:
     return read_xml(described.read_bytes(), f"{path}: {described.name}", ModelError)
-
-
-def _attributes(sets: list[Element], tag: str) -> Iterator[str]:
-    return (element.attrib["name"] for each in sets for element in each.findall(tag))

@@ -5,7 +5,7 @@ outputs depend directly on an input must step after the component that feeds thi
 are late by one communication step.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from falsifier.fmu.description import Structure
@@ -28,13 +28,18 @@ class Dependencies:
         declared = self._inputs_of(place.member, output)
         return declared is not None and self._declared(place.member, place.name) in declared
 
-    def is_possible(self, place: Place, output: str) -> bool:
-        """Whether the output may depend directly on the input: declared, or nothing is declared."""
-        return self._inputs_of(place.member, output) is None or self.is_declared(place, output)
+    def may_reach(self, place: Place, *, undeclared: bool) -> bool:
+        """Whether an output of the component depends directly on the input at this place.
 
-    def outputs(self, member: int) -> list[str]:
-        """Return the names of the outputs of a component."""
-        return [v.name for v in self._members[member].description.info.outputs]
+        Args:
+            place: the input.
+            undeclared: whether an output of which nothing is declared may depend on it.
+        """
+        outputs = [v.name for v in self._members[place.member].description.info.outputs]
+        return any(
+            self.is_declared(place, name) or (undeclared and self._inputs_of(place.member, name) is None)
+            for name in outputs
+        )
 
     def _inputs_of(self, member: int, output: str) -> frozenset[str] | None:
         return self._structures[member].inputs_of.get(self._declared(member, output))
@@ -72,8 +77,8 @@ def step_order(members: int, links: Iterable[Link], dependencies: Dependencies) 
     A component comes after those on whose outputs its own outputs depend directly: as declared, and if
     possible also where nothing is declared. Otherwise the order is the given one.
     """
-    declared = _predecessors(members, links, dependencies, dependencies.is_declared)
-    possible = _predecessors(members, links, dependencies, dependencies.is_possible)
+    declared = _predecessors(members, links, dependencies, undeclared=False)
+    possible = _predecessors(members, links, dependencies, undeclared=True)
     left, order = set(range(members)), []
     while left:
         first = min(left, key=lambda m: (len(declared[m] & left), len(possible[m] & left), m))
@@ -89,12 +94,10 @@ def iterated_order(
 
     An FMU that declares nothing may depend directly on all its inputs, and counts as such.
     """
-    before = _predecessors(members, links, dependencies, dependencies.is_possible)
+    before = _predecessors(members, links, dependencies, undeclared=True)
     for link in links:
         member = link.source.member
-        if member == link.target.member and any(
-            dependencies.is_possible(link.target, name) for name in dependencies.outputs(member)
-        ):
+        if member == link.target.member and dependencies.may_reach(link.target, undeclared=True):
             before[member].add(member)
     reached = [_reached(m, before) for m in range(members)]
     base = {m: k for k, m in enumerate(step_order(members, links, dependencies))}
@@ -134,15 +137,12 @@ def late_links(
 
 
 def _predecessors(
-    members: int,
-    links: Iterable[Link],
-    dependencies: Dependencies,
-    is_direct: Callable[[Place, str], bool],
+    members: int, links: Iterable[Link], dependencies: Dependencies, *, undeclared: bool
 ) -> list[set[int]]:
+    """Return the components that must step before each component."""
     found: list[set[int]] = [set() for _ in range(members)]
     for link in links:
-        target = link.target
-        outputs = dependencies.outputs(target.member)
-        if link.source.member != target.member and any(is_direct(target, name) for name in outputs):
-            found[target.member].add(link.source.member)
+        source, target = link.source.member, link.target
+        if source not in (target.member, SYSTEM) and dependencies.may_reach(target, undeclared=undeclared):
+            found[target.member].add(source)
     return found

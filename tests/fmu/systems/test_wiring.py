@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.model import Experiment, Variable
 from falsifier.errors import ModelError, SimulationError, SpecError
-from falsifier.fmu import Connection, Coupling, System
+from falsifier.fmu import Connection, Coupling, Frame, System
 from falsifier.fmu.description import libraries
 from falsifier.fmu.process import Reply, Where
 from falsifier.fmu.process.plan import make_plan
@@ -166,6 +166,14 @@ def test_an_output_that_feeds_its_own_component_directly_is_a_loop() -> None:
     with pytest.raises(SpecError, match=r"a\.y -> a\.measured -> a\.y: these depend directly"):
         system({"a": "Gain_2"}, {"a.measured": "a.y"})
     assert system({"a": "Plant_2"}, {"a.u": "a.y"}).info.inputs == ()
+
+
+def test_an_input_of_the_whole_closes_no_loop() -> None:
+    frame = Frame((Variable("r", causality="input", start=0.0),))
+    links: dict[str, Connection | str] = {"first.r": Connection("r"), "last.measured": "first.y"}
+    fmus = {name: fixtures.path("Gain_2") for name in ("first", "last")}
+    found = System(fmus, links, coupling=Coupling(loops="iterate"), frame=frame)
+    assert found.network.loops == () and order(found) == ["first", "last"]
 
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
