@@ -19,8 +19,7 @@ from falsifier.fmu.description import (
     read_structure,
 )
 from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, Wire, parse_structure
-from falsifier.fmu.ssp.package import SUFFIXES, Package
-from falsifier.fmu.ssp.parameters import Given, bound_values
+from falsifier.fmu.ssp.package import SUFFIXES, Given, Package, bound_values
 from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
