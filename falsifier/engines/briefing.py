@@ -40,6 +40,7 @@ class Briefing:
         simulations: maximum number of simulations of the run, which prompts state; None: no limit.
         lessons: what the LLM wrote down for its next question.
         numbers: numbers of the samples, by the keys of their candidates.
+        told: number of samples.
         best: candidate of the sample with the smallest robustness.
         pending: candidates that were proposed and have no evaluation yet.
         rationales: the LLM's reasons, by the keys of its candidates.

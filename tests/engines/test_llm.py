@@ -1,7 +1,6 @@
 """The language model as an engine, on scripted chats and against a server on this machine."""
 
 import json
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,13 +21,11 @@ from falsifier.llm.connect import connect
 from falsifier.llm.conversation import NoValidReplyError
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.llm.replay import RecordedChat, ScriptedChat
-from falsifier.llm.retry import Gate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run, read_journal
 from falsifier.record.records import ExchangeRecord
 from falsifier.record.run import falsify, resume
-from falsifier.search.budget import Budget
 from falsifier.search.events import Event, Exchanged
 from falsifier.search.result import Result
 from falsifier.testing import START, EngineContract, lag_problem
@@ -334,39 +331,6 @@ def test_a_cache_answers_the_same_question_of_another_run(tmp_path: Path) -> Non
         assert len(server.received) == 2
         assert first_candidate(chat, 1) != asked
         assert len(server.received) == 4
-
-
-def test_runs_share_one_client() -> None:
-    problem = lag_problem()
-    with serving(*(Step(reply([0.01 * i] * 4), together=3, delay=0.02) for i in range(12))) as server:
-        chat = connect("openai/m", api_base=server.url, gate=Gate(concurrency=3))
-        found: list[Evaluation] = []
-
-        def run() -> None:
-            engine = LLMEngine(problem, chat, variant="MP4")
-            for _ in range(3):
-                found.append(evaluate(problem, *engine.ask()))
-                engine.tell(found[-1:])
-
-        threads = [threading.Thread(target=run) for _ in range(4)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert len(found) == 12
-    assert server.most_at_once == 3
-
-
-def test_token_budget_ends_a_run() -> None:
-    problem = lag_problem()
-    with serving(*(Step(reply([0.01 * i] * 4)) for i in range(9))) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url)
-        result = falsify(
-            problem, LLMEngine(problem, chat, variant="MP4"), budget=Budget(simulations=50, tokens=300)
-        )
-    assert result.status == "not falsified"
-    assert "300 tokens" in result.reason
-    assert result.spent.calls == 3
 
 
 def test_free_parameterizations_come_from_mp5_only() -> None:
