@@ -1,6 +1,6 @@
 """An engine that searches coarse inputs first, then finer ones, and passes on what it has learnt."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from falsifier.core.candidate import Candidate
@@ -49,8 +49,8 @@ class Refining:
     """
 
     def __init__(self, stages: Sequence[Stage]) -> None:
-        self._stages = list(stages)
-        self._level = 0
+        self._engines = [stage.engine for stage in stages]
+        self._stage, *self._finer = stages
         self._count = self._pending = 0
         self._simulations: int | None = None
         self._best: list[Evaluation] = []
@@ -62,14 +62,15 @@ class Refining:
     @property
     def name(self) -> str:
         """Name of the engine of each level."""
-        return self._stages[0].engine.name
+        return self._stage.engine.name
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return candidates of the level that it is time for, up to n, and none beyond the level's end."""
-        done = self._count + self._pending
-        while self._end is not None and done >= self._end:
+        done, wanted = self._count + self._pending, max(n, 1)
+        while self._finer and done >= self._finer[0].first:
             self._refine()
-        wanted = max(n, 1) if self._end is None else min(max(n, 1), self._end - done)
+        if self._finer:
+            wanted = min(wanted, self._finer[0].first - done)
         candidates, self._copies = self._copies[:wanted], self._copies[wanted:]
         if len(candidates) < wanted:
             candidates += self._asked(wanted - len(candidates))
@@ -80,8 +81,8 @@ class Refining:
         """Tell the engine of the current level what it can express, and keep what is worth passing on."""
         self._count += len(evaluations)
         self._pending = 0
-        self._stages[self._level].engine.tell(self._expressible(evaluations))
-        if self._end is not None:
+        self._stage.engine.tell([e for e in evaluations if self._expresses(e.candidate)])
+        if self._finer:
             self._keep(evaluations)
 
     def begin(self, simulations: int | None) -> None:
@@ -92,52 +93,45 @@ class Refining:
     def doubt(self, confirmation: Confirmation) -> None:
         """Tell the engines of this level and the next ones that a violation does not count if they ask."""
         self._doubts.append(confirmation)
-        engine = self._stages[self._level].engine
-        if isinstance(engine, FollowsRun):
-            engine.doubt(confirmation)
+        if isinstance(self._stage.engine, FollowsRun):
+            self._stage.engine.doubt(confirmation)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return the remarks of the engines of all levels."""
-        engines = [stage.engine for stage in self._stages]
-        return tuple(r for e in engines if isinstance(e, HasRemarks) for r in e.remarks(evaluations))
+        return tuple(r for e in self._engines if isinstance(e, HasRemarks) for r in e.remarks(evaluations))
 
     def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
         """Connect the engines to a run if they ask a language model."""
-        for stage in self._stages:
-            if isinstance(stage.engine, AsksLLM):
-                stage.engine.attach(on_exchange, wrap)
-
-    @property
-    def _end(self) -> int | None:
-        """Number of simulations after which the next level begins; None on the last one."""
-        finer = self._stages[self._level + 1 :]
-        return finer[0].first if finer else None
+        for engine in self._engines:
+            if isinstance(engine, AsksLLM):
+                engine.attach(on_exchange, wrap)
 
     def _refine(self) -> None:
         """Go on with the next level."""
-        self._level += 1
-        stage = self._stages[self._level]
-        passed = [*self._constant.values(), *self._best]
-        self._earlier = {_same(e.candidate): e for e in passed}
-        known = self._expressible(self._earlier.values())
-        foreign = [e for e in self._best if not _expresses(stage, e.candidate)]
-        copies = [(e, _copy(stage.space, e.candidate)) for e in foreign]
-        known += [replace(e, candidate=copy) for e, copy in copies if _same(copy) in self._earlier]
-        self._copies = [copy for _, copy in copies if _same(copy) not in self._earlier][:COPIES]
+        self._stage, self._copies = self._finer.pop(0), []
+        self._earlier = {_same(e.candidate): e for e in (*self._constant.values(), *self._best)}
+        known = [e for e in self._earlier.values() if self._expresses(e.candidate)]
+        for evaluation in self._best:
+            if self._expresses(evaluation.candidate):
+                continue
+            copy = _copy(self._stage.space, evaluation.candidate)
+            if _same(copy) in self._earlier:
+                known.append(replace(evaluation, candidate=copy))
+            elif len(self._copies) < COPIES:
+                self._copies.append(copy)
         self._begin(told=len(known))
-        stage.engine.tell(known)
+        self._stage.engine.tell(known)
 
     def _begin(self, *, told: int) -> None:
-        engine = self._stages[self._level].engine
-        if isinstance(engine, FollowsRun):
-            end = self._simulations if self._end is None else self._end
-            engine.begin(None if end is None else end - self._stages[self._level].first + told)
+        if isinstance(self._stage.engine, FollowsRun):
+            end = self._finer[0].first if self._finer else self._simulations
+            self._stage.engine.begin(None if end is None else end - self._stage.first + told)
             for confirmation in self._doubts:
-                engine.doubt(confirmation)
+                self._stage.engine.doubt(confirmation)
 
     def _asked(self, n: int) -> list[Candidate]:
         """Ask the engine; what earlier levels have simulated is told to it at once."""
-        engine = self._stages[self._level].engine
+        engine = self._stage.engine
         candidates = engine.ask(n)
         for _ in range(0 if isinstance(engine, AsksLLM) else _RETRIES):  # asking a language model costs money
             known = [c for c in candidates if _same(c) in self._earlier]
@@ -147,34 +141,26 @@ class Refining:
             candidates = [c for c in candidates if c not in known] or engine.ask(n)
         return candidates
 
-    def _expressible(self, evaluations: Iterable[Evaluation]) -> list[Evaluation]:
-        stage = self._stages[self._level]
-        return [e for e in evaluations if _expresses(stage, e.candidate)]
+    def _expresses(self, candidate: Candidate) -> bool:
+        """Whether the level's inputs include these, so that its engine can learn from them as they are."""
+        try:
+            self._stage.space.admit(candidate)
+        except CandidateError:
+            return False
+        return True
 
     def _keep(self, evaluations: Sequence[Evaluation]) -> None:
         for evaluation in evaluations:
-            if len(self._constant) < _KEPT and _is_constant(evaluation.candidate):
+            is_constant = all(len(set(s.values)) == 1 for s in evaluation.candidate.signals.values())
+            if is_constant and len(self._constant) < _KEPT:
                 self._constant.setdefault(_same(evaluation.candidate), evaluation)
         judged = [e for e in (*self._best, *evaluations) if e.robustness is not None]
         self._best = sorted(judged, key=lambda e: e.robustness or 0.0)[:_KEPT]
 
 
-def _expresses(stage: Stage, candidate: Candidate) -> bool:
-    """Whether a level's inputs include these, so that its engine can learn from them as they are."""
-    try:
-        stage.space.admit(candidate)
-    except CandidateError:
-        return False
-    return True
-
-
 def _copy(space: SearchSpace, candidate: Candidate) -> Candidate:
     finer = fit(space, candidate).candidate
     return replace(finer, rationale=f"one of the best samples so far, in finer pieces: {candidate.rationale}")
-
-
-def _is_constant(candidate: Candidate) -> bool:
-    return all(len(set(signal.values)) == 1 for signal in candidate.signals.values())
 
 
 def _same(candidate: Candidate) -> object:
