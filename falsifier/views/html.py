@@ -30,7 +30,7 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
     '<p class="a">1 &lt; 2</p>'
     """
     given = "".join(
-        f' {name.rstrip("_").replace("_", "-")}="{_escaped(_text(value))}"'
+        f' {name.rstrip("_").replace("_", "-")}="{_escaped(value)}"'
         for name, value in attributes.items()
         if value is not None
     )
@@ -74,9 +74,5 @@ def picture(content: bytes, kind: Literal["png", "svg+xml"], description: str) -
     return el("img", src=f"data:image/{kind};base64,{data}", alt=description, class_="picture")
 
 
-def _escaped(text: str) -> str:
-    return escape(plain(text))
-
-
-def _text(value: str | float) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
+def _escaped(value: str | float) -> str:
+    return escape(plain(value if isinstance(value, str) else f"{value:.6g}"))

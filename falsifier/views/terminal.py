@@ -3,27 +3,17 @@
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from falsifier.core.literals import plain
 from falsifier.core.secrets import redact
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.live import Live
+    from rich.progress import Progress
 
 T = TypeVar("T")
-
-
-class Live(Protocol):
-    """A moving display of rich."""
-
-    def start(self) -> None:
-        """Begin to draw."""
-        ...
-
-    def stop(self) -> None:
-        """Draw for the last time."""
-        ...
 
 
 def warn(text: str) -> None:
@@ -60,7 +50,7 @@ def unbroken(show: Callable[[T], None]) -> Callable[[T], None]:
 
 
 @contextmanager
-def moving(live: Live) -> Iterator[None]:
+def moving(live: "Live | Progress") -> Iterator[None]:
     """Keep a display moving for as long as the context lasts."""
     with suppress(OSError):
         live.start()

@@ -18,6 +18,7 @@ from falsifier.record import manifest
 from falsifier.search.budget import Spent
 from falsifier.search.refine_levels import (
     LevelResult,
+    RefineLevel,
     level_results,
     parameterization_note,
     parameterization_of,
@@ -41,7 +42,9 @@ def result_text(result: Result) -> str:
         if _can_continue(result):
             lines.append(_continue_line(result.directory))
         elif result.status == "not falsified" and result.best is not None:
-            lines.append(_closer_line(result.directory))
+            place = shlex.quote(str(result.directory))
+            nearest = f"falsifier explain {place} (the nearest miss)"
+            lines.append(f"to look closer: {nearest}, falsifier coverage {place} (what was tried)")
     if result.status == "failed":
         lines.append(f"failed: {result.reason}")
     return "\n".join(map(one_line, lines))
@@ -123,7 +126,6 @@ def counterexample_name(result: Result) -> str:
 
 def result_json(result: Result) -> dict[str, Any]:
     """Convert a result to a value that can be dumped as one JSON object."""
-    spent: dict[str, Any] = {field: getattr(result.spent, field) for field in Spent.__dataclass_fields__}
     return {
         "requirement": result.problem.name,
         "formula": str(result.problem.requirement.formula),
@@ -134,14 +136,22 @@ def result_json(result: Result) -> dict[str, Any]:
         "parameterization": "refined"
         if result.levels
         else parameterization_of(result.searched or result.problem.space),
-        "levels": _levels_json(result),
+        "levels": [
+            {
+                "searched": parameterization_note(level.space),
+                "simulations": found.simulations,
+                "smallest": found.smallest,
+                "falsified": found.falsified,
+            }
+            for level, found in _level_results(result)
+        ],
         "findings": [asdict(finding) for finding in result.findings],
         "failures": [asdict(failure) for failure in result.failures],
         "not_searched": [asdict(held) for held in result.problem.held],
         "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
         "remarks": list(result.remarks),
         "not_confirmed": [c.reason for c in result.refuted],
-        "spent": spent,
+        "spent": asdict(result.spent),
         "directory": result.directory and str(result.directory),
     }
 
@@ -150,29 +160,20 @@ def level_facts(result: Result) -> list[Fact]:
     """Say of each level of a search that refined its inputs what was searched, and what came of it."""
     return [
         (found.name, f"{found.text}: {parameterization_note(level.space)}")
-        for level, found in zip(result.levels, _level_results(result), strict=True)
+        for level, found in _level_results(result)
     ]
 
 
-def _level_results(result: Result) -> tuple[LevelResult, ...]:
+def _level_results(result: Result) -> list[tuple[RefineLevel, LevelResult]]:
     if not result.levels:
-        return ()
+        return []
     starts = [level.first for level in result.levels]
     # What was simulated at the same time as the counterexample comes after it and does not count.
     end = result.spent.simulations if result.falsified else None
-    return level_results(starts, [e.robustness for e in result.evaluations[:end]], falsified=result.falsified)
-
-
-def _levels_json(result: Result) -> list[dict[str, Any]]:
-    return [
-        {
-            "searched": parameterization_note(level.space),
-            "simulations": found.simulations,
-            "smallest": found.smallest,
-            "falsified": found.falsified,
-        }
-        for level, found in zip(result.levels, _level_results(result), strict=True)
-    ]
+    robustness = [e.robustness for e in result.evaluations[:end]]
+    return list(
+        zip(result.levels, level_results(starts, robustness, falsified=result.falsified), strict=True)
+    )
 
 
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
@@ -237,20 +238,17 @@ def outcome_text(evaluation: Evaluation) -> str:
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """Convert an evaluation to a value that can be dumped as JSON."""
-    verdict = evaluation.verdict
+    verdict, signals = evaluation.verdict, evaluation.candidate.signals
+    breach = verdict.breach if verdict else None
     return {
         **evaluation.candidate.to_json(),
         "robustness": evaluation.robustness,
         "critical_time": verdict and verdict.critical_time,
         "predicate": verdict and verdict.predicate,
         "values": dict(verdict.values) if verdict else None,
-        "breach": asdict(verdict.breach) | {"text": verdict.breach.text}
-        if verdict and verdict.breach
-        else None,
-        "switches": {name: signal.switches for name, signal in evaluation.candidate.signals.items()},
-        "shortest_dwell": {
-            name: signal.shortest_dwell for name, signal in evaluation.candidate.signals.items()
-        },
+        "breach": breach and asdict(breach) | {"text": breach.text},
+        "switches": {name: signal.switches for name, signal in signals.items()},
+        "shortest_dwell": {name: signal.shortest_dwell for name, signal in signals.items()},
     }
 
 
@@ -277,12 +275,6 @@ def _can_continue(result: Result) -> bool:
     if not result.evaluations or result.spent.has_mostly_failed:
         return False
     return result.status in ("interrupted", "failed")
-
-
-def _closer_line(directory: Path) -> str:
-    place = shlex.quote(str(directory))
-    nearest = f"falsifier explain {place} (the nearest miss)"
-    return f"to look closer: {nearest}, falsifier coverage {place} (what was tried)"
 
 
 def _continue_line(directory: Path) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from falsifier.analyses.coverage import labels_of
-from falsifier.campaigns.analysis import Published, Run, Table, load, main_table, read_published
+from falsifier.campaigns.analysis import Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
@@ -133,16 +133,16 @@ class Content:
         return {name: [sections.get(name) for sections in by_side] for name in names}
 
 
-def gather(*directories: Path, published: Published | None = None) -> Content:
+def gather(*directories: Path) -> Content:
     """Read runs or campaigns; several are compared.
 
     Raises:
         JournalError: if a directory is neither, or is damaged.
     """
-    return Content([_side(directory, published) for directory in directories])
+    return Content(list(map(_side, directories)))
 
 
-def _side(directory: Path, published: Published | None) -> Side:
+def _side(directory: Path) -> Side:
     runs = load(directory)
     grouped: dict[str, dict[str, list[Run]]] = {}
     for run in runs:
@@ -152,7 +152,7 @@ def _side(directory: Path, published: Published | None) -> Side:
     return Side(
         directory.resolve().name,
         runs,
-        main_table(runs, read_published() if published is None else published) if counts else None,
+        main_table(runs, read_published()) if counts else None,
         [_section(name, by_method) for name, by_method in grouped.items()],
     )
 
@@ -169,8 +169,11 @@ def searches(runs: Iterable[Run]) -> list[Run]:
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     runs = [run for members in by_method.values() for run in members]
-    shown = [_shown(run) for run in [run for run in runs if run.falsified] or _best(runs)]
-    return section_of(name, by_method, shown)
+    found = [run for run in runs if run.falsified]
+    if not found:
+        judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
+        found = [judged[min(judged)]] if judged else []
+    return section_of(name, by_method, list(map(_shown, found)))
 
 
 def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
@@ -194,11 +197,6 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
         by_method,
         sorted(shown, key=lambda one: (not one.is_shrunk, one.run.simulations)),
     )
-
-
-def _best(runs: Iterable[Run]) -> list[Run]:
-    judged = [run for run in runs if run.verdict is not None]
-    return [min(judged, key=lambda run: run.verdict.robustness if run.verdict else 0.0)] if judged else []
 
 
 def _shown(run: Run) -> Shown:

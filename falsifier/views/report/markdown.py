@@ -10,6 +10,7 @@ from falsifier.views.report.wording import (
     differences,
     input_table,
     limit_facts,
+    parameter_facts,
     replay_command,
     result_text,
     run_command,
@@ -43,10 +44,11 @@ def markdown_report(*directories: Path) -> str:
 
 def _verdict(section: Section, where: str) -> list[str]:
     """What a card of the page shows, without its picture."""
+    result = markdown_text(one_line(result_text(section)))
     parts = [
         f"## {markdown_text(section.heading)}{where}: {section.status}",
         markdown_text(one_line(section.sentence)),
-        f"**{_capital(markdown_text(one_line(result_text(section))))}.**",
+        f"**{result[:1].upper()}{result[1:]}.**",
     ]
     if section.shown:
         parts += _found(section.shown[0])
@@ -69,12 +71,7 @@ def _found(shown: Shown) -> list[str]:
     if shown.candidate.signals:
         parts.append(input_table(shown).markdown().rstrip())
     if shown.candidate.parameters:
-        parts.append(
-            _facts(
-                (f"{n} =", f"{v:.10g} {shown.units.get(n, '')}")
-                for n, v in shown.candidate.parameters.items()
-            )
-        )
+        parts.append(_facts(parameter_facts(shown)))
     if shown.explanation:
         parts.append(markdown_text(one_line(shown.explanation)))
     if shown.confirmed:
@@ -92,10 +89,6 @@ def _facts(facts: Iterable[Fact]) -> str:
 def _listed(title: str, lines: Iterable[str]) -> list[str]:
     items = [f"- {markdown_text(one_line(line))}" for line in lines]
     return ["\n".join([f"{title}:", "", *items])] if items else []
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _environment(side: Side) -> str:

@@ -16,6 +16,7 @@ from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join, picture, table
+from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report.content import Content, Section, Shown, Side, Status, gather, searches
 from falsifier.views.report.wording import (
     advice,
@@ -23,6 +24,7 @@ from falsifier.views.report.wording import (
     input_table,
     level_facts,
     limit_facts,
+    parameter_facts,
     replay_command,
     result_text,
     run_command,
@@ -64,32 +66,28 @@ def html_report(*directories: Path) -> str:
 
 def page(content: Content) -> str:
     """Lay out a report: verdicts first, then what they rest on."""
-    talks = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in _sections(content))
+    sections = [section for side in content.sides for section in side.sections]
+    talks = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in sections)
     most = max(1, _MOST_QUESTIONS // max(1, talks))
-    names = list(content.requirements)
+    requirements = content.requirements
+    links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in requirements]
+    cards = [_verdicts(content, name, found, most) for name, found in requirements.items()]
     return document(
         f"Falsification report: {content.title}",
         el("a", "Skip to the results", href="#verdicts", class_="skip"),
         el("header", el("h1", content.title), *(el("p", overview(side)) for side in content.sides)),
-        _navigation(names) if len(names) > 1 else Html(""),
+        el("nav", el("ul", *links), aria_label="Requirements") if len(links) > 1 else "",
         el(
             "main",
-            el(
-                "div",
-                *(
-                    _verdicts(content, name, sections, most)
-                    for name, sections in content.requirements.items()
-                ),
-                id="verdicts",
-            ),
-            _differences(content) if len(content.sides) > 1 else Html(""),
-            *(_statistics(side) for side in content.sides),
-            *(_environment(side) for side in content.sides),
+            el("div", *cards, id="verdicts"),
+            _differences(content) if len(content.sides) > 1 else "",
+            *map(_statistics, content.sides),
+            *map(_environment, content.sides),
         ),
     )
 
 
-def document(title: str, *body: Html, script: str = "") -> str:
+def document(title: str, *body: str, script: str = "") -> str:
     """Return a page with the style of reports, whose policy forbids all scripts but this one.
 
     Args:
@@ -133,8 +131,6 @@ def overview(side: Side) -> str:
 
 def drawn(make: "Callable[[], Figure]", description: str) -> Html:
     """Draw a figure into the page; if it cannot be drawn, say so."""
-    from falsifier.views.plotting import svg
-
     try:
         content = svg(make())
     except Exception as error:  # whatever a drawing library thinks of values and names that others chose
@@ -147,7 +143,7 @@ def facts_html(facts: Iterable[Fact]) -> Html:
     return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
 
 
-def card_html(section: Section, *, title: str = "", more: Sequence[Html] = ()) -> Html:
+def card_html(section: Section, *, title: str = "", more: Sequence[str] = ()) -> Html:
     """Show the verdict on a requirement: what was found, or what was tried.
 
     Args:
@@ -157,26 +153,20 @@ def card_html(section: Section, *, title: str = "", more: Sequence[Html] = ()) -
     """
     status = section.status
     found = _found(section.shown[0]) if section.shown else []
+    if status != "violated":
+        what = tried(section)
+        found.append(join(el("h3", "What was tried"), facts_html(what)) if what else "")
+        found.append(_lines("What this does not show", unshown_lines(section)))
     return el(
         "article",
         el("h2", title or section.heading, " ", el("span", _BADGES[status], class_="badge")),
         el("p", section.sentence, class_="sentence"),
         el("p", result_text(section), class_="result"),
         *found,
-        *(_untested(section) if status != "violated" else ()),
-        _lines("Incomplete runs and unconfirmed violations", list(trouble_lines(section))),
+        _lines("Incomplete runs and unconfirmed violations", trouble_lines(section)),
         *more,
         class_=f"card {status.replace(' ', '-')}",
     )
-
-
-def _sections(content: Content) -> list[Section]:
-    return [section for side in content.sides for section in side.sections]
-
-
-def _navigation(names: Sequence[str]) -> Html:
-    links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in names]
-    return el("nav", el("ul", *links), aria_label="Requirements")
 
 
 def _anchor(name: str) -> str:
@@ -197,80 +187,59 @@ def _verdicts(content: Content, name: str, sections: Sequence[Section | None], m
     return el("section", *cards, id=_anchor(name), class_="sides")
 
 
-def _found(shown: Shown) -> list[Html]:
+def _found(shown: Shown) -> list[str]:
     """What violates, or came nearest: limit and value, picture, inputs, why, and whether it is confirmed."""
     run, verdict = shown.run, shown.verdict
     what = "counterexample" if run.falsified else "simulation nearest to a violation"
     named = f"The shrunk {what}" if shown.is_shrunk else f"The {what}"
     if shown.panels:
-        seen = _simulation(shown)
+        names = ", ".join(panel.title for panel in shown.panels)
+        seen = drawn(lambda: plot_panels(shown.panels, shown.verdict), f"over time: {names}")
     else:
         lost = "its file is damaged or missing" if shown.is_lost else "its trajectory was not kept"
         seen = el("p", f"{named} is not shown: {lost}.", class_="note")
     inputs = input_table(shown)
-    listed = table(inputs.header, inputs.rows, label=inputs.title, numbers=True)
+    listed = table(inputs.header, inputs.rows, label=inputs.title, numbers=True) if inputs.rows else ""
     if len(inputs.rows) > _MOST_ROWS:
         listed = el("details", el("summary", f"Table of {counted(len(inputs.rows), 'row')}"), listed)
-    parameters = facts_html(
-        (f"{n} =", f"{v:.10g} {shown.units.get(n, '')}".strip())
-        for n, v in shown.candidate.parameters.items()
-    )
+    parameters = parameter_facts(shown)
+    command = advice(shown)
     return [
-        el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else Html(""),
+        el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else "",
         el("h3", named),
         seen,
         el("h3", "Inputs to enter in a simulator"),
-        listed if inputs.rows else Html(""),
-        parameters if shown.candidate.parameters else Html(""),
-        join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else Html(""),
-        facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else Html(""),
-        el("p", "To simplify and explain it: ", el("code", advice(shown)), class_="note")
-        if advice(shown)
-        else Html(""),
+        listed,
+        facts_html(parameters) if parameters else "",
+        join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
+        facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
+        el("p", "To simplify and explain it: ", el("code", command), class_="note") if command else "",
     ]
 
 
-def _simulation(shown: Shown) -> Html:
-    from falsifier.views.plotting import plot_panels
-
-    names = ", ".join(panel.title for panel in shown.panels)
-    return drawn(lambda: plot_panels(shown.panels, shown.verdict), f"over time: {names}")
-
-
-def _untested(section: Section) -> list[Html]:
-    """What was tried without a violation, and what was not tested."""
-    what = tried(section)
-    return [
-        join(el("h3", "What was tried"), facts_html(what)) if what else Html(""),
-        _lines("What this does not show", unshown_lines(section)),
-    ]
-
-
-def _lines(title: str, lines: Sequence[str]) -> Html:
-    return join(el("h3", title), el("ul", *(el("li", line) for line in lines))) if lines else Html("")
+def _lines(title: str, lines: Sequence[str]) -> str:
+    return join(el("h3", title), el("ul", *(el("li", line) for line in lines))) if lines else ""
 
 
 def _details(section: Section, most: int) -> Html:
     """What a verdict rests on: formula, runs, robustness over simulations, other finds, questions."""
-    from falsifier.views.plotting import plot_history, plot_rates
-
     runs, first = section.runs, section.shown[:1]
     held = held_text(runs[0].manifest.not_searched)
     histories = [
         drawn(partial(plot_history, *members), f"Robustness over simulations, {label}")
         for label, members in section.by_method.items()
     ]
-    rates = drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations")
+    if len(runs) > 1:
+        histories.append(drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations"))
     return el(
         "details",
         el("summary", f"Formula, {counted(len(runs), 'run')}, engines and seeds"),
         el("p", el("code", section.formula), class_="formula"),
-        *(_shown_details(one) for one in first),
-        facts_html([("not searched", held)]) if held else Html(""),
+        *map(_shown_details, first),
+        facts_html([("not searched", held)]) if held else "",
         _runs(runs),
         *histories,
-        rates if len(runs) > 1 else Html(""),
-        *(_other(one) for one in section.shown[1:_MOST_DRAWN]),
+        *map(_other, section.shown[1:_MOST_DRAWN]),
         _questions(section, most),
         class_="more",
     )
@@ -326,17 +295,17 @@ def _other(shown: Shown) -> Html:
     )
 
 
-def _questions(section: Section, most: int) -> Html:
+def _questions(section: Section, most: int) -> str:
     """What the runs of a requirement asked a language model."""
     asked = [shown.run for shown in section.shown if shown.run.spent.calls]
     if not asked:
-        return Html("")
+        return ""
     parts = [
         join(el("h4", run_name(run)), exchanges_html(run.directory, run.requirement, most=most))
         for run in asked[:_MOST_TALKS]
     ]
     rest = "".join(f" {run_name(run)}: falsifier report {run.directory}." for run in asked[_MOST_TALKS:])
-    note = el("p", f"Not shown here:{rest}", class_="note") if rest else Html("")
+    note = el("p", f"Not shown here:{rest}", class_="note") if rest else ""
     return join(el("h3", "What was asked, and what came of it"), *parts, note)
 
 
@@ -346,9 +315,9 @@ def _differences(content: Content) -> Html:
     return el("section", el("h2", found.title), shown)
 
 
-def _statistics(side: Side) -> Html:
+def _statistics(side: Side) -> str:
     if side.table is None:
-        return Html("")
+        return ""
     main = side.table.only(*(name for name in side.table.header if name not in _FOLDED))
     folded = side.table.only(*(name for name in side.table.header if name in (*_KEYS, *_FOLDED)))
     return el(

@@ -1,7 +1,7 @@
 """What a report says of its content: phrases, facts, tables, and commands that repeat what it shows."""
 
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -118,19 +118,14 @@ def input_table(shown: Shown) -> Table:
         name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal
         for name, signal in shown.candidate.signals.items()
     }
-    times = sorted({time for signal in signals.values() for time in signal.times})
-    points = {name: dict(zip(s.times, s.values, strict=True)) for name, s in signals.items()}
-    header = [f"{name}{_in_brackets(shown.units.get(name, ''))}, {_course(s)}" for name, s in signals.items()]
-    cells = {time: [points[name].get(time) for name in signals] for time in times}
-    rows = [
-        (f"{time:.6g}", *("" if value is None else f"{value:.6g}" for value in row))
-        for time, row in cells.items()
-    ]
-    return Table("Inputs", ("time [s]", *header), tuple(rows))
-
-
-def _in_brackets(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
+    header, columns = ["time [s]"], []
+    for name, signal in signals.items():
+        unit = shown.units.get(name, "")
+        header.append(f"{name}{f' [{unit}]' if unit else ''}, {_course(signal)}")
+        columns.append({time: f"{v:.6g}" for time, v in zip(signal.times, signal.values, strict=True)})
+    times = sorted({time for column in columns for time in column})
+    rows = [(f"{time:.6g}", *(column.get(time, "") for column in columns)) for time in times]
+    return Table("Inputs", tuple(header), tuple(rows))
 
 
 def _course(signal: Signal) -> str:
@@ -139,6 +134,12 @@ def _course(signal: Signal) -> str:
         return "constant"
     held = f", sampled every {signal.hold:g} s" if signal.hold and signal.interpolation != "constant" else ""
     return f"{_BETWEEN[signal.interpolation]}{held}"
+
+
+def parameter_facts(shown: Shown) -> list[Fact]:
+    """Return the parameters of a simulation with their values and units."""
+    values = shown.candidate.parameters.items()
+    return [(f"{name} =", f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
 
 
 def tried(section: Section) -> list[Fact]:
@@ -170,13 +171,15 @@ def unshown_lines(section: Section) -> list[str]:
     ]
 
 
-def trouble_lines(section: Section) -> Iterator[str]:
-    """Yield which runs failed or were interrupted, and which violations were not confirmed."""
+def trouble_lines(section: Section) -> list[str]:
+    """Return which runs failed or were interrupted, and which violations were not confirmed."""
+    lines = []
     for run in section.runs:
         if run.status in ("failed", "interrupted"):
-            yield f"{run_name(run)}: {run.status}: {run.reason}"
+            lines.append(f"{run_name(run)}: {run.status}: {run.reason}")
         for index, outcome in run.unconfirmed.items():
-            yield f"{run_name(run)}, simulation {index + 1}: {outcome}"
+            lines.append(f"{run_name(run)}, simulation {index + 1}: {outcome}")
+    return lines
 
 
 def run_name(run: Run) -> str:
