@@ -31,7 +31,7 @@ def info_text(info: ModelInfo, *, everything: bool = False) -> str:
         info: the description.
         everything: whether to list all variables, internal ones too.
     """
-    return "\n".join(_lines(info, everything=everything))
+    return "\n".join(_info_lines(info, everything=everything))
 
 
 def model_json(info: ModelInfo) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def model_json(info: ModelInfo) -> dict[str, Any]:
     return content
 
 
-def _lines(info: ModelInfo, *, everything: bool) -> Iterator[str]:
+def _info_lines(info: ModelInfo, *, everything: bool) -> Iterator[str]:
     yield f"{info.name}  FMI {info.fmi_version}, {', '.join(info.interfaces) or NO_INTERFACE}"
     if info.description:
         yield info.description
@@ -176,7 +176,9 @@ class SystemDiagram:
 def diagram(system: System) -> SystemDiagram:
     """Return the components and connections of a system."""
     network = system.network
-    late = set(_late(network))
+    late = set(late_links(network.links, network.order, network.loops))
+    if network.coupling.method == "jacobi":
+        late = {n for n in network.links if n.source.member != SYSTEM}
     outer = tuple(name for name, place in network.places.items() if place.member == SYSTEM)
     wires = tuple(
         Wire(network.title(n.source), network.title(n.target), _conversion(n), n in late)
@@ -187,17 +189,10 @@ def diagram(system: System) -> SystemDiagram:
     return SystemDiagram(system.name, boxes, wires, network.loops, outer, network.coupling.method)
 
 
-def _late(network: Network) -> Iterator[Link]:
-    if network.coupling.method == "jacobi":
-        return (n for n in network.links if n.source.member != SYSTEM)
-    return late_links(network.links, network.order, network.loops)
-
-
 def _conversion(link: Link) -> str:
     factor = "" if link.factor == 1.0 else f" * {link.factor:.6g}"
     offset = "" if link.offset == 0.0 else f" {link.offset:+.6g}"
-    line = " (extrapolated)" if link.is_linear else ""
-    return f"{factor}{offset}{line}"
+    return f"{factor}{offset}{' (extrapolated)' if link.is_linear else ''}"
 
 
 def _box(network: Network, position: int, connected: set[str]) -> Box:
@@ -222,44 +217,31 @@ def _box(network: Network, position: int, connected: set[str]) -> Box:
     )
 
 
-def diagram_text(found: SystemDiagram) -> str:
-    """Return a system as text for the terminal: components in the order of stepping, with their ports."""
-    return "\n".join(_diagram_lines(found))
-
-
 def loop_texts(found: SystemDiagram) -> Iterator[str]:
     """Yield which components repeat their steps together."""
     for first, last in found.loops:
         yield f"{', '.join(box.name for box in found.boxes[first:last])}: repeated until the outputs agree"
 
 
-def _diagram_lines(found: SystemDiagram) -> Iterator[str]:
+def diagram_text(found: SystemDiagram) -> str:
+    """Return a system as text for the terminal: components in the order of stepping, with their ports."""
     number = len(found.boxes)
     count = f"{number} component" + ("s, in the order in which they step" if number > 1 else "")
-    yield f"{found.name}: {count} ({found.method})"
-    yield from loop_texts(found)
-    feeding = {wire.target: wire for wire in found.wires}
-    fed: dict[str, list[str]] = {}
+    lines = [f"{found.name}: {count} ({found.method})", *loop_texts(found)]
+    sources, targets = dict[str, str](), dict[str, str]()
     for wire in found.wires:
-        fed.setdefault(wire.source, []).append(wire.target)
-    for name in found.outer:
-        yield f"   input of the system: {name} -> {', '.join(fed.get(name, ['not connected']))}"
+        sources[wire.target] = f"{wire.source}{wire.conversion}{'  (late)' if wire.is_late else ''}"
+        before = f"{targets[wire.source]}, " if wire.source in targets else ""
+        targets[wire.source] = f"{before}{wire.target}"
+    none = "not connected"
+    lines += [f"   input of the system: {name} -> {targets.get(name, none)}" for name in found.outer]
     for k, box in enumerate(found.boxes, start=1):
-        yield ""
-        yield f"{k:2} {box.name}  ({box.kind})"
+        lines += ["", f"{k:2} {box.name}  ({box.kind})"]
         width = max((len(port.label) for port in (*box.inputs, *box.outputs)), default=0)
-        for port in box.inputs:
-            yield f"     {port.label:{width}}  <-  {_source(feeding.get(port.title))}"
-        for port in box.outputs:
-            yield f"     {port.label:{width}}  ->  {', '.join(fed.get(port.title, ['not connected']))}"
+        lines += [f"     {p.label:{width}}  <-  {sources.get(p.title, none)}" for p in box.inputs]
+        lines += [f"     {p.label:{width}}  ->  {targets.get(p.title, none)}" for p in box.outputs]
         if box.left_out:
-            yield f"     ... and {box.left_out} more that are not connected"
+            lines.append(f"     ... and {box.left_out} more that are not connected")
     if any(wire.is_late for wire in found.wires):
-        yield ""
-        yield "(late): the value of the previous communication point"
-
-
-def _source(wire: Wire | None) -> str:
-    if wire is None:
-        return "not connected"
-    return f"{wire.source}{wire.conversion}{'  (late)' if wire.is_late else ''}"
+        lines += ["", "(late): the value of the previous communication point"]
+    return "\n".join(lines)

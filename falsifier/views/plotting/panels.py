@@ -1,6 +1,6 @@
 """What to draw of one simulation, as values: compared quantities with their bounds, then inputs.
 
-Both the matplotlib figures and the charts in reports are drawn from these panels.
+Figures of results, reports and notebooks are drawn from these panels.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -84,7 +84,7 @@ def panels(
     candidate: Candidate,
     inputs: Iterable[Range],
     verdict: Verdict | None,
-    labels: Mapping[str, Mapping[int, str]] | None = None,
+    labels: Mapping[str, Mapping[int, str]],
     components: Sequence[str] = (),
 ) -> list[Panel]:
     """Make the panels of one simulation: one per compared quantity, then one per searched input.
@@ -100,17 +100,29 @@ def panels(
         labels: names of the numbers of signals that are not real, by signal.
         components: names of the components of a system.
     """
-    quantities = [(compared_sides(judged[0][0])[0], judged) for judged in _compared(formula).values()]
+    compared: dict[str, _Judged] = {}
+    for predicate, window in judged_windows(formula):
+        compared.setdefault(str(compared_sides(predicate)[0]), []).append((predicate, window))
     drawn = [
-        replace(_quantity(trajectory, judged, verdict), component=_owner(quantity.signals, components))
-        for quantity, judged in quantities
+        _named(_quantity(trajectory, judged, verdict), name, predicate.signals, labels, components)
+        for name, judged in compared.items()
+        for predicate in [compared_sides(judged[0][0])[0]]
     ]
-    drawn += [
-        replace(_input(r, trajectory, candidate), component=_owner([r.name], components)) for r in inputs
-    ]
+    drawn += [_named(_input(r, trajectory, candidate), r.name, [r.name], labels, components) for r in inputs]
     place = {name: k for k, name in enumerate(components)}
-    grouped = sorted(drawn, key=lambda panel: place.get(panel.component, -1))
-    return [_discrete(panel, labels or {}) for panel in grouped]
+    return sorted(drawn, key=lambda panel: place.get(panel.component, -1))
+
+
+def _named(
+    panel: Panel,
+    name: str,
+    signals: Iterable[str],
+    labels: Mapping[str, Mapping[int, str]],
+    components: Sequence[str],
+) -> Panel:
+    """Return a panel with the component that it belongs to, and the names of its numbers if it has any."""
+    panel = replace(panel, component=_owner(signals, components))
+    return replace(panel, labels=labels[name], steps=True) if name in labels else panel
 
 
 def _owner(signals: Iterable[str], components: Sequence[str]) -> str:
@@ -141,14 +153,6 @@ def judged_windows(
 
 
 _Judged = list[tuple[Predicate, tuple[float, float]]]
-
-
-def _compared(formula: Formula) -> dict[str, _Judged]:
-    """Predicates with their windows by compared quantity, in order of first appearance."""
-    found: dict[str, _Judged] = {}
-    for predicate, window in judged_windows(formula):
-        found.setdefault(str(compared_sides(predicate)[0]), []).append((predicate, window))
-    return found
 
 
 def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) -> Panel:
@@ -185,11 +189,6 @@ def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
         limits=(float(_drawable(r.low)), float(_drawable(r.high))),
         steps=signal.interpolation == "constant",
     )
-
-
-def _discrete(panel: Panel, labels: Mapping[str, Mapping[int, str]]) -> Panel:
-    name = panel.title.partition(" [")[0]
-    return replace(panel, labels=labels[name], steps=True) if name in labels else panel
 
 
 def _evaluated(expression: Expression, trajectory: Trajectory) -> Array:

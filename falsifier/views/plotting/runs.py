@@ -1,6 +1,6 @@
 """Figures of runs and campaigns."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -92,11 +92,12 @@ def plot_comparison(
     """
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
-    panels = [p for p in ([r for r in requirements if (r in apart) == own] for own in (False, True)) if p]
-    if len(panels) < 2:
+    few = [name for name in requirements if name not in apart]
+    many = [name for name in requirements if name in apart]
+    if not (few and many):
         ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
         _bars(ax, cells, requirements)
-        if apart:
+        if many:
             ax.set_yscale("log")
         ax.legend()
         return figure_of(ax)
@@ -105,11 +106,10 @@ def plot_comparison(
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(max(7.0, 1.2 * len(requirements) + 1.0), 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[len(panel) for panel in panels])
-    for axes, panel in zip((left, right), panels, strict=True):
-        _bars(axes, cells, panel)
-    right.set_yscale("log")
-    right.set_ylabel("")
+    left, right = figure.subplots(1, 2, width_ratios=[len(few), len(many)])
+    _bars(left, cells, few)
+    _bars(right, cells, many)
+    right.set(yscale="log", ylabel="")
     left.legend()
     return figure
 
@@ -138,23 +138,13 @@ def _bars(ax: "Axes", cells: _Cells, requirements: Sequence[str]) -> None:
     for i, method in enumerate(methods):
         found = [cells.get((requirement, method)) for requirement in requirements]
         at = np.arange(len(requirements)) + (i - (len(methods) - 1) / 2) * width
-        means = _each(found, lambda s: s.mean)
-        bars = ax.bar(
-            at,
-            means,
-            width,
-            yerr=_each(found, lambda s: s.deviation),
-            label=caption(method.label),
-            capsize=2,
-        )
+        # 0 without a value, so that matplotlib draws no bar.
+        means = [(s.mean or 0.0) if s else 0.0 for s in found]
+        deviations = [(s.deviation or 0.0) if s else 0.0 for s in found]
+        bars = ax.bar(at, means, width, yerr=deviations, label=caption(method.label), capsize=2)
         ax.bar_label(bars, [f"{s.falsified}/{s.runs}" if s else "" for s in found], fontsize=7, padding=2)
     ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
-
-
-def _each(found: Sequence[Statistics | None], value: Callable[[Statistics], float | None]) -> list[float]:
-    """The value of each; 0 without one, so that matplotlib draws no bar."""
-    return [(value(s) or 0.0) if s is not None else 0.0 for s in found]
 
 
 def falsification_curve(runs: Iterable[Run]) -> Curve:

@@ -17,7 +17,9 @@ def drawn(formula: str) -> list[Panel]:
     problem = lag_problem(formula)
     found = evaluate(problem, STEP)
     assert found.trajectory is not None
-    return panels(problem.requirement.formula, found.trajectory, STEP, problem.space.inputs, found.verdict)
+    return panels(
+        problem.requirement.formula, found.trajectory, STEP, problem.space.inputs, found.verdict, {}
+    )
 
 
 @pytest.mark.parametrize(
@@ -82,7 +84,7 @@ def test_panels_of_a_system_are_grouped_by_component() -> None:
     candidate = Candidate({"pi.r": Signal((0.0,), (1.0,), "constant")})
     components = ("plant", "pi", "plant.inner")
     ranges = (InputRange("pi.r", 0.0, 2.0),)
-    found = panels(formula, trajectory, candidate, ranges, None, components=components)
+    found = panels(formula, trajectory, candidate, ranges, None, {}, components)
     assert [(p.title, p.component) for p in found] == [
         ("plant.y - pi.y", ""),
         ("plant.y", "plant"),
@@ -90,5 +92,5 @@ def test_panels_of_a_system_are_grouped_by_component() -> None:
         ("pi.r", "pi"),
         ("plant.inner.y", "plant.inner"),
     ]
-    single = panels(formula, trajectory, candidate, ranges, None)
+    single = panels(formula, trajectory, candidate, ranges, None, {})
     assert [p.title for p in single][:2] == ["pi.y", "plant.y"] and not any(p.component for p in single)
