@@ -1,16 +1,14 @@
 """The protocol's tables as values, printed as text, Markdown or CSV."""
 
-import csv
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from io import StringIO
 
 from falsifier.campaigns.published import COLUMNS, Published, Score, is_tied, rank
 from falsifier.campaigns.request import Method
 from falsifier.campaigns.runs import Run
 from falsifier.campaigns.statistics import Interval, Statistics, group, statistics
-from falsifier.core.literals import csv_cell, markdown_text, one_line
+from falsifier.core.literals import csv_text, markdown_text, one_line
 from falsifier.stl.margins import shown
 
 NONE = "–"
@@ -53,10 +51,7 @@ class Table:
 
     def csv(self) -> str:
         """Format as comma-separated values."""
-        buffer = StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerows(map(csv_cell, row) for row in (self.header, *self.rows))
-        return buffer.getvalue()
+        return csv_text((self.header, *self.rows))
 
     def text(self) -> str:
         """Format as plain text with aligned columns."""

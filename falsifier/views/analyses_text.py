@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverage, PairCoverage, RangeCoverage
 from falsifier.analyses.formalize import Difference, Formalized, Reading
@@ -13,7 +14,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
 from falsifier.problem.template_advice import Advice, hint
 from falsifier.stl.margins import margin_words, signed
-from falsifier.views.text import Fact, llm_use
+from falsifier.views.text import Fact, aligned, llm_use
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8
@@ -32,21 +33,17 @@ def coverage_text(found: Coverage, name: str) -> str:
     lines += [f"  {failure.text}" for failure in found.failures]
     if found.ranges:
         header = ("searched", "range", "tried", "parts tried", "changes")
-        lines += _aligned([header, *map(_range_row, found.ranges)])
+        lines += _indented([header, *map(_range_row, found.ranges)])
         lines += _legend(found)
     gaps = [*_gap_rows(found), *_pair_rows(found.pairs)]
     if gaps and found.simulations:
-        lines += ["never tried", *_aligned(gaps)]
+        lines += ["never tried", *_indented(gaps)]
     if found.outputs:
         lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
-        lines += _aligned(
-            [
-                (_named(o.name, o.unit), f"{o.low:.6g} to {o.high:.6g}")
-                for o in sorted(found.outputs, key=lambda o: o.name)
-            ]
-        )
+        outputs = sorted(found.outputs, key=lambda o: o.name)
+        lines += _indented([(_named(o.name, o.unit), f"{o.low:.6g} to {o.high:.6g}") for o in outputs])
     if found.modes:
-        lines += ["modes", *_aligned([_mode_row(m) for m in found.modes])]
+        lines += ["modes", *_indented([_mode_row(m) for m in found.modes])]
     for requirement, climb in found.climbs.items():
         if climb.is_told:
             of = f"{requirement}: " if len(found.climbs) > 1 else ""
@@ -110,11 +107,8 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
     }
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
-        yield f"  {'  '.join(cells)}".rstrip()
+def _indented(rows: Iterable[Sequence[str]]) -> list[str]:
+    return [f"  {line}" for line in aligned(rows)]
 
 
 def _range_row(r: RangeCoverage) -> tuple[str, ...]:
@@ -203,31 +197,28 @@ def formalized_text(found: Formalized) -> str:
 
 def formalized_json(found: Formalized) -> dict[str, Any]:
     """Return the same as a JSON object."""
-    readings = [
-        {
-            "formula": str(r.formula),
-            "words": r.words,
-            "meaning": r.meaning,
-            "nominal_robustness": None if r.nominal is None else r.nominal.robustness,
-        }
-        for r in found.readings
-    ]
-    differences = [
-        {
-            "first": d.first,
-            "second": d.second,
-            "only_first": _points(d.only_first),
-            "only_second": _points(d.only_second),
-        }
-        for d in found.differences
-    ]
-    spent = {"calls": found.spent.calls, "tokens": found.spent.tokens, "cost": found.spent.cost}
     return {
         "sentence": found.sentence,
-        "readings": readings,
-        "differences": differences,
+        "readings": [
+            {
+                "formula": str(r.formula),
+                "words": r.words,
+                "meaning": r.meaning,
+                "nominal_robustness": r.nominal and r.nominal.robustness,
+            }
+            for r in found.readings
+        ],
+        "differences": [
+            {
+                "first": d.first,
+                "second": d.second,
+                "only_first": _points(d.only_first),
+                "only_second": _points(d.only_second),
+            }
+            for d in found.differences
+        ],
         "rejected": list(found.rejected),
-        "spent": spent,
+        "spent": {"calls": found.spent.calls, "tokens": found.spent.tokens, "cost": found.spent.cost},
     }
 
 
@@ -255,15 +246,12 @@ def _reading_lines(number: int, reading: Reading) -> Iterator[str]:
     yield f"   in words   {reading.words}"
     if reading.meaning:
         yield f"   meant      {one_line(reading.meaning)}"
-    if reading.nominal is not None:
-        yield f"   nominal    {_nominal(reading)}"
-
-
-def _nominal(reading: Reading) -> str:
-    nominal = reading.nominal
-    if nominal is None or nominal.robustness is None:
-        return f"the simulation failed: {'' if nominal is None else one_line(nominal.reason)}"
-    return f"robustness {signed(nominal.robustness)} ({margin_words(nominal.robustness)})"
+    if (nominal := reading.nominal) is None:
+        return
+    if nominal.robustness is None:
+        yield f"   nominal    the simulation failed: {one_line(nominal.reason)}"
+    else:
+        yield f"   nominal    robustness {signed(nominal.robustness)} ({margin_words(nominal.robustness)})"
 
 
 def _difference_lines(difference: Difference) -> Iterator[str]:
@@ -293,6 +281,8 @@ def _points(trajectory: Trajectory | None) -> dict[str, list[list[float]]] | Non
     }
 
 
+Array = NDArray[np.float64]
+
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 48
 
@@ -306,19 +296,19 @@ def trace_lines(trajectory: Trajectory, *, width: int = _WIDTH) -> list[str]:
     ]
 
 
-def sparkline(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]], *, width: int = _WIDTH) -> str:
+def sparkline(values: Array, *, width: int = _WIDTH) -> str:
     """Return a column as a line of bars, each the value in the middle of its part of the time.
 
     >>> sparkline(np.array([0.0, 0.0, 1.0, 1.0]), width=4)
     '▁▁██'
     """
     at = ((np.arange(width) + 0.5) * len(values) / width).astype(int)
-    shown = np.asarray(values)[at]
+    shown = values[at]
     low, high = float(np.min(values)), float(np.max(values))
     heights = np.zeros(width) if low == high else (shown - low) / (high - low)
     return "".join(_BARS[round(h * (len(_BARS) - 1))] for h in heights)
 
 
-def _span(column: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+def _span(column: Array) -> str:
     low, high = float(np.min(column)), float(np.max(column))
     return f"constant {low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"

@@ -3,7 +3,7 @@
 The tables are plain text: a table library needs minutes for the 100,000 variables of large models.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import counted
 from falsifier.fmu import System
 from falsifier.fmu.systems import SYSTEM, Link, Network, Place, late_links
+from falsifier.views.text import aligned
 
 if TYPE_CHECKING:
     from falsifier.context.simulink import Diagram
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _SHOWN_VARIABLES = 60
 NO_INTERFACE = "no interface that can be simulated (scheduled execution is not supported)"
 _COLUMNS = ("name", "type", "unit", "min", "max", "start", "description")
-_RIGHT_ALIGNED = ("min", "max", "start")
+_RIGHT_ALIGNED = (3, 4, 5)
 # Longer cells are not padded to; they push their row to the right.
 _WIDEST_COLUMN = 40
 
@@ -72,20 +73,10 @@ def _info_lines(info: ModelInfo, *, everything: bool) -> Iterator[str]:
         limit = len(variables) if everything else _SHOWN_VARIABLES
         if variables:
             yield title
-            yield from _table(variables[:limit])
+            rows = [_COLUMNS, *map(_cells, variables[:limit])]
+            yield from aligned(rows, right=_RIGHT_ALIGNED, widest=_WIDEST_COLUMN)
         if len(variables) > limit:
             yield f"... and {len(variables) - limit} more; --all shows all {title}"
-
-
-def _table(variables: Sequence[Variable]) -> Iterator[str]:
-    rows = [_COLUMNS, *map(_cells, variables)]
-    widths = [min(max(map(len, column)), _WIDEST_COLUMN) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (
-            cell.rjust(width) if column in _RIGHT_ALIGNED else cell.ljust(width)
-            for column, cell, width in zip(_COLUMNS, row, widths, strict=True)
-        )
-        yield "  ".join(cells).rstrip()
 
 
 def _cells(v: Variable) -> tuple[str, ...]:
