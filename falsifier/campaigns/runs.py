@@ -166,8 +166,8 @@ def _told_apart(runs: list[Run]) -> list[Run]:
 
 
 def _run(directory: Path, manifest: Manifest, requirement: str) -> Run:
-    summary = read_summary(directory, requirement)
-    return run_of(directory, manifest.of(requirement), summary, shared=manifest.shared)
+    described = manifest.of(requirement)  # which refuses a requirement that the run does not have
+    return run_of(directory, described, read_summary(directory, requirement), shared=manifest.shared)
 
 
 def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: bool) -> Run:
