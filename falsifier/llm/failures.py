@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
-from falsifier.llm.litellm_adapter import own_words
+from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
@@ -187,8 +187,8 @@ def classify(
         return ChatError(where + said)
     if isinstance(error, BrokenReplyError):
         return TransientChatError(where + said)
-    status, text = _status(error), f"{type(error).__name__}: {said}"
-    lowered = _shortened(" ".join(text.split())).lower()
+    status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
+    lowered = _shortened(text).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     impossible = {
         ToolsUnsupportedError: not offers_tools or any(word in lowered for word in _FORMAT_WORDS),
@@ -224,7 +224,8 @@ def _detail(text: str, status: int | None) -> str:
         told = said
     if title := _TITLE.search(said):
         told = title[1]
-    detail = _FULL_STOP.sub("", _shortened(told if isinstance(told, str) and told.strip() else text))
+    told = told if isinstance(told, str) and told.strip() else text
+    detail = _FULL_STOP.sub("", _shortened(" ".join(told.split())))
     if status is not None and not _LETTERS.search(detail):
         return f"the server answers with the HTTP status {status} and without a reason"
     return detail

@@ -15,7 +15,7 @@ github.com/BerriAI/litellm that tells of it:
   ``Provider.effort``.
 - It lists prices that nobody knows as zero (huggingface, 1.106.2, no issue): ``listed_price``.
 - It puts the classes of its errors before a server's words, several times over, and a stack trace after them
-  (1.106.2, #9682): ``own_words``.
+  (1.106.2, #9682): ``own_words``, ``without_trace``.
 - It replaces every error if tenacity is missing (#19462): that is among our requirements.
 """
 
@@ -86,9 +86,13 @@ def completed(llm: str, **arguments: Any) -> Any:
     return load_litellm().completion(model=llm, drop_params=True, **arguments)
 
 
+def without_trace(text: str) -> str:
+    """The text of an error in one line, without the stack trace that litellm may append."""
+    return " ".join(text.split(_TRACE)[0].split())
+
+
 def own_words(text: str) -> str:
-    """What a server said in an error of litellm, in one line."""
-    text = " ".join(text.split(_TRACE)[0].split())
+    """What a server said in an error, without the classes of litellm's errors."""
     return _CLASSES.sub("", text, count=1).strip() if _CLASSES.match(text) else text
 
 

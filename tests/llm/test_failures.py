@@ -50,11 +50,14 @@ def test_no_secret_and_no_stack_survives_classification() -> None:
     said = "it was my-secret-key. Traceback (most recent call last): lots"
     error = str(told(said, "openai/x", "http://me:my-secret-key@host/v1"))
     assert "my-secret-key" not in error and "Traceback" not in error and "openai/x" in error
+    trace = "litellm.APIError: \nTraceback (most recent call last): content_policy_violation"
+    assert "content filter" not in str(told(trace)), "a stack trace is not what the server says"
 
 
 def test_the_servers_words_come_without_classes_and_full_stop() -> None:
     assert str(told("Connection error.")).endswith("Connection error")
     assert str(told("still loading ...")).endswith("still loading ...")
+    assert str(told('{"error": {"message": "not\\n now."}}')).endswith("not now")
     assert "--anonymous" in str(told("content_policy_violation"))
     assert "too long" in str(told("this model's maximum context length is 8192 tokens"))
 
