@@ -24,7 +24,7 @@ _ASKED = ("variant", "api_base", "fallback", "anonymous")
 _LIMITS = ("budget", "seconds", "max_tokens", "max_cost")
 # Names of --llm-option that the provider does not see, fields of LLMSettings, and what they expect.
 _EXPECTED = {
-    "price": "expected SENT:RECEIVED, in US dollars per million tokens sent and received, for example 0.25:2",
+    "price": "expected SENT:RECEIVED, finite numbers from 0 on, US dollars per million tokens, as 0.25:2",
     "timeout": "expected a number of seconds above 0",
     "cache": "expected yes, or no to ignore stored replies",
     "reply": f"expected {' or '.join(get_args(ReplyKind))}",

@@ -49,7 +49,7 @@ def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str, tmp_pat
         "run", "AT1", "--llm", "openai/m", "--budget", "1", "--llm-option", f"price={price}", cwd=tmp_path
     )
     assert result.code == 2
-    assert f"price={price}: prices must be finite and not negative" in result.err
+    assert f"price={price}: expected SENT:RECEIVED, finite numbers from 0 on" in result.err
 
 
 @given(st.sampled_from(["simulations", "tokens"]), st.one_of(st.integers(), st.floats()))
