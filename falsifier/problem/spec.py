@@ -9,8 +9,10 @@ these sections that sets a key wins::
 
 import tomllib
 from collections.abc import Iterable, Mapping
+from functools import reduce
+from operator import or_
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
 from pydantic.fields import FieldInfo
@@ -33,18 +35,8 @@ from falsifier.problem.sections import (
     RequirementSection,
     Strict,
 )
-from falsifier.problem.templates import (
-    TEMPLATES,
-    Dwell,
-    NeverTogether,
-    Order,
-    Overshoot,
-    RampLimit,
-    Response,
-    Rise,
-    Settles,
-    StaysWithin,
-)
+from falsifier.problem.template_arguments import Template
+from falsifier.problem.templates import TEMPLATES
 
 Section = TypeVar("Section", bound=BaseModel)
 # Names that we choose stand in messages, tables and titles.
@@ -58,27 +50,21 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _STEPS = ("tuple", "function-before")
 
 
+# Kinds of requirements; pydantic's locations have them as tags between a requirement's name and its keys.
+_KINDS: Mapping[str, type[RequirementSection | Template]] = {"formula": RequirementSection, **TEMPLATES}
+
+
 def _kind_of_requirement(section: object) -> str | None:
     """Return which section a requirement is; None if there is no such template."""
     name = section.get("template") if isinstance(section, Mapping) else getattr(section, "template", None)
-    if name is None:
-        return "<formula>"
-    return f"<{name}>" if name in TEMPLATES else None
+    return "<formula>" if name is None else f"<{name}>" if name in TEMPLATES else None
 
 
-AnyRequirement = Annotated[
-    Annotated[RequirementSection, Tag("<formula>")]
-    | Annotated[Settles, Tag("<settles>")]
-    | Annotated[Overshoot, Tag("<overshoot>")]
-    | Annotated[Rise, Tag("<rise>")]
-    | Annotated[Response, Tag("<response>")]
-    | Annotated[StaysWithin, Tag("<stays_within>")]
-    | Annotated[NeverTogether, Tag("<never_together>")]
-    | Annotated[Dwell, Tag("<dwell>")]
-    | Annotated[RampLimit, Tag("<ramp_limit>")]
-    | Annotated[Order, Tag("<order>")],
-    Discriminator(_kind_of_requirement),
-]
+if TYPE_CHECKING:
+    AnyRequirement = RequirementSection | Template
+else:
+    _TAGGED = (Annotated[kind, Tag(f"<{name}>")] for name, kind in _KINDS.items())
+    AnyRequirement = Annotated[reduce(or_, _TAGGED), Discriminator(_kind_of_requirement)]
 
 
 class Spec(Strict):
@@ -245,7 +231,7 @@ def _fields(keys: Iterable[str], kind: str) -> Mapping[str, FieldInfo]:
             next(remaining, None)
         section = _section_in(annotation)
         if section is RequirementSection:
-            section = TEMPLATES.get(kind.strip("<>"), RequirementSection)
+            section = _KINDS.get(kind.strip("<>"), RequirementSection)
         fields = section.model_fields if section else fields
     return fields
 

@@ -11,7 +11,7 @@ What remains has the same robustness and the same critical time, and finite valu
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -297,17 +297,14 @@ def _prefixed(operand: Formula) -> str:
 
 def renamed(node: T, names: Mapping[str, str]) -> T:
     """Return the same formula or expression with other names; names that are not listed stay."""
-    return _renamed(node, names)  # type: ignore[no-any-return]
-
-
-def _renamed(node: Any, names: Mapping[str, str]) -> Any:
+    found: Any = node
     if isinstance(node, Name):
-        return Name(names.get(node.name, node.name))
-    if isinstance(node, tuple):
-        return tuple(_renamed(part, names) for part in node)
-    if is_dataclass(node) and not isinstance(node, type):
-        return type(node)(*(_renamed(getattr(node, f.name), names) for f in fields(node)))
-    return node
+        found = Name(names.get(node.name, node.name))
+    elif isinstance(node, tuple):
+        found = tuple(renamed(part, names) for part in node)
+    elif is_dataclass(node) and not isinstance(node, type):
+        found = type(node)(*(renamed(getattr(node, f.name), names) for f in fields(node)))
+    return cast(T, found)
 
 
 # -- true and false ------------------------------------------------------------------------------------------
