@@ -3,6 +3,7 @@
 from typing import Annotated
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -16,6 +17,15 @@ from falsifier.fmu.systems import Extrapolation, Isolation, Loops, Method
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
+    if not limits[0] < limits[1]:
+        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
+    return limits
+
+
+Range = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
 # Maximum number of control points of one input.
 MAX_CONTROL_POINTS = 10_000
 
@@ -35,18 +45,10 @@ class FreeSection(Strict):
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
-def _check_order(limits: tuple[float, float]) -> tuple[float, float]:
-    if not limits[0] < limits[1]:
-        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
-    return limits
-
-
 class InputSection(Strict):
     """One input signal: searched within a range, or kept constant."""
 
-    range: tuple[Number, Number] | None = Field(
-        None, description="[low, high]; default: the FMU's min and max."
-    )
+    range: Range | None = Field(None, description="[low, high]; default: the FMU's min and max.")
     control_points: int | None = Field(
         None, ge=1, le=MAX_CONTROL_POINTS, description="Number of evenly spaced control points."
     )
@@ -62,8 +64,6 @@ class InputSection(Strict):
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "InputSection":
-        if self.range is not None:
-            _check_order(self.range)
         if self.value is not None and (self.range is not None or self.control_points is not None):
             raise ValueError("value keeps the input constant; remove it, or remove range and control_points")
         return self
@@ -76,15 +76,13 @@ def _bare_value(section: object) -> object:
 class ParameterSection(Strict):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
-    range: tuple[Number, Number] | None = Field(None, description="[low, high] to search within.")
+    range: Range | None = Field(None, description="[low, high] to search within.")
     value: Number | str | None = Field(
         None, description="Fixed value; text for a string. A file is named relative to the spec file."
     )
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
-        if self.range is not None:
-            _check_order(self.range)
         if (self.range is None) == (self.value is None):
             raise ValueError(
                 "expected either range = [low, high] (searched) or value = number or text (fixed)"

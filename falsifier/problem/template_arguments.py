@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from math import floor, inf, isfinite
-from typing import Annotated, ClassVar, NamedTuple, get_args, get_type_hints
+from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_type_hints
 
 from pydantic import AfterValidator, Field
 
@@ -42,9 +42,11 @@ def term(text: str | float) -> Expression:
     """Return the expression that an argument states.
 
     Raises:
-        FormulaError: if it is no expression.
+        FormulaError: if it is no expression, or not finite.
     """
     if isinstance(text, int | float):
+        if not isfinite(text):
+            raise FormulaError("expected a finite number")
         return Number(float(text))
     formula = parse(f"({text}) <= 0")
     if not isinstance(formula, Predicate):
@@ -52,22 +54,24 @@ def term(text: str | float) -> Expression:
     return formula.left
 
 
-def _checked_term(text: str | float) -> str | float:
-    if isinstance(text, float) and not isfinite(text):
-        raise ValueError("expected a finite number")
-    try:
-        term(text)
-    except FormulaError as error:
-        raise ValueError(str(error)) from None
-    return text
+def _read_by(read: Callable[[Any], object]) -> AfterValidator:
+    """Return the check that an argument can be read."""
+
+    def check(argument: Any) -> Any:
+        try:
+            read(argument)
+        except FormulaError as error:
+            raise ValueError(str(error)) from None
+        return argument
+
+    return AfterValidator(check)
 
 
-def _checked_condition(text: str) -> str:
-    try:
-        parse(text)
-    except FormulaError as error:
-        raise ValueError(str(error)) from None
-    return text
+def _moment(after: float | str) -> None:
+    if isinstance(after, str):
+        parse(after)
+    elif not 0 <= after < inf:
+        raise FormulaError(f"expected a time of at least 0 s, or a condition, got {after:g}")
 
 
 def _checked_margin(margin: float | str) -> float | str:
@@ -81,14 +85,6 @@ def _checked_margin(margin: float | str) -> float | str:
     return margin
 
 
-def _checked_moment(after: float | str) -> float | str:
-    if isinstance(after, str):
-        return _checked_condition(after)
-    if not 0 <= after < inf:
-        raise ValueError(f"expected a time of at least 0 s, or a condition, got {after:g}")
-    return after
-
-
 def share_of(margin: float | str) -> float | None:
     """Return a percentage as a share; None if it is none."""
     if not isinstance(margin, str) or not margin.rstrip().endswith("%"):
@@ -99,10 +95,10 @@ def share_of(margin: float | str) -> float | None:
         return None
 
 
-Term = Annotated[str | float, AfterValidator(_checked_term)]
-Condition = Annotated[str, AfterValidator(_checked_condition)]
+Term = Annotated[str | float, _read_by(term)]
+Condition = Annotated[str, _read_by(parse)]
 Margin = Annotated[float | str, AfterValidator(_checked_margin)]
-Moment = Annotated[float | str, AfterValidator(_checked_moment)]
+Moment = Annotated[float | str, _read_by(_moment)]
 Duration = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 

@@ -23,7 +23,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from falsifier.problem.sections import Seconds
+from falsifier.problem.sections import Range, Seconds
 from falsifier.problem.template_arguments import (
     Clock,
     Condition,
@@ -258,15 +258,13 @@ class RampLimit(Template):
     over: Seconds | None = Field(
         None, description="Without a rate: time in s over which changes are judged, with range and levels."
     )
-    range: tuple[Finite, Finite] | None = Field(None, description="With over: [low, high] of the signal.")
+    range: Range | None = Field(None, description="With over: [low, high] of the signal.")
     levels: int = Field(20, ge=1, le=_MOST_LEVELS, description="With over: number of levels in the range.")
 
     @model_validator(mode="after")
     def _one_way(self) -> "RampLimit":
         if (self.over is None) != (self.range is None) or (self.over is not None and self.rate is not None):
             raise ValueError("expected rate alone, or over and range together")
-        if self.range is not None and not self.range[0] < self.range[1]:
-            raise ValueError("range: expected [low, high] with low < high")
         if self.over is None and self.rate is None and not isinstance(term(self.signal), Name):
             raise ValueError("an expression has no der(...): give rate, or over and range")
         return self

@@ -227,6 +227,8 @@ def test_of_several_requirements_that_simulate_differently_one_has_to_be_named(t
     with pytest.raises(SpecError, match=r"simulate in different ways.*:NAME, with one of R, S"):
         formula_of_template(ProblemSource(target=target), within)
     assert formula_of_template(ProblemSource(target=f"{target}:R"), within) == "G[0,30] (speed <= 120)"
+    alike = spec(tmp_path, more.replace("stop_time = 30.0", ""))
+    assert str(load_problem(alike, stl="G[0,9] (rpm <= 1)").requirement.formula) == "G[0,9] (rpm <= 1)"
 
 
 def test_what_a_users_function_raises_is_said_with_its_line(

@@ -31,7 +31,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.rnage", [0, 1], r"inputs\.u\.rnage: unknown key; did you mean 'range'\?"),
         ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
         ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
-        ("inputs.u.range", [1, 0], r"inputs\.u: expected \[low, high\] with low < high, got \[1, 0\]"),
+        ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
         ("inputs.u.range", [0], r"inputs\.u\.range"),
         (
             "inputs.u.interpolation",
@@ -102,7 +102,7 @@ def test_fixed_and_searched_replace_each_other() -> None:
     ("requirement", "key"),
     [
         ({"template": "order", "conditions": ["a", "b"], "inputs": {"u": {"rang": [0, 1]}}}, "inputs.u.rang"),
-        ({"formula": "G (x <= 1)", "inputs": {"u": {"range": [1, 0]}}}, "inputs.u"),
+        ({"formula": "G (x <= 1)", "inputs": {"u": {"range": [1, 0]}}}, "inputs.u.range"),
         ({"template": "order", "conditions": ["a", "b ="]}, "conditions.1"),
         ({}, "formula"),
     ],
