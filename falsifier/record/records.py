@@ -10,6 +10,7 @@ from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
+from falsifier.search.result import ResultStatus
 from falsifier.stl.monitor import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
@@ -104,7 +105,7 @@ class EndedRecord(_Record):
     """The run ended or was interrupted."""
 
     kind: Literal["ended"] = "ended"
-    status: str
+    status: ResultStatus
     reason: str
     spent: Spent
     findings: dict[str, list[Finding]] = Field(

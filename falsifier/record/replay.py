@@ -135,14 +135,14 @@ def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
 
 def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
     """What was spent on a language model beyond the exchanges that are played back."""
-    usages = [exchange.usage for exchange in played]
-    costs = [usage.cost for usage in usages if usage.cost is not None]
-    cost = None if spent.cost is None else max(0.0, round(spent.cost - sum(costs), 12))
+    again = Spent()
+    for exchange in played:
+        again = again.plus_requests(exchange.requests, exchange.usage)
     return Spent(
-        calls=spent.calls - sum(exchange.requests for exchange in played),
-        timed_out=spent.timed_out - sum(usage.timed_out for usage in usages),
-        prompt_tokens=spent.prompt_tokens - sum(usage.prompt_tokens for usage in usages),
-        completion_tokens=spent.completion_tokens - sum(usage.completion_tokens for usage in usages),
-        reasoning_tokens=spent.reasoning_tokens - sum(usage.reasoning_tokens for usage in usages),
-        cost=cost,
+        calls=spent.calls - again.calls,
+        timed_out=spent.timed_out - again.timed_out,
+        prompt_tokens=spent.prompt_tokens - again.prompt_tokens,
+        completion_tokens=spent.completion_tokens - again.completion_tokens,
+        reasoning_tokens=spent.reasoning_tokens - again.reasoning_tokens,
+        cost=None if spent.cost is None else max(0.0, round(spent.cost - (again.cost or 0.0), 12)),
     )

@@ -20,9 +20,10 @@ from falsifier.record.records import (
 )
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
+from falsifier.search.result import ResultStatus
 from falsifier.stl.monitor import Verdict
 
-RunStatus = Literal["waiting", "running", "falsified", "not falsified", "interrupted", "failed"]
+RunStatus = ResultStatus | Literal["waiting", "running"]
 FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
 
 
@@ -113,7 +114,7 @@ class Summary:
                 exchange = Exchange.model_validate(record.exchange)
                 self._spent = self._spent.plus_requests(exchange.requests, exchange.usage)
             case EndedRecord():
-                self.status = _ended(record.status)
+                self.status = record.status
                 self.reason = record.reason
                 self._spent = record.spent
                 own = [found for name, found in record.findings.items() if self._requirement in (None, name)]
@@ -150,8 +151,3 @@ def read_summary(directory: Path, requirement: str | None = None) -> Summary:
     if reader.begun:
         summary.begin()
     return summary
-
-
-def _ended(status: str) -> RunStatus:
-    known: dict[str, RunStatus] = {"not falsified": "not falsified", "interrupted": "interrupted"}
-    return known.get(status, "failed")
