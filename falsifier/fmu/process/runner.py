@@ -148,12 +148,9 @@ class Runner:
     def _speaking_worker(self, plan: Plan) -> Worker:
         """Return a new worker that asks the FMU for messages; it serves one simulation."""
         self._drop()
-        worker = self._worker = self._new_worker("process", (), logging=True)
+        worker = self._worker = Worker(self._workplace(), self._order, "process", (), logging=True)
         self._prepare(worker, plan, is_new=True)
         return worker
-
-    def _new_worker(self, reuse: Reuse | None, untrusted: tuple[Reuse, ...], *, logging: bool) -> Worker:
-        return Worker(self._workplace(), self._order, reuse, untrusted, logging=logging)
 
     def _simulate(
         self, worker: Worker, plan: Plan, fill: Callable[[Room], None]
@@ -162,7 +159,9 @@ class Runner:
             worker = self._started(worker, plan, fill)
             reply = worker.wait()
         except TimeoutError:
-            raise self._overdue(worker, plan) from None
+            reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
+            self._drop()
+            raise outcome.overdue(plan, reached, during, log) from None
         except Closed as error:
             reason, log = worker.crash(error)
             self._worker = None
@@ -209,8 +208,9 @@ class Runner:
         worker, known = self._worker, self._experience
         is_new = worker is None
         if worker is None:
-            worker = self._new_worker(known.reuse, known.untrusted, logging=self._order.logging)
-            self._worker = worker
+            worker = self._worker = Worker(
+                self._workplace(), self._order, known.reuse, known.untrusted, logging=self._order.logging
+            )
         if worker.plan is plan:
             return worker
         try:
@@ -286,11 +286,6 @@ class Runner:
         known.reuse = _reuse(reply)
         if reply.leaving or known.reuse == "process":
             self._drop()
-
-    def _overdue(self, worker: Worker, plan: Plan) -> SimulationError:
-        reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
-        self._drop()
-        return outcome.overdue(plan, reached, during, log)
 
     def _drop(self) -> None:
         worker, self._worker = self._worker, None

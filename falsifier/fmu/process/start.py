@@ -30,11 +30,11 @@ _DROPPED = "(further output was dropped)"
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
 _SIGNALS = {
-    0xC0000005: "SIGSEGV",  # access violation
-    0xC00000FD: "SIGSEGV",  # stack overflow
-    0xC000001D: "SIGILL",
-    0xC0000094: "SIGFPE",  # integer division by zero
-    0xC0000374: "SIGABRT",  # damaged heap
+    0xC0000005: signal.SIGSEGV,  # access violation
+    0xC00000FD: signal.SIGSEGV,  # stack overflow
+    0xC000001D: signal.SIGILL,
+    0xC0000094: signal.SIGFPE,  # integer division by zero
+    0xC0000374: signal.SIGABRT,  # damaged heap
 }
 
 
@@ -162,7 +162,10 @@ class Started:
         path = workplace.program()
         command: tuple[str, ...] = ()
         if through_wine:
-            command = (_wine(), windows_path(workplace.program(windows=True)))
+            wine = find_wine()
+            if wine is None:
+                raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
+            command = (str(wine), windows_path(workplace.program(windows=True)))
         self.scratch = workplace.scratch()
         self.output = Output()
         environment = worker_environment(os.environ, self.scratch)
@@ -211,21 +214,13 @@ class Started:
 
 def crash_code(exception: int) -> int:
     """Return the exit code that an exception of Windows has elsewhere: minus the number of a signal."""
-    name = _SIGNALS.get(exception)
-    number = getattr(signal, name, None) if name else None
-    return -int(number) if number is not None else exception & 0xFF
+    found = _SIGNALS.get(exception)
+    return exception & 0xFF if found is None else -found
 
 
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
     return hidden_places(os.environ, posix_files.homes(), is_root=os.geteuid() == 0)
-
-
-def _wine() -> str:
-    wine = find_wine()
-    if wine is None:
-        raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
-    return str(wine)
 
 
 def _make_prefix(prefix: Path) -> None:
