@@ -32,6 +32,8 @@ _DENSE_FROM_BYTES = 256 << 20
 _MAX_OVERHEAD, _MAX_EXPANSION = 1024, 1.01
 # Limits of usual file systems in bytes; the second one leaves room for the folder that is unpacked to.
 _MAX_NAME_BYTES, _MAX_PATH_BYTES = 255, 2048
+# Of a name in a message.
+_SHOWN_CHARACTERS = 100
 
 _MACHINES = {
     "amd64": "x86_64",
@@ -191,50 +193,39 @@ def _faults(entries: list[zipfile.ZipInfo]) -> Iterator[str]:
     # Some tools list folders several times, which does no harm.
     files = Counter(entry.filename for entry in entries if not entry.is_dir())
     yield from (f"rejected because it contains {name!r} {n} times" for name, n in files.items() if n > 1)
-    for entry in entries:
-        yield from _faults_of_name(entry)
-        yield from _faults_of_content(entry)
     folders = {str(folder) for entry in entries for folder in PurePosixPath(entry.filename).parents}
     folders |= {entry.filename.rstrip("/") for entry in entries if entry.is_dir()}
-    for name in sorted(folders & files.keys()):
-        yield f"rejected because its entry {name!r} is both a file and a folder"
+    both = folders & files.keys()
+    for entry in entries:
+        shown = entry.orig_filename[:_SHOWN_CHARACTERS]
+        yield from (f"rejected because its entry {shown!r} {fault}" for fault in _faults_of(entry))
+        if entry.filename in both:
+            yield f"rejected because its entry {shown!r} is both a file and a folder"
 
 
-def _faults_of_name(entry: zipfile.ZipInfo) -> Iterator[str]:
+def _faults_of(entry: zipfile.ZipInfo) -> Iterator[str]:
     # zipfile truncates names at NUL: check the name as it was written.
     written = entry.orig_filename.replace("\\", "/")
     parts = written.split("/")
     if written.startswith("/") or ":" in parts[0] or ".." in parts or "\0" in written:
-        yield (
-            f"rejected because its entry {entry.orig_filename!r} would be written outside the folder that it "
-            "is unpacked to"
-        )
+        yield "would be written outside the folder that it is unpacked to"
     if any(ord(character) < 32 or ord(character) == 127 for character in written):
-        yield f"rejected because its entry {written!r} has a control character in its name"
+        yield "has a control character in its name"
     longest = max(len(part.encode("utf-8", "replace")) for part in parts)
     if longest > _MAX_NAME_BYTES or len(written.encode("utf-8", "replace")) > _MAX_PATH_BYTES:
         yield (
-            f"rejected because its entry {written[:60]!r}... has too long a name for file systems (at most "
-            f"{_MAX_NAME_BYTES} bytes per name, {_MAX_PATH_BYTES} per path)"
+            f"has too long a name for file systems (at most {_MAX_NAME_BYTES} bytes per name, "
+            f"{_MAX_PATH_BYTES} per path)"
         )
-
-
-def _faults_of_content(entry: zipfile.ZipInfo) -> Iterator[str]:
-    name, mode, packed = entry.filename, entry.external_attr >> 16, entry.compress_size
+    size, mode, packed = entry.file_size, entry.external_attr >> 16, entry.compress_size
     kind = _FORBIDDEN_KINDS.get(stat.S_IFMT(mode))
     if kind is not None:
-        yield f"rejected because its entry {name!r} is a {kind}"
+        yield f"is a {kind}"
     if mode & (stat.S_ISUID | stat.S_ISGID):
-        yield f"rejected because its entry {name!r} asks for its owner's rights (setuid)"
+        yield "asks for its owner's rights (setuid)"
     if entry.flag_bits & 0x1:
-        yield f"its entry {name!r} is encrypted; save it without a password"
-    if entry.file_size > max(_MAX_COMPRESSION * max(packed, 1), _DENSE_FROM_BYTES):
-        yield (
-            f"rejected because its entry {name!r} grows from {packed} to {entry.file_size} bytes, like a zip "
-            "bomb"
-        )
-    if packed > _MAX_EXPANSION * entry.file_size + _MAX_OVERHEAD:
-        yield (
-            f"rejected because its entry {name!r} declares {entry.file_size} bytes, but {packed} are stored; "
-            "export the model again"
-        )
+        yield "is encrypted; save it without a password"
+    if size > max(_MAX_COMPRESSION * max(packed, 1), _DENSE_FROM_BYTES):
+        yield f"grows from {packed} to {size} bytes, like a zip bomb"
+    if packed > _MAX_EXPANSION * size + _MAX_OVERHEAD:
+        yield f"declares {size} bytes, but {packed} are stored; export the model again"
