@@ -76,11 +76,7 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
     A model that simulates in processes of its own needs only threads, each with its own such process: other
     Python processes would take seconds to start. They are there for models in Python. Simulations that are
     still under way at the end are stopped.
-
-    Raises:
-        SpecError: if jobs is not positive.
     """
-    _check_jobs(jobs)
     if jobs == 1:
         yield None
         return
@@ -139,7 +135,8 @@ def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
 
             yield Workers(again, executor.slots)
         return
-    _check_jobs(jobs)
+    if jobs < 1:
+        raise SpecError(f"jobs must be at least 1, got {jobs}")
     workers = Workers(lambda: _process_pool(jobs), lambda: jobs)
     try:
         yield workers
@@ -169,11 +166,6 @@ def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") 
             return alone.submit(evaluate, problem, candidate).result()
         except BrokenExecutor as error:
             return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
-
-
-def _check_jobs(jobs: int) -> None:
-    if jobs < 1:
-        raise SpecError(f"jobs must be at least 1, got {jobs}")
 
 
 def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":

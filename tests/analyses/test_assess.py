@@ -67,15 +67,6 @@ def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
         assert part in found.text
 
 
-def test_a_requirement_that_nothing_moves_is_told() -> None:
-    still = lag_problem(
-        inputs=0, parameters=[BIAS], response=lambda times, *_: {"x": np.zeros_like(times)}, name="STILL"
-    )
-    found = assess(still, budget=30)
-    assert "Nothing that was searched had an effect on x" in found.text
-    assert not assess(system(0.8), budget=30).findings
-
-
 def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
     found = assess(lag_problem("G[0,10] (x <= 3)", response=mostly_broken), budget=50, seed=1)
     failed = sum(failure.count for failure in found.failures)

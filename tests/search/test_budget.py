@@ -1,4 +1,3 @@
-import numpy as np
 import pytest
 
 from falsifier.errors import ChatError, SpecError
@@ -40,15 +39,6 @@ def test_a_budget_needs_a_positive_limit() -> None:
         Budget(None)
     with pytest.raises(SpecError, match="simulations: expected a whole number, at least 1, got 0"):
         Budget(0)
-
-
-def test_whole_numbers_of_numpy_become_ints() -> None:
-    budget = Budget(np.int32(3), tokens=np.int64(5))  # type: ignore[arg-type]
-    assert (type(budget.simulations), type(budget.tokens)) == (int, int)
-    with pytest.raises(
-        SpecError, match=r"budget: simulations: expected a whole number, at least 1, got 2\.5"
-    ):
-        Budget(2.5)  # type: ignore[arg-type]
 
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
