@@ -91,17 +91,14 @@ def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[
 
 
 def _margin(predicate: Predicate, difference: Interval) -> Interval:
-    found, at_zero = _distance(predicate, difference), on_limit(predicate.operator)
+    operator, found = predicate.operator, difference
+    if operator in ("<", "<="):
+        found = -difference
+    elif operator in ("==", "!="):
+        distance = _absolute(difference)
+        found = -distance if operator == "==" else distance
+    at_zero = on_limit(operator)
     return Interval(found.low or at_zero, found.high or at_zero)
-
-
-def _distance(predicate: Predicate, difference: Interval) -> Interval:
-    if predicate.operator in ("<", "<="):
-        return -difference
-    if predicate.operator in (">", ">="):
-        return difference
-    distance = _absolute(difference)
-    return -distance if predicate.operator == "==" else distance
 
 
 def _smallest(parts: list[Interval]) -> Interval:
