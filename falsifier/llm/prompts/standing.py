@@ -274,7 +274,7 @@ def _freedom(view: View) -> Iterator[str]:
         whose = "" if len(view.space.inputs) == 1 else f" of {listed(names)}"
         yield (
             f"Alternatively, choose {what} of the control points{whose} yourself: at most "
-            f"{free.max_control_points}, at least {free.min_interval:g} s apart"
+            f"{free.max_control_points}{' each' * (len(names) > 1)}, at least {free.min_interval:g} s apart"
         )
 
 

@@ -52,7 +52,7 @@ def test_what_a_violation_is_and_ranges_are_told(variant: str) -> None:
         "input signal throttle [%]: ",
         "In words: At all times from 0 to 20 s, speed is at most 120.",
         "pchip (monotone cubic) interpolation; sampled and held every 0.05 s",
-        "at most 500, at least 0.1 s apart",
+        "at most 500 each, at least 0.1 s apart",
         '"times": []',
     ],
 )
@@ -225,7 +225,7 @@ def test_freedom_is_told_as_far_as_it_goes_and_once() -> None:
     assert "Alternatively, choose" not in standing(lag_problem()) and '"times"' not in standing(lag_problem())
     assert "at most 7, at least 0.5 s apart" in standing(lag_problem(free=Freedom(7, 0.5)))
     problem = lag_problem(inputs=2, free=Freedom(7, 0.5))
-    assert standing(problem).count("control points of u and v yourself: at most 7") == 1
+    assert standing(problem).count("control points of u and v yourself: at most 7 each") == 1
     u, v = problem.space.inputs
     inputs = (u, replace(v, free=Freedom(9, 0.25)))
     text = standing(replace(problem, space=replace(problem.space, inputs=inputs)))
