@@ -1,18 +1,35 @@
-"""Numbers as prompts write them: no more digits than needed, and bounds that are valid if typed back."""
+"""Numbers, inputs and parameters as prompts write them, and as an LLM would write them in a reply.
+
+There are no more digits than needed, and what is typed back is valid.
+"""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from math import floor, isfinite, log10
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal, even_times
+from falsifier.core.space import InputRange
+from falsifier.llm.prompts.view import View
 from falsifier.stl.margins import is_on_limit
 
 # Significant digits of the largest value in a column of numbers.
 _COLUMN_DIGITS = 4
 _BOUND_DIGITS = 10
 _CHOSEN_DIGITS = 7
+# Digits of the width of a range to which values of signals and parameters are shown.
+_DIGITS_OF_RANGE = 4
+_DIGITS_OF_PARAMETER = 5
+# Switches of a signal up to which every one is told; of others those by more than a share of the range.
+_MOST_PIECES = 12
+_ROUGHLY = 0.02
+
+# Of a signal with more switches only their number and distances, and its mean are told in brief.
+_MOST_IN_BRIEF = 16
 
 
 def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
@@ -97,3 +114,77 @@ def runs(values: Sequence[float]) -> str:
         parts += [f'"{text} x {length}"'] if is_long else [text] * length
         start = end
     return f"[{', '.join(parts)}]"
+
+
+def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
+    """Each input with its own control points and interpolation, and parameters.
+
+    Args:
+        view: the problem.
+        candidate: what was or will be simulated.
+        in_brief: whether signals of many pieces are only described.
+    """
+    lines = []
+    for r in view.space.inputs:
+        told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time, in_brief=in_brief)
+        lines.append(f"{r.name}: {told}")
+    for p in view.space.parameters:
+        decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
+        lines.append(f"{p.name} = {plain(candidate.parameters[p.name], decimals)}")
+    return tuple(lines)
+
+
+def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:
+    """Parameterization with values rounded to some thousandths of the range."""
+    decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
+    rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
+    if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
+        rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
+        if in_brief and rough.switches > _MOST_IN_BRIEF:
+            return _described(rough, stop_time, decimals)
+        if rough.switches < rounded.switches:
+            return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
+    return signal_text(rounded, stop_time=stop_time)
+
+
+def _described(signal: Signal, stop_time: float, decimals: int) -> str:
+    """What is to be known of constant pieces that are not listed."""
+    lengths = np.diff((*signal.times, stop_time))
+    low, high = (plain(v, decimals) for v in (min(signal.values), max(signal.values)))
+    mean = plain(float(np.average(signal.values, weights=lengths)), decimals)
+    apart = [number(float(f(lengths)), 3) for f in (np.min, np.median, np.max)]
+    return (
+        f"{len(lengths)} constant pieces between {low} and {high}, mean {mean}, "
+        f"each {apart[0]} to {apart[2]} s long, {apart[1]} s in the median"
+    )
+
+
+def _merged(signal: Signal, tolerance: float) -> Signal:
+    """Constant pieces, those whose values differ from the first of them by no more than this as one."""
+    merged = [(signal.times[0], signal.values[0])]
+    for time, value in zip(signal.times[1:], signal.values[1:], strict=True):
+        if abs(value - merged[-1][1]) > tolerance:
+            merged.append((time, value))
+    times, values = zip(*merged, strict=True)
+    return replace(signal, times=times, values=values)
+
+
+def signal_text(signal: Signal, *, stop_time: float) -> str:
+    """Parameterization of one signal.
+
+    >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"), stop_time=50.0)
+    'constant pieces from [time, value] points [[0, 100], [2.5, 0]]'
+    >>> signal_text(Signal.evenly([3.0, 3.0], stop_time=50.0), stop_time=50.0)
+    'constant 3'
+    """
+    if len(set(signal.values)) == 1:
+        return f"constant {number(signal.values[0])}"
+    manner = "constant pieces" if signal.interpolation == "constant" else signal.interpolation
+    even = even_times(len(signal.times), stop_time=stop_time, interpolation=signal.interpolation)
+    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * max(stop_time, 1.0)):
+        return f"{manner}, {len(signal.values)} evenly spaced values {runs(signal.values)}"
+    points = list(zip(signal.times, signal.values, strict=True))
+    if signal.interpolation == "constant":
+        points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
+    shown = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
+    return f"{manner} from [time, value] points [{shown}]"

@@ -16,7 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm import ReplyKind
 from falsifier.llm.messages import Message
-from falsifier.llm.prompts.choices import as_signals
+from falsifier.llm.prompts.numbers import as_signals
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.published import (
     MOST_SAMPLES,

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.llm.prompts.choices import as_signals, signal_text
-from falsifier.llm.prompts.numbers import bounds, runs
+from falsifier.llm.prompts.numbers import as_signals, bounds, runs, signal_text
 from falsifier.llm.prompts.published import as_point, as_values
 from falsifier.llm.prompts.view import View
 from falsifier.testing import FREE, START, lag_problem
