@@ -48,20 +48,7 @@ class Freedom:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What an input or parameter may be.
-
-    Attributes:
-        name: its name in the model.
-        low: lower bound in its unit; the next allowed number, unless reals are.
-        high: upper bound.
-        unit: its unit, empty if unknown.
-        description: its meaning, from the model.
-        kind: type of its values; every type except real has integer values.
-        items: names and numbers of an enumeration's items.
-
-    Raises:
-        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them.
-    """
+    """What inputs and parameters have in common; see there."""
 
     name: str
     low: float
@@ -99,16 +86,24 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class InputRange(Range):
-    """One searched input signal; values that are not reals are held between control points.
+    """One searched input signal.
 
     Attributes:
+        name: the input's name in the model.
+        low: lower bound in the input's unit; the next allowed number, unless reals are.
+        high: upper bound.
+        unit: the input's unit, empty if unknown.
+        description: its meaning, from the model.
+        kind: type of its values; every type except real has integer values, held between control points.
+        items: names and numbers of an enumeration's items.
         control_points: number of evenly spaced control points of the fixed parameterization.
         interpolation: interpolation between the control points.
         hold: sample-and-hold period in s, or None.
         free: limits of a free parameterization, or None if only the fixed one is allowed.
 
     Raises:
-        SpecError: as of every range, or if the control points, interpolation, hold or free are not as above.
+        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them,
+            or the control points, interpolation, hold or free are not as above.
     """
 
     _: KW_ONLY
@@ -133,7 +128,17 @@ class ParameterRange(Range):
     """One searched parameter or initial state: a single number.
 
     Attributes:
+        name: the parameter's name in the model.
+        low: lower bound in the parameter's unit; the next allowed number, unless reals are.
+        high: upper bound.
+        unit: its unit, empty if unknown.
+        description: its meaning, from the model.
+        kind: type of its value; every type except real has integer values.
+        items: names and numbers of an enumeration's items.
         nominal: its value if it is not searched, if known.
+
+    Raises:
+        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them.
     """
 
     _: KW_ONLY
@@ -304,12 +309,12 @@ class SearchSpace:
     def _admitted_times(self, r: InputRange, signal: Signal) -> tuple[float, ...]:
         """Times of the control points as they will be simulated."""
         fixed = self.fixed_times(r)
-        is_fixed = signal.interpolation == r.interpolation and (
-            signal.times == fixed or _are_close(signal.times, fixed, 1e-9 * max(self.stop_time, 1.0))
-        )
-        if not is_fixed:
-            _check_freedom(r, signal, self.stop_time)
-        return fixed if is_fixed else signal.times
+        if signal.interpolation == r.interpolation and len(signal.times) == len(fixed):
+            rounding = 1e-9 * max(self.stop_time, 1.0)
+            if all(abs(a - b) <= rounding for a, b in zip(signal.times, fixed, strict=True)):
+                return fixed
+        _check_freedom(r, signal, self.stop_time)
+        return signal.times
 
 
 def _admitted_signal(r: InputRange, times: tuple[float, ...], signal: Signal) -> Signal:
@@ -348,12 +353,6 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
         raise CandidateError(
             f"{r.label}: the control point at {signal.times[-1]:g} s is after the stop time {stop_time:g} s"
         )
-
-
-def _are_close(times: Sequence[float], others: Sequence[float], tolerance: float) -> bool:
-    return len(times) == len(others) and all(
-        abs(a - b) <= tolerance for a, b in zip(times, others, strict=True)
-    )
 
 
 def nearest_value(ranged: Range, value: float) -> float:
