@@ -1,5 +1,6 @@
 """Reads what a user named as context, refuses secrets, and tells as much of each file as fits."""
 
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -22,6 +23,7 @@ MAX_TOTAL = 20_000
 _MAX_BYTES = 32 << 20
 _MAX_COMPARISONS, _MAX_COMPARED = 60, 6_000  # number, and characters of all
 _MAX_CROSSINGS = 24  # of a signal
+_ESCAPE = re.compile(r"\\(?:u([0-9a-fA-F]{4})|([/\\\"]))")
 _LEAVE_OUT = "remove it, or leave the file out"
 
 
@@ -111,8 +113,8 @@ def gather(
     chosen = _fitting(contents, MAX_TOTAL - sum(_size(each) for each in compared))
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
-        # Encodings may have hidden a secret before.
-        whole = "\n".join((text, *(t.text for t in readable.found)))
+        # Encodings may have hidden a secret before, and escapes of JSON still do.
+        whole = _ESCAPE.sub(_unescaped, "\n".join((text, *(t.text for t in readable.found))))
         otherwise = _LEAVE_OUT if file.is_named else NAME_THEM
         sentry.look(whole, f"{file.path}, as it is told", file.path, otherwise)
         form = f"{readable.forms[i][0]}{', because the rest is too long' if i else ''}"
@@ -193,6 +195,10 @@ def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -
         if low <= level <= high
     }
     return [Crossing(name, level) for level in sorted(levels)[:_MAX_CROSSINGS]]
+
+
+def _unescaped(found: re.Match[str]) -> str:
+    return chr(int(found[1], 16)) if found[1] else found[2]
 
 
 def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:

@@ -251,14 +251,16 @@ def _value(text: str, tokens: Sequence[Token], sign: int) -> str:
 
 def _read_blocks(found: Source, tokens: Sequence[Token], line: int) -> None:
     """Note the blocks of the standard library that a statement declares, and what it connects."""
+    closing = _closing(tokens)
+    end = 0  # of the block that was read last: a block within it is no component
     for i, (kind, name) in enumerate(pairwise(tokens)):
         if kind.text == "connect":
             if sides := _CONNECT.match(found.text, kind.start):
                 one, other = sides[1].strip(), sides[2].strip()
                 found.leading |= {one: other, other: one}
-        elif name.kind == "name" and (kind.text in _COMPARING or kind.text in _TABLES):
-            has_bracket = i + 2 < len(tokens) and tokens[i + 2].text == "("
-            inner = tokens[i + 3 : _closing(tokens)[i + 2] + 1] if has_bracket else []
+        elif i >= end and name.kind == "name" and (kind.text in _COMPARING or kind.text in _TABLES):
+            end = closing.get(i + 2, i + 1)
+            inner = tokens[i + 3 : end + 1]
             stated = _assignments(found.text, inner, is_modelica=True)
             direct = {each.name: each.value for each in stated if not each.is_inner}
             found.blocks.append(_Block(kind.text, name.text, direct, line))

@@ -111,6 +111,13 @@ def test_a_secret_behind_an_encoding_is_refused_as_well(tmp_path: Path) -> None:
         read(simulink.write_slx(tmp_path / "limphome.slx", parts))
 
 
+@pytest.mark.parametrize("text", ['["sk\\u002dabcdefghijklmnop"]', '["https:\\/\\/me:secret1@example.org"]'])
+def test_escapes_of_json_hide_no_secret(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(SpecError, match=r"a\.json, as it is told: line 1 looks like a key"):
+        read(tmp_path / "a.json")
+
+
 def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"none\.md: cannot be read"):
         read(tmp_path / "none.md")
