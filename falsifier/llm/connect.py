@@ -17,7 +17,7 @@ from falsifier.core.files import cache_directory
 from falsifier.errors import ChatSetupError
 from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.litellm_adapter import check_name, check_options
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Mode, Usage
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate
@@ -49,7 +49,6 @@ def connect(
     options: Mapping[str, Any] | None = None,
     price: Price | None = None,
     timeout: float = DEFAULT_TIMEOUT,
-    mode: Mode | None = None,
     gate: Gate | None = None,
     attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
@@ -64,7 +63,6 @@ def connect(
         options: further parameters of litellm's ``completion``.
         price: what the LLM costs; None: litellm's table.
         timeout: seconds to wait for one reply.
-        mode: first way of asking for JSON; None: the strictest one that the provider is known to accept.
         gate: shared by all runs on the same account; None: a new one.
         attempts: maximum number of requests per reply if failures are temporary.
         cache: directory of stored replies; None: no cache.
@@ -83,7 +81,7 @@ def connect(
         options=dict(options or {}),
         timeout=timeout,
         price=price,
-        mode=mode or first_mode(llm),
+        mode=first_mode(llm),
         content="" if own is None else own.content,
         gate=gate or Gate(),
         attempts=attempts,
