@@ -166,22 +166,21 @@ class Room:
     outputs: NDArray[np.float64]
 
     @staticmethod
-    def size(plan: Plan) -> int:
-        """Return the number of float64 values that a plan needs."""
-        rows = len(plan.inputs) * 5 * plan.pieces + len(plan.outputs) * plan.samples
-        return HEADER + len(plan.parameters) + rows
+    def sizes(plan: Plan) -> tuple[int, int, int, int]:
+        """Return the numbers of float64 values that a plan needs, by array."""
+        rows = len(plan.inputs) * 5 * plan.pieces
+        return HEADER, len(plan.parameters), rows, len(plan.outputs) * plan.samples
 
     @classmethod
     def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
-        """Return a plan's arrays as views of a flat array of at least ``size`` float64 values."""
-        a = HEADER + len(plan.parameters)
-        b = a + len(plan.inputs) * 5 * plan.pieces
-        c = b + len(plan.outputs) * plan.samples
+        """Return a plan's arrays as views of a flat array of enough float64 values."""
+        ends = np.cumsum(cls.sizes(plan))
+        header, parameters, inputs, outputs, _ = np.split(memory, ends)
         return cls(
-            memory[:HEADER],
-            memory[HEADER:a],
-            memory[a:b].reshape(len(plan.inputs), 5 * plan.pieces),
-            memory[b:c].reshape(len(plan.outputs), plan.samples),
+            header,
+            parameters,
+            inputs.reshape(len(plan.inputs), 5 * plan.pieces),
+            outputs.reshape(len(plan.outputs), plan.samples),
         )
 
 

@@ -186,7 +186,7 @@ class Worker:
     def prepare(self, plan: Plan, limit: float) -> Reply:
         """Let the worker look up a plan's variables; errors as for ``load``."""
         started = self._started
-        started.memory.fit(Room.size(plan))
+        started.memory.fit(sum(Room.sizes(plan)))
         started.memory.give()
         self.room = Room.over(plan, started.memory.values)
         send(started.program, Request.PREPARE, text(started.place) + self._order.prepare(plan))

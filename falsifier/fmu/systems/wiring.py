@@ -7,7 +7,7 @@ from typing import get_args
 from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.fmu.description import Slot, Structure, conversion, describe, read_structure
+from falsifier.fmu.description import Structure, conversion, describe, read_structure
 from falsifier.fmu.systems.network import (
     SYSTEM,
     Component,
@@ -217,10 +217,6 @@ class _Joiner:
             return ""
         silent, other = ("input", f"output is in {a}") if a else ("output", f"input is in {b}")
         return f"passes unchanged; the {silent} states no unit, the {other}"
-
-
-def _is_element(name: str, slot: Slot, array: str) -> bool:
-    return slot.declared == array and name.startswith(f"{array}[")
 
 
 def _check_types(a: Variable, b: Variable) -> None:
