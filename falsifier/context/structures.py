@@ -97,7 +97,8 @@ def _with_names(
         fields = known.get(fields[0][1], ())
     at = 0
     for label, value in values:
-        at = next((i for i, (_, name) in enumerate(fields) if name == label), at)
+        if label:
+            at = next((i for i, (_, name) in enumerate(fields) if name == label), at)
         if at < len(fields):
             inner, name = fields[at]
             if isinstance(value, str):
