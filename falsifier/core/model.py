@@ -15,8 +15,6 @@ from falsifier.errors import SimulationError, SpecError, did_you_mean
 Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
-_KINDS: tuple[str, ...] = get_args(Kind)
-_CAUSALITIES: tuple[str, ...] = get_args(Causality)
 
 # Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
@@ -73,8 +71,8 @@ class Variable:
     is_clocked: bool = False
 
     def __post_init__(self) -> None:
-        one_of("kind of a variable", self.kind, _KINDS)
-        one_of("causality of a variable", self.causality, _CAUSALITIES)
+        one_of("kind of a variable", self.kind, get_args(Kind))
+        one_of("causality of a variable", self.causality, get_args(Causality))
 
     @property
     def is_bounded(self) -> bool:

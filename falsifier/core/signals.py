@@ -160,10 +160,13 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
     # Plain floats: for the few control points of a search, numpy's overhead per call would dominate.
     steps = [b - a for a, b in pairwise(times)]
     secants = [(b - a) / h for (a, b), h in zip(pairwise(values), steps, strict=True)]
-    slopes = _inner_slopes(steps, secants)
     if len(steps) == 1:
         slopes = [secants[0], secants[0]]
     else:
+        slopes = [
+            inner_slope(*lengths, *sides)
+            for lengths, sides in zip(pairwise(steps), pairwise(secants), strict=True)
+        ]
         first = end_slope(steps[0], steps[1], secants[0], secants[1])
         slopes = [first, *slopes, end_slope(steps[-1], steps[-2], secants[-1], secants[-2])]
     rows = [
@@ -175,16 +178,11 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
     return table
 
 
-def _inner_slopes(steps: list[float], secants: list[float]) -> list[float]:
-    """Return the slopes between the pieces; 0 at a peak, in a valley or on a flat piece."""
-    return [
-        inner_slope(h, next_h, left, right)
-        for (h, next_h), (left, right) in zip(pairwise(steps), pairwise(secants), strict=True)
-    ]
-
-
 def inner_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
-    """Return the slope of a pchip curve between two pieces: the weighted harmonic mean of their secants."""
+    """Return the slope of a pchip curve between two pieces: the weighted harmonic mean of their secants.
+
+    It is 0 at a peak, in a valley or on a flat piece.
+    """
     if secant * next_secant <= 0.0:
         return 0.0
     weight, next_weight = step + 2.0 * next_step, 2.0 * step + next_step
