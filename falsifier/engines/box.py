@@ -62,6 +62,10 @@ class BoxEngine(ABC):
             if self.box.represents(evaluation.candidate):
                 self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
 
+    def _is_same(self, told: Vector, own: Vector) -> bool:
+        """Whether a point that was told is one that was proposed; its candidate has settled values."""
+        return bool(np.allclose(told, self.box.settled(own), rtol=0, atol=1e-9))
+
     @abstractmethod
     def _propose(self, rng: np.random.Generator) -> Proposal:
         """Return the next point; ``rng`` is the only source of randomness to use."""

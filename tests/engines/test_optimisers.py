@@ -2,6 +2,8 @@
 
 import gc
 import threading
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -126,6 +128,15 @@ def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
         generations.add(int(candidate.rationale.split()[1]))
         engine.tell([Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))])
     assert generations == {1}, "a plateau ends a start after its first generation"
+
+
+@pytest.mark.parametrize("name", ["annealing", "cma", "optuna"])
+def test_candidates_of_whole_numbers_are_recognised(name: str) -> None:
+    problem = box_problem()
+    space = replace(problem.space, inputs=tuple(replace(r, kind="integer") for r in problem.space.inputs))
+    problem = replace(problem, space=space)
+    asked = drive(make_engine(name, problem, seed=0), partial(bowl, problem), rounds=60)
+    assert sum("uniform random" in c.rationale for c in asked) < 20
 
 
 def test_a_single_coordinate_can_be_searched() -> None:

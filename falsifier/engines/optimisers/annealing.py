@@ -44,7 +44,7 @@ class Annealing(BoxEngine):
         if cost is not None:
             self._worst = max(self._worst, cost)
         # A failed simulation counts as the worst cost so far: annealing needs a number for every point.
-        if self._awaited is not None and np.allclose(point, self._awaited, rtol=0, atol=1e-9):
+        if self._awaited is not None and self._is_same(point, self._awaited):
             self._awaited = None
             self._walk.answer(self._worst if cost is None else cost)
 

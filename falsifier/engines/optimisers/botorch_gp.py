@@ -42,7 +42,7 @@ class BoTorch(GaussianProcessEngine):
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         super()._learn(point, cost)
-        self._pending = [p for p in self._pending if not np.allclose(p, point, rtol=0, atol=1e-9)]
+        self._pending = [p for p in self._pending if not self._is_same(point, p)]
 
     def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
         seed = int(rng.integers(2**31))

@@ -8,6 +8,8 @@ from falsifier.problem.problem import Problem
 
 # Initial standard deviation as a share of the ranges: the authors recommend about a third.
 _FIRST_STEP = 0.3
+# Generations in a row that may consist of points whose costs are known; in a small space, all are in the end.
+_GENERATIONS = 20
 
 
 class CMA(BoxEngine):
@@ -27,6 +29,8 @@ class CMA(BoxEngine):
         self._generation: list[Vector] = []
         self._costs: list[float | None] = []
         self._next = 0
+        # Where different points have the same candidate, its cost is known from the first one.
+        self._known: dict[bytes, float] = {}
 
     def _start(self) -> CMAEvolutionStrategy:
         # The package requires two dimensions: a single coordinate is complemented by an unused second one.
@@ -43,28 +47,56 @@ class CMA(BoxEngine):
         )
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
-        if not self._generation:
-            if self._strategy.stop():
-                self._strategy = self._start()
-            self._generation = [np.asarray(x) for x in self._strategy.ask()]
-            self._costs = [None] * len(self._generation)
-            self._next = 0
-        if self._next == len(self._generation):
-            return Proposal(rng.random(self.box.dimension), "uniform random, while a generation is simulated")
-        point = self._generation[self._next][: self.box.dimension]
-        self._next += 1
-        return Proposal(point, f"generation {self._strategy.countiter + 1} of the evolution strategy")
+        for _ in range(_GENERATIONS):
+            if not self._generation:
+                self._begin()
+            while self._next < len(self._generation):
+                point = self._own(self._next)
+                self._next += 1
+                known = self._known.get(_key(point)) if self.box.has_gaps else None
+                if known is None:
+                    why = f"generation {self._strategy.countiter + 1} of the evolution strategy"
+                    return Proposal(point, why)
+                self._costs[self._next - 1] = known
+            if not self._end():
+                why = "uniform random, while a generation is simulated"
+                return Proposal(rng.random(self.box.dimension), why)
+        why = "uniform random: what the evolution strategy proposes was simulated"
+        return Proposal(rng.random(self.box.dimension), why)
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         if cost is not None:
             self._worst = max(self._worst, cost)
         # A failed simulation counts as the worst cost so far: the strategy needs a number for every point.
+        known = self._worst if cost is None else cost
+        if self.box.has_gaps:
+            self._known[_key(point)] = known
         for i in range(self._next):
-            own = self._generation[i][: self.box.dimension]
-            if self._costs[i] is None and np.allclose(point, own, rtol=0, atol=1e-9):
-                self._costs[i] = self._worst if cost is None else cost
+            if self._costs[i] is None and self._is_same(point, self._own(i)):
+                self._costs[i] = known
                 break
+        self._end()
+
+    def _own(self, i: int) -> Vector:
+        """Return a point of the generation, as its candidate has it."""
+        return self.box.settled(self._generation[i][: self.box.dimension])
+
+    def _begin(self) -> None:
+        if self._strategy.stop():
+            self._strategy = self._start()
+        self._generation = [np.asarray(x) for x in self._strategy.ask()]
+        self._costs = [None] * len(self._generation)
+        self._next = 0
+
+    def _end(self) -> bool:
+        """Tell the strategy if the costs of the whole generation are known; return whether they were."""
         told = [cost for cost in self._costs if cost is not None]
-        if self._generation and len(told) == len(self._generation):
-            self._strategy.tell(self._generation, told)
-            self._generation, self._next = [], 0
+        if not self._generation or len(told) < len(self._generation):
+            return False
+        self._strategy.tell(self._generation, told)
+        self._generation, self._next = [], 0
+        return True
+
+
+def _key(point: Vector) -> bytes:
+    return np.round(point, 6).tobytes()

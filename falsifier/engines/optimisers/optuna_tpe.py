@@ -35,7 +35,7 @@ class TPE(BoxEngine):
 
     def _learn(self, point: Vector, cost: float | None) -> None:
         for i, (trial, own) in enumerate(self._open):
-            if np.allclose(point, own, rtol=0, atol=1e-9):
+            if self._is_same(point, own):
                 del self._open[i]
                 if cost is None:
                     self._study.tell(trial, state=optuna.trial.TrialState.FAIL)
