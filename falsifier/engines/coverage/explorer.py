@@ -16,7 +16,7 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Array
-from falsifier.engines.coverage.marks import MODES, Mark, Marker
+from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete_event
 from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
@@ -24,8 +24,12 @@ from falsifier.problem.problem import Problem
 
 # Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
 _NEW_END, _REPEATED = 0.6, 0.2
-# Of what follows the lowest robustness: a small change, a new end from an earlier time; else one from then.
-_SLIGHT, _EARLIER = 0.2, 0.2
+# Of what follows the lowest robustness: a small change, the same done again, a new end from an earlier time;
+# else one from then.
+_SLIGHT, _AGAIN, _EARLIER = 0.2, 0.25, 0.15
+# Of what is done again, the share without a stretch before it, and that with all that led there; the shortest
+# span otherwise, as a share of the time until then.
+_SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
 # Two values of robustness that differ by at most this share of their size are the same level.
 _SAME_LEVEL = 1e-6
 # Ideas, then random points, among which one that was not simulated is looked for.
@@ -101,8 +105,8 @@ class Explorer:
         if difference <= _SAME_LEVEL * abs(robustness):
             self._at_lowest.append(Reached(point, critical))
         marks = self._marker.marks(trajectory)
-        new = {mark.source for mark in marks if mark not in self._reached}
-        self._new.update(new)
+        new = [mark for mark in marks if mark not in self._reached]
+        self._new.update({mark.source for mark in new})
         for mark, time in marks.items():
             self._hits[mark] += 1
             known = self._reached.get(mark)
@@ -112,7 +116,7 @@ class Explorer:
                 self._programs.remember(point, time, self._interval)
             if known is None or time < 0.95 * known.time:
                 self._reached[mark] = Reached(point, time, known.tries if known else 0)
-        return any(source == MODES or source in self._marker.kinds for source in new)
+        return any(is_discrete_event(mark) and mark.source in (MODES, *self._marker.kinds) for mark in new)
 
     def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Idea:
         """Return the next input: one that reached a rare mark, continued differently after it.
@@ -153,9 +157,20 @@ class Explorer:
         kind = rng.random()
         if kind < _SLIGHT:
             return Idea(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+        if kind < _SLIGHT + _AGAIN:
+            return Idea(self._again(rng, reached), f"{where}, done again and again")
         # Now and then from an earlier time: it may have been too late.
-        time = reached.time * (rng.random() if kind < _SLIGHT + _EARLIER else 1.0)
+        time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
         return Idea(self._programs.another_end(rng, reached.point, time), f"{where}, continued differently")
+
+    def _again(self, rng: np.random.Generator, reached: Reached) -> Array:
+        """Return the input that goes on with what it did before the lowest robustness, until the end."""
+        point, time = reached.point, reached.time
+        if rng.random() < _SOONER:
+            point, time = self._programs.sooner(rng, point, time)
+        is_all = rng.random() < _FROM_START
+        span = time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
+        return self._programs.again(rng, point, time, span)
 
     def _choose(self, rng: np.random.Generator) -> Mark | None:
         """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""

@@ -44,6 +44,11 @@ class Mark(NamedTuple):
     what: tuple[float | str, ...]
 
 
+def is_discrete_event(mark: Mark) -> bool:
+    """Whether a mark is a value or a change of signals with few values, not a level or a distance."""
+    return mark.source == MODES or mark.what[0] in ("is", "changes", "after")
+
+
 class Change(NamedTuple):
     """A change of a discrete signal, or of the truth of a predicate.
 

@@ -124,6 +124,34 @@ class Programs:
             result[group] = values
         return result
 
+    def again(self, rng: np.random.Generator, point: Array, time: float, length: float) -> Array:
+        """Return the program that repeats what it did in the ``length`` s before a time until the end.
+
+        What made a counter count once may do so as often as it is done.
+        """
+        result = self._parameters(rng, point)
+        for times, group in zip(self._times, self._layout.groups, strict=False):
+            first, stop = (int(np.searchsorted(times, t, side="right")) for t in (time - length, time))
+            first = min(max(first, 0), max(stop - 1, 0))
+            span = max(stop - first, 1)
+            values = result[group]
+            values[stop:] = values[first + np.arange(len(values) - stop) % span]
+            result[group] = values
+        return result
+
+    def sooner(self, rng: np.random.Generator, point: Array, time: float) -> tuple[Array, float]:
+        """Return the program without a stretch before a time, and that time in it: the rest comes sooner."""
+        result = point.copy()
+        begin = float(rng.uniform(0.0, time))
+        cut = float((time - begin) * rng.random() ** 2)
+        for times, group in zip(self._times, self._layout.groups, strict=False):
+            first, stop = (int(np.searchsorted(times, t, side="left")) for t in (begin, begin + cut))
+            values = result[group]
+            moved = len(values) - stop
+            values[first : first + moved] = values[stop:].copy()
+            result[group] = values
+        return result, time - cut
+
     def moved(self, rng: np.random.Generator, point: Array) -> Array:
         """Return the program with one switch of one input moved, one piece dropped or one value changed."""
         point = self._parameters(rng, point)

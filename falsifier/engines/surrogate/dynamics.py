@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Layout, TimeGrid
 from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.stl import Verdict
@@ -208,6 +208,11 @@ class Forecaster:
     def predictor(self, cost: PredictedCost) -> Callable[[Array], Array]:
         """Return a function from points, shape (m, d), to their predicted costs, shape (m,)."""
         return lambda points: cost.cost(self._margins(cost, points))
+
+    def outputs(self, points: Array, grid: TimeGrid) -> Array:
+        """Return the predicted outputs of points, shape (m, cells + 1, outputs)."""
+        assert self._dynamics is not None, "fitted first"
+        return self._dynamics.predict(self._layout.inputs(points, grid))
 
     def verdicts(self, cost: PredictedCost, points: Array) -> list[Verdict]:
         """Return the verdicts predicted for points, shape (m, d), in the requirement's own unit."""

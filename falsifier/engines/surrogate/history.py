@@ -48,6 +48,7 @@ class History:
     grid: TimeGrid
     layout: Layout
     samples: list[Sample] = field(default_factory=list)
+    _discrete: frozenset[str] = frozenset()
     _cost: PredictedCost | None = None
     _scaled: PredictedCost | None = None
 
@@ -72,22 +73,35 @@ class History:
         driven = {r.name for r in problem.space.inputs}
         outputs = [name for name in problem.experiment.outputs if name not in driven]
         outputs.sort(key=lambda name: name not in formula.signals)
+        self._discrete = frozenset(
+            name for name in outputs if is_discrete(learnable(trajectory[name]), kind=problem.info.kind(name))
+        )
         return PredictedCost.of(
             formula,
             problem.space,
             self.grid,
             outputs[: max(_MOST_OUTPUTS, len(set(outputs) & set(formula.signals)))],
-            discrete=frozenset(
-                name
-                for name in outputs
-                if is_discrete(learnable(trajectory[name]), kind=problem.info.kind(name))
-            ),
+            discrete=self._discrete,
             constants={
                 name: float(learnable(trajectory[name][0]))
                 for name in formula.signals
                 if name not in driven and name not in outputs
             },
         )
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs in the traces, in order."""
+        return self._cost.outputs if self._cost else ()
+
+    @property
+    def continuous(self) -> list[str]:
+        """The outputs that are not discrete and have varied."""
+        return [
+            name
+            for j, name in enumerate(self.outputs)
+            if name not in self._discrete and any(np.ptp(s.trace.states[:, j]) > 0 for s in self.samples)
+        ]
 
     def scaled_cost(self) -> PredictedCost:
         """Return the cost of predictions, scaled by the spread of all samples."""

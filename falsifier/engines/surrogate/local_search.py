@@ -160,14 +160,14 @@ class TrustRegion(BoxEngine):
         return np.asarray(candidates[np.argmin(mean - np.abs(rng.standard_normal(len(mean))) * deviation)])
 
     def _learn(self, point: Vector, cost: float | None) -> None:
-        is_own = any(np.allclose(point, own, rtol=0, atol=1e-9) for own in self._own)
+        is_own = any(self._is_same(point, own) for own in self._own)
         best = min(self._costs[self._first :], default=np.inf)
         if cost is not None:
             self._points.append(point)
             self._costs.append(cost)
         if not is_own:
             return
-        self._own = [own for own in self._own if not np.allclose(point, own, rtol=0, atol=1e-9)]
+        self._own = [own for own in self._own if not self._is_same(point, own)]
         if cost is not None and cost < best - 1e-9 * abs(best):
             self._successes, self._failures = self._successes + 1, 0
         else:

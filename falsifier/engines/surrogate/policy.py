@@ -39,12 +39,11 @@ class Policy:
 
     Args:
         priors: rating of each arm before its first proposals, from 0 to 1.
-        simple: the arms with a reserved share.
-        settings: memory, sharpness and reserved share.
+        settings: memory and sharpness.
     """
 
-    def __init__(self, priors: Mapping[str, float], simple: Sequence[str], settings: Settings) -> None:
-        self._settings, self._simple = settings, frozenset(simple)
+    def __init__(self, priors: Mapping[str, float], settings: Settings) -> None:
+        self._settings = settings
         self._brought = {arm: _PRIOR_WEIGHT * prior for arm, prior in priors.items()}
         self._turns = dict.fromkeys(priors, _PRIOR_WEIGHT)
 
@@ -60,15 +59,15 @@ class Policy:
         brought = self._brought[arm] + _UNKNOWN * _UNKNOWN_WEIGHT
         return brought / (self._turns[arm] + _UNKNOWN_WEIGHT)
 
-    def choose(self, arms: Sequence[str], rng: np.random.Generator, *, reserved: bool) -> str:
+    def choose(self, arms: Sequence[str], reserved: Mapping[str, float], rng: np.random.Generator) -> str:
         """Draw one of the arms that can propose now.
 
         Args:
             arms: names of the arms.
+            reserved: shares of the turns that no rating takes away, together less than 1; others have none.
             rng: random generator.
-            reserved: whether the simple arms have their share.
         """
-        kept = np.array([self._settings.reserved * (reserved and arm in self._simple) for arm in arms])
+        kept = np.array([reserved.get(arm, 0.0) for arm in arms])
         ratings = np.array([self.rating(arm) for arm in arms]) ** self._settings.sharpness
         shares = kept + (1.0 - kept.sum()) * ratings / ratings.sum()
         return arms[int(rng.choice(len(arms), p=shares / shares.sum()))]

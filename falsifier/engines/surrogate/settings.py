@@ -41,7 +41,7 @@ class Settings:
 
     cells: int = 100
     constants: int = 2
-    corners: int = 4
+    corners: int = 8
     bangs: int = 2
     pauses: int = 2
     probes: int = 2

@@ -20,6 +20,7 @@ from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_
 from falsifier.engines.surrogate.planning import is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
+from falsifier.engines.surrogate.pushing import Push, Pushes, by_height
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
@@ -41,6 +42,7 @@ _PRIORS = {
     "dynamics": 0.8,
     "changes": 0.3,
     "levels": 0.3,
+    "push": 0.15,
     "region": 0.2,
     "switching": 0.2,
     "coverage": 0.1,
@@ -51,6 +53,8 @@ _PRIORS = {
 }
 # Without inputs there is no time in which dynamics would tell more than the final robustness.
 _PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8}
+# Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
+_WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The arms with a share of turns that no rating takes away.
 _SIMPLE = ("coverage", "uniform", "corners", "cma")
 
@@ -64,12 +68,14 @@ class Pending:
         candidate: the candidate.
         point: its point in the layout, in [0, 1]^d.
         forecast: prediction of the dynamics, if they proposed it.
+        push: what it drives further than before, if that is its aim.
     """
 
     arm: str
     candidate: Candidate
     point: Array
     forecast: Forecast | None = None
+    push: Push | None = None
 
 
 class Surrogate:
@@ -97,8 +103,9 @@ class Surrogate:
             "cma": CMA(problem, seed=seed),
         }
         priors = _PRIORS if space.inputs else _PRIORS_OF_PARAMETERS
-        self._policy = Policy(priors, _SIMPLE, self.settings)
+        self._policy = Policy(priors, self.settings)
         self._levels = Levels()
+        self._pushes = Pushes()
         self._windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
         self._opening = self._first_kinds()
         self._asked = self._switched = 0
@@ -125,9 +132,12 @@ class Surrogate:
             else:
                 brought = worth(self._levels, sample.robustness)
                 assert evaluation.trajectory is not None, "a sample has one"
-                critical = sample.critical * self.grid.step * self.grid.cells
+                critical = evaluation.verdict.critical_time if evaluation.verdict else 0.0
                 is_new = self._explorer.learn(point, evaluation.trajectory, sample.robustness, critical)
+                self._pushes.know(self.history.outputs, self.history.continuous)
             if pending is not None:
+                if pending.push and is_new:
+                    self._pushes.succeeded(pending.push)
                 self._policy.learn(pending.arm, brought, is_new=is_new)
                 self._judge(pending, sample)
             elif sample is not None and self.layout.nearest_extreme(point, within=_NEAR_EXTREME):
@@ -181,7 +191,7 @@ class Surrogate:
         """
         settings = self.settings
         if not self.problem.space.inputs:
-            return ["corners"] * settings.corners
+            return ["corners"] * min(settings.corners, 2 ** len(self.problem.space.parameters))
         if self._windows:
             turns = zip_longest(["switching"] * settings.bangs, ["corners"] * settings.pauses)
             return [kind for turn in turns for kind in turn if kind is not None]
@@ -243,6 +253,8 @@ class Surrogate:
                 return self._plan(rng)
             case "changes":
                 return self._change(rng)
+            case "push":
+                return self._push(rng)
             case "random":
                 point = random_points(self.layout, rng, 1)[0]
                 return self._made(arm, point, "random: too few simulations to learn from yet")
@@ -274,22 +286,25 @@ class Surrogate:
         if len(self.history.samples) < 2:
             return "random"
         has_inputs, differs = bool(self.problem.space.inputs), not self._levels.is_plateau
+        lead = has_inputs and self._levels.is_staircase
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
             # Where levels lead, going on from the lowest one does what a change would.
-            "changes": differs and not (has_inputs and self._levels.is_staircase),
+            "changes": differs and not lead,
             "region": differs,
             "cma": differs,
             "corners": not self._corners.is_done,
             "switching": bool(self._windows) and self._switched < _MOST_SWITCHING,
             "coverage": has_inputs,
             "context": self._explorer.has_levels,
-            "levels": has_inputs and self._levels.is_staircase,
+            "levels": lead,
+            "push": (lead or (has_inputs and not differs)) and not self._pushes.is_done,
         }
         arms = [arm for arm in _PRIORS if can.get(arm, True)]
-        trial = len(self._opening) + self.settings.trial
-        return self._policy.choose(arms, rng, reserved=self._asked >= trial)
+        is_trial = self._asked < len(self._opening) + self.settings.trial
+        reserved = {} if is_trial else dict.fromkeys(_SIMPLE, self.settings.reserved)
+        return self._policy.choose(arms, reserved | (_WHERE_LEVELS_LEAD if lead else {}), rng)
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         self._switched += 1
@@ -317,6 +332,26 @@ class Surrogate:
         forecast = self.forecaster.forecast(cost, point)
         why = f"the learnt dynamics predict a scaled robustness of {forecast.cost:.3g}"
         return self._made("dynamics", point, why, forecast)
+
+    def _push(self, rng: np.random.Generator) -> Pending:
+        """Plan what drives an output further than before."""
+        samples, push = self.history.samples, self._pushes.next(rng)
+        order, critical = by_height(push, samples, self.grid.cells)
+        forecaster, elites = self._fitted(order, rng), order[: self.settings.elites]
+
+        def predict(points: Array) -> Array:
+            return np.asarray(-push.heights(forecaster.outputs(points, self.grid)).max(axis=1))
+
+        point = plan(
+            predict,
+            self.layout,
+            elites=self.history.points[elites],
+            critical=critical[elites],
+            seen=self._tried,
+            settings=self._plan_settings(len(self.history.outputs)),
+            rng=rng,
+        )
+        return replace(self._made("push", point, str(push)), push=push)
 
     def _plan_settings(self, outputs: int) -> Settings:
         settings = self.settings

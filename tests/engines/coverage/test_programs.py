@@ -55,6 +55,28 @@ def test_a_span_is_repeated_after_a_pause() -> None:
     assert np.count_nonzero(found[11:50] == 1.0) >= 5
 
 
+def test_what_was_done_before_a_time_is_done_again_until_the_end() -> None:
+    programs = Programs(layout_of(inputs=2))
+    point = np.tile(np.arange(50) / 50, 2)
+    point = np.concatenate([point, [0.5]])[: layout_of(inputs=2).dimension]
+    # The cells are 0.2 s long; from 4 s on, the five cells from 3 s on follow again and again.
+    found = programs.again(drawn(0), point, 3.9, 1.0)
+    for start in (0, 50):
+        own = found[start : start + 50]
+        assert (own[:20] == point[start : start + 20]).all()
+        assert (own[20:] == np.resize(own[15:20], 30)).all()
+
+
+def test_without_a_stretch_what_follows_comes_sooner() -> None:
+    programs, point = Programs(layout_of(inputs=1)), np.arange(layout_of(inputs=1).dimension) / 100
+    for seed in range(20):
+        found, time = programs.sooner(drawn(seed), point, 5.0)
+        assert 0.0 <= time <= 5.0
+        assert programs.another_end(drawn(seed), found, 10.0).shape == point.shape
+        moved = round((5.0 - time) / 0.2)
+        assert abs(found[25 - moved] - point[25]) <= 0.011, "what was there from 5 s on"
+
+
 def test_values_are_drawn_between_levels_that_are_known() -> None:
     layout = layout_of(inputs=1)
     (ranged,) = layout.space.inputs
