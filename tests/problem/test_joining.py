@@ -7,7 +7,7 @@ from zipfile import ZipFile
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import SpecError
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import RequirementSection
@@ -129,9 +129,3 @@ def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None
         join_formula(fixture("Ball_2"), low, changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
         join_formula(tmp_path / "gone.fmu", low, changes=changes_from_options())
-
-
-def test_an_fmu_for_scheduled_execution_alone_cannot_be_used() -> None:
-    spec = SPEC | {"model": {"fmu": "Scheduled_3.fmu"}}
-    with pytest.raises(ModelError, match="scheduled execution"):
-        join(parse_spec(spec, file="my.toml"), "R", path=fixture("Scheduled_3").with_name("my.toml"))

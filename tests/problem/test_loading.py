@@ -1,4 +1,3 @@
-import pickle
 from pathlib import Path
 
 import pytest
@@ -10,7 +9,6 @@ from falsifier.problem.loading import formula_of_template, load_problem, load_pr
 from falsifier.problem.problem import Problem
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
-from tests.command import falsifier
 from tests.problem.support import AT, GOOD, echo, spec
 
 
@@ -37,11 +35,6 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         load_problem("AT1", shortest_piece=1e-9)
 
 
-def test_problems_travel_between_processes(folder: Path) -> None:
-    problem = load_problem(spec(folder, GOOD))
-    assert pickle.loads(pickle.dumps(problem)) == problem
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -51,23 +44,11 @@ def test_problems_travel_between_processes(folder: Path) -> None:
         ("G[0,20]", "G[0,60]", r"requirements\.R\.formula: .*60 s"),
         ("G[0,20]", "G[0,20", r"requirements\.R\.formula: "),
         ("control_points = 7", "", r"inputs\.throttle\.control_points: this key is missing"),
-        (
-            "control_points = 7",
-            "control_points = 7\nrange = [0, 120]",
-            r"inputs\.throttle\.range: \[0, 120\] exceeds",
-        ),
+        ("control_points", "range = [0, 120]\ncontrol_points", r"inputs\.throttle\.range: .* exceeds"),
         ("finalDrive", "finalDrve", r"parameters\.finalDrve: .*did you mean 'finalDrive'"),
         ("[parameters]", "[parameters]\nspeed = 3", r"parameters\.speed: cannot be set: .*output"),
-        (
-            '"co-simulation"',
-            '"co-simulation"\noutput_interval = 0.03',
-            r"model\.output_interval: .*not an integer multiple",
-        ),
-        (
-            'interface = "co-simulation"',
-            "",
-            r"model\.interface: the FMU offers co-simulation and .*; set this key to one of them",
-        ),
+        ("interface", "output_interval = 0.03\ninterface", r"model\.output_interval: .*integer multiple"),
+        ('interface = "co-simulation"', "", r"model\.interface: .*; set this key to one of them"),
     ],
 )
 def test_errors_name_file_key_and_cure(folder: Path, old: str, new: str, message: str) -> None:
@@ -166,11 +147,7 @@ def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("target", "text", "message"),
     [
-        (
-            "AT1",
-            "rise signal=sped reference=80 time=10",
-            r"--template: signal: unknown signal 'sped'; did you",
-        ),
+        ("AT1", RISE.replace("speed", "sped"), r"--template: signal: unknown signal 'sped'; did you"),
         ("AT1", "rise signal=speed reference=80 time=51", r"--template: time: needs values up to 51 s"),
         ("AT1", "rise signal=speed reference=80", r"--template: time: this key is missing"),
         ("AT1", "raise signal=speed", r"--template: template: no such template; did you mean 'rise'"),
@@ -186,22 +163,6 @@ def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> Non
 def test_errors_name_the_argument(target: str, text: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
         formula_of_template(ProblemSource(target=target), text)
-
-
-def test_what_a_requirement_overrides_stays(tmp_path: Path) -> None:
-    text = GOOD.replace("[requirements.R]", "[requirements.R]\nstop_time = 30.0").replace(
-        "AT.fmu", AT.as_posix()
-    )
-    source = ProblemSource(target=spec(tmp_path, text))
-    assert formula_of_template(source, "stays_within signal=speed high=120") == "G[0,30] (speed <= 120)"
-
-
-def test_on_the_command_line_the_formula_is_what_is_judged(tmp_path: Path) -> None:
-    done = falsifier("simulate", "AT1", "--template", RISE, "--set", "throttle=100", cwd=tmp_path)
-    assert done.code in (0, 1), done.err
-    both = falsifier("run", "AT1", "--template", RISE, "--stl", "G (speed <= 1)", cwd=tmp_path)
-    assert both.code == 2
-    assert "--stl and --template" in both.err
 
 
 def test_a_spec_with_a_template_is_a_problem_with_its_formula(folder: Path) -> None:

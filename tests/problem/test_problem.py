@@ -14,7 +14,7 @@ from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.context import named_context, with_context
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import parse_spec
@@ -70,17 +70,11 @@ def test_problems_that_are_simulated_otherwise_do_not_share_a_search() -> None:
     ("wrong", "message"),
     [
         ({"experiment": Experiment(5.0, 0.1, ("x",))}, "LAG: stop_time is 10 s in the search space, but 5 s"),
-        (
-            {"space": SearchSpace((InputRange("v", 0, 1),), (), 10.0)},
-            "no input 'v'",
-        ),
+        ({"space": SearchSpace((InputRange("v", 0, 1),), (), 10.0)}, "no input 'v'"),
         ({"parameters": {"gain": math.nan}}, "parameter 'gain': expected a finite number, got nan"),
         ({"parameters": {"gian": 2.0}}, "no variable 'gian'; did you mean 'gain'"),
         ({"experiment": Experiment(10.0, 0.1, ("X",))}, "no variable 'X'"),
-        (
-            {"requirement": Requirement("HIGH", parse("G (gain < 2)"))},
-            "'gain', which is neither",
-        ),
+        ({"requirement": Requirement("HIGH", parse("G (gain < 2)"))}, "'gain', which is neither"),
     ],
 )
 def test_parts_of_a_problem_that_do_not_fit_are_refused(wrong: dict[str, Any], message: str) -> None:
@@ -91,19 +85,6 @@ def test_parts_of_a_problem_that_do_not_fit_are_refused(wrong: dict[str, Any], m
 CHANGED = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
 
 
-@pytest.mark.parametrize(
-    ("target", "name"),
-    [("AT1", "AT1"), ("specs/AT.toml:AT1", "AT1"), ("python:a.b:make", "make"), ("my.fmu", "my")],
-)
-def test_its_name_is_the_targets_last_part(target: str, name: str) -> None:
-    assert ProblemSource(target=target).name == name
-
-
-def test_equal_sources_are_equal_keys() -> None:
-    again = ProblemSource(target="AT1", changes=changes_from_options(values=["brake=0"], stop_time=30.0))
-    assert len({CHANGED, again, ProblemSource(target="AT1")}) == 2
-
-
 def test_what_is_not_stated_stays_so_through_json() -> None:
     read = ProblemSource.model_validate_json(CHANGED.model_dump_json())
     assert read == CHANGED
@@ -112,29 +93,6 @@ def test_what_is_not_stated_stays_so_through_json() -> None:
     assert problem.experiment.stop_time == 30.0
     assert problem.experiment.output_interval == bundled.experiment.output_interval
     assert (dict(problem.parameters), problem.space.inputs) == ({"brake": 0.0}, bundled.space.inputs[:1])
-
-
-INFO = lag_problem().info
-EXPERIMENT = Experiment(10.0, 0.1, ("x",))
-
-
-def test_outputs_and_inputs_may_be_named() -> None:
-    assert parse_requirement("G[0,10] (x <= u)", INFO, EXPERIMENT).signals == ("x", "u")
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("G[0,10] (xx <= 1)", "'x'"),  # the nearest signal
-        ("G[0,11] (x <= 1)", "11"),  # the window that reaches past the stop time
-        ("G[0,0.25] (x <= 1)", "0.25"),  # a bound between two samples
-        ("G[0,10] (x <= )", "x <= )"),  # where it cannot be read on
-    ],
-)
-def test_what_cannot_be_judged_names_the_place(text: str, named: str) -> None:
-    with pytest.raises(SpecError) as caught:
-        parse_requirement(text, INFO, EXPERIMENT)
-    assert named in str(caught.value)
 
 
 def test_a_requirement_has_a_name_and_a_formula_or_its_text() -> None:

@@ -48,11 +48,6 @@ def test_problems_of_one_search_get_the_same_limits() -> None:
     assert alone.space != one.space
 
 
-def test_fixed_and_refined_contradict_each_other() -> None:
-    with pytest.raises(SpecError, match="drop --parameterization fixed"):
-        widened([load_problem("AT1", parameterization="fixed")])
-
-
 def test_options_other_than_limits_are_still_refused_for_problems_made_in_python() -> None:
     (wide,) = widened([load_problem("python:tests.problems:easy")])
     assert wide.source is not None

@@ -1,7 +1,5 @@
 import pickle
 import random
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -81,6 +79,7 @@ Y = [2.0, 7.0, 1.0, 8.0, 2.0]
         ("F[1,3] (x <= 0)", -1, 1),  # the earlier of two largest
         ("F (y >= 8)", ON_LIMIT, 3),
         ("G[4,4] (x <= 4)", -1, 4),
+        ("1 + 1 <= 5", 3, 0),
         ("X (x <= 3)", 2, 1),
         ("X X (x <= 3)", -1, 2),
         ("x <= 5 and y <= 4", 2, 0),
@@ -113,36 +112,6 @@ def test_arithmetic_and_functions_are_those_of_numpy() -> None:
     }.items():  # fmt: skip
         found = Monitor(parse(f"{text} >= 0.25"), 1.0, 5).course(trajectory(x=X, y=Y))
         assert found == pytest.approx(value - 0.25), text
-
-
-def test_until_includes_the_left_operand_at_the_end() -> None:
-    t = trajectory(left=[1.0, -1.0], right=[-1.0, 1.0])
-    assert judge("(left >= 0) U[0,1] (right >= 0)", t) == (-1.0, 0.0)
-    t = trajectory(left=[1.0, -3.0], right=[-5.0, 1.0])
-    assert judge("(left >= 0) U[0,1] (right >= 0)", t) == (-3.0, 1.0)
-
-
-def test_the_critical_time_of_a_nested_formula_is_the_inner_operators() -> None:
-    x = [5.0] * 14
-    x[6:9] = [-2.0, -1.0, -4.0]
-    assert judge("G[0,10] F[1,3] (x >= 0)", trajectory(x=x)) == (-1.0, 7.0)
-
-
-def test_operators_without_a_window_reach_to_the_end() -> None:
-    t = trajectory(x=[1.0, 2.0, 3.0, 0.0, -7.0])
-    assert judge("G (x >= 0)", t) == (-7.0, 4.0)
-    assert judge("G F (x >= 0)", t) == (-7.0, 4.0)
-    assert judge("F G (x >= 0)", t) == (-7.0, 4.0)
-    assert judge("G[0,3] F (x >= 0)", t) == (ON_LIMIT, 3.0)
-    assert judge("(x >= 0) U G (x <= 0)", t) == (ON_LIMIT, 3.0)
-
-
-def test_one_sample_and_constants() -> None:
-    t = trajectory(x=[2.0])
-    assert judge("G (x <= 3)", t) == (1.0, 0.0)
-    assert judge("F[0,0] (x <= 3) and (x >= 0) U (x >= 1)", t) == (1.0, 0.0)
-    assert judge("1 + 1 <= 5", trajectory(x=X)) == (3.0, 0.0)
-    assert judge("G[0,2] (min(1, 2) * x <= 2^2)", trajectory(x=[4.0, 4.0, 4.0])) == (ON_LIMIT, 0.0)
 
 
 # -- the automatic transmission and the chasing cars ---------------------------------------------------------
@@ -221,11 +190,6 @@ def test_windows_that_do_not_fit_are_errors(text: str, parts: list[str]) -> None
         Monitor(parse(text), step=0.1, samples=101)
     for part in parts:
         assert part in str(caught.value)
-
-
-def test_windows_may_end_at_the_last_sample() -> None:
-    x = list(range(101))
-    assert judge("G[0,10] (x <= 99)", trajectory(0.1, x=[float(v) for v in x])) == (-1.0, 10.0)
 
 
 @pytest.mark.parametrize(("step", "samples"), [(0.0, 3), (-1.0, 3), (float("nan"), 3), (1.0, 0)])
@@ -380,13 +344,6 @@ def test_only_a_negative_margin_is_a_violation(robustness: float, violated: bool
     assert Verdict(robustness, 0.0, "x <= 1").violated is violated
 
 
-def test_verdicts_hold_plain_numbers() -> None:
-    verdict = Monitor(parse("G (x <= 3)"), 1.0, 5).evaluate(trajectory(x=X, y=Y))
-    assert [type(v) for v in (verdict.robustness, verdict.critical_time, *verdict.values.values())] == [
-        float
-    ] * 4
-
-
 # -- monitors as values --------------------------------------------------------------------------------------
 
 
@@ -407,19 +364,8 @@ def test_one_monitor_serves_many_threads() -> None:
     assert [v.robustness for v in found] == [min(-float(i), i - 1.0) for i in range(40)] * 5
 
 
-def test_monitors_need_no_package_beside_numpy() -> None:
-    code = (
-        "import sys; from falsifier.stl import Monitor, parse; m = Monitor(parse('G[0,1] x <= 3'), 1.0, 3);"
-        "from falsifier.core.trajectory import Trajectory; import numpy as np;"
-        "m.evaluate(Trajectory(np.arange(3.0), {'x': np.zeros(3)}));"
-        "print([m for m in ('rtamt', 'scipy') if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
-
-
-def compiled(text: str, *, samples: int = 101, **wanted: int) -> Program:
-    return compile_formula(parse(text), step=0.1, samples=samples, **wanted)
+def compiled(text: str) -> Program:
+    return compile_formula(parse(text), step=0.1, samples=101)
 
 
 def computed(program: Program) -> int:
@@ -440,15 +386,3 @@ def test_a_part_that_stands_twice_is_computed_once_where_either_needs_it() -> No
         compiled("G[0,2] (x <= 1) and G[0,2] (x <= 1)").size
         < compiled("G[0,2] (x <= 1) and G[0,2] (x <= 2)").size
     )
-
-
-def test_values_at_several_samples_reach_further() -> None:
-    program = compiled("G[0,2] (x <= 1)", first=10, last=30)
-    assert (program.root.place.first, program.root.place.last) == (10, 30)
-    assert computed(program) == 41 + 21
-
-
-def test_constants_are_worked_out_beforehand() -> None:
-    program = compiled("x <= 2*3 + sqrt(16)")
-    assert computed(program) == 1
-    assert len(program.steps) == 2, "the margin, and its check"

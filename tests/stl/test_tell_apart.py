@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.stl import Monitor, parse
 from falsifier.stl.intervals import Interval
-from falsifier.stl.tell_apart import _batches, tell_apart
+from falsifier.stl.tell_apart import tell_apart
 
 RANGES = {"b": Interval(0, 1), "x": Interval(-10, 10)}
 
@@ -45,14 +45,6 @@ def test_examples_are_repeatable_and_have_few_steps() -> None:
     assert first is not None and again is not None
     assert (first["x"] == again["x"]).all()
     assert (first["x"][1:] != first["x"][:-1]).sum() == 1
-
-
-@pytest.mark.parametrize(
-    ("samples", "count", "largest"), [(1000, 300, 300), (100_000, 300, 40), (3_000_000, 20, 1)]
-)
-def test_fine_grids_are_tried_in_parts(samples: int, count: int, largest: int) -> None:
-    sizes = _batches(samples)
-    assert (sum(sizes), max(sizes)) == (count, largest)
 
 
 def test_an_example_on_a_fine_grid_is_found_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
