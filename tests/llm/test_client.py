@@ -307,14 +307,6 @@ def test_nothing_else_is_reached_printed_or_read(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
-@pytest.mark.parametrize("effort", ["none", "minimal"])
-def test_the_smallest_efforts_are_sent_or_reported_as_dropped(effort: str) -> None:
-    with serving(Step("yes")) as server:
-        reply = LiteLLMChat("openai/gpt-5-mini", effort=effort, api_base=server.url).send(REQUEST)
-        (asked,) = server.received
-    assert (asked.body.get("reasoning_effort") == effort) != ("effort" in reply.parameters.get("dropped", []))
-
-
 KEPT = ChatRequest(
     messages=(
         Message(role="system", content="standing", stable=8),

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
-from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import CachedChat, connect, preflight
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
@@ -119,10 +118,6 @@ PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=
 
 
 class TestCache:
-    def test_it_is_opt_in(self, tmp_path: Path) -> None:
-        assert isinstance(connect("ollama_chat/x"), LiteLLMChat)
-        assert isinstance(connect("ollama_chat/x", cache=tmp_path), CachedChat)
-
     def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
         inner = ScriptedChat([PAID, "never"])
         chat = CachedChat(inner, tmp_path / "new" / "folder")

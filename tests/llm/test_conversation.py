@@ -120,12 +120,6 @@ class TestTools:
         assert following.messages[2] == Message(role="tool", content="3", tool_call_id="c1")
         assert [e.problem for e in exchanges] == [None, None]
 
-    def test_several_calls_at_once_are_answered_one_by_one(self) -> None:
-        both = ChatReply(text="", tool_calls=calling(1, 2).tool_calls + calling(3, 4, id="c2").tool_calls)
-        _, chat, _ = ask_with_tools(both, "7")
-        answers = [(m.tool_call_id, m.content) for m in chat.requests[1].messages if m.role == "tool"]
-        assert answers == [("c1", "3"), ("c2", "7")]
-
     def test_a_wrong_call_is_told_what_is_wrong_and_may_be_corrected(self) -> None:
         value, chat, exchanges = ask_with_tools(wrong(), calling(1, 2), "3")
         assert value == "3"
@@ -135,9 +129,3 @@ class TestTools:
     def test_wrong_calls_do_not_go_on_for_ever(self) -> None:
         with pytest.raises(NoValidReplyError, match="no terms"):
             ask_with_tools(wrong(), wrong(), wrong(), "3")
-
-    def test_a_rejected_answer_after_a_call_keeps_what_was_said(self) -> None:
-        value, chat, _ = ask_with_tools(calling(1, 2), "", "3")
-        assert value == "3"
-        roles = [m.role for m in chat.requests[2].messages]
-        assert roles == ["user", "assistant", "tool", "assistant", "user"]

@@ -3,7 +3,6 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import converse
-from falsifier.llm.failures import ToolsUnsupportedError
 from tests.llm.server import Step, serving
 from tests.llm.support import PLAIN, QUESTION, add
 from tests.llm.test_client import REQUEST
@@ -52,11 +51,6 @@ class TestLadder:
             chat = LiteLLMChat("openai/mine", api_base=server.url)
             with pytest.raises(ChatError, match="in the same turn"):
                 converse(chat, QUESTION, str.strip, lambda _: None, respond=add)
-
-    def test_the_same_words_mean_nothing_where_no_tool_was_offered(self) -> None:
-        with serving(REFUSALS[0]) as server, pytest.raises(ChatError) as caught:
-            LiteLLMChat("openai/mine", api_base=server.url).complete(PLAIN)
-        assert not isinstance(caught.value, ToolsUnsupportedError)
 
 
 def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:

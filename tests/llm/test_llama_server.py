@@ -21,7 +21,6 @@ from falsifier.llm.replies import ReplyForm
 from falsifier.testing import START, lag_problem
 from tests import patience
 from tests.command import falsifier
-from tests.llm.llama_server import llama_server, needs_llama_server
 from tests.llm.support import PLAIN, QUESTION, add
 from tests.llm.tiny_model import CALL, FIRST_BYTE, write_tiny_model
 
@@ -41,16 +40,18 @@ TEXT = PLAIN.model_copy(
 
 @pytest.fixture(scope="module")
 def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    needs_llama_server()
+    pytest.importorskip("xllamacpp", reason="llama.cpp's server comes with falsifier[llama]")
     file = tmp_path_factory.mktemp("llm") / "tiny.gguf"
     write_tiny_model(file)
     return file
 
 
 @pytest.fixture(scope="module")
-def server(model: Path) -> Iterator[str]:
-    with llama_server(model, context=16_384) as url:
-        yield url
+def server(model: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield model_file.served(str(model)).address
+    model_file._end_all()
 
 
 def chat(server: str, mode: Mode = "json_schema", **options: Any) -> LiteLLMChat:
@@ -109,26 +110,14 @@ def test_a_reply_that_the_server_cannot_parse_is_one_that_cannot_be_used(server:
     assert ladder.mode == "json_object"
 
 
-def test_a_run_with_rubbish_for_answers_ends_properly(server: str, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("model")
+def test_a_prompt_beyond_the_models_context_is_never_cut(tmp_path: Path) -> None:
+    write_tiny_model(tmp_path / "short.gguf", context=256)
     done = falsifier(
-        *("run", "python:tests.problems:impossible", "--llm", "openai/tiny", "--api-base", server),
-        *("--variant", "MP1", "--budget", "2", "--out", "run", "--llm-option", "max_tokens=200"),
+        *("run", "python:tests.problems:impossible", "--llm", "short.gguf", "--budget", "2", "--out", "run"),
         cwd=tmp_path,
         env={"XDG_CACHE_HOME": "cache"},
     )
-    assert done.code == 3, done.err
-    assert "failed after 2 simulations" in done.out
-    assert "language model gave no usable answer" in done.out
-
-
-def test_a_prompt_beyond_the_servers_context_is_never_cut(model: Path, tmp_path: Path) -> None:
-    with llama_server(model, context=256) as url:
-        done = falsifier(
-            *("run", "python:tests.problems:impossible", "--llm", "openai/tiny", "--api-base", url),
-            *("--budget", "2", "--out", "run"),
-            cwd=tmp_path,
-            env={"XDG_CACHE_HOME": "cache"},
-        )
     assert done.code == 3
     for part in ("the prompt is too long", "llama.cpp: --ctx-size", "(256 tokens)"):
         assert part in done.out, part
@@ -150,6 +139,7 @@ class TestModelFile:
         )
         assert done.code == 3, done.err
         assert "failed after 2 simulations" in done.out
+        assert "language model gave no usable answer" in done.out
         recorded = (tmp_path / "run" / "manifest.json").read_text()
         assert json.loads(recorded)["request"]["llm"]["name"] == str(model)
         assert "127.0.0.1" not in recorded + (tmp_path / "run" / "journal.jsonl").read_text()

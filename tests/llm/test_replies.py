@@ -15,7 +15,6 @@ from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpac
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import ChatReply
 from falsifier.llm.replies import ReplyForm
-from falsifier.testing import START, lag_problem
 
 FREE = Freedom(max_control_points=200, min_interval=0.1)
 SPACE = SearchSpace(
@@ -60,7 +59,6 @@ def changed(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("reply", "problem"),
     [
-        ('{"answer": 42}', "no JSON object with a candidate"),
         ("<point>1, 2, 3</point>", "expected 6 numbers, got 3"),
         ("<point>1, two, 3, 4, 5, 6</point>", "'two'"),
         ("<point>0 0 0 0 0 2000</point>", r"'mass': 2000 is outside its range \[900, 1100\]"),
@@ -68,14 +66,6 @@ def changed(**changes: Any) -> dict[str, Any]:
         (
             "<point>-1 0 101 0 0 2000</point>",
             r"'throttle' at t = 0, 10 s: -1, 101 are outside .*; parameter 'mass'",
-        ),
-        (
-            changed(signals=[{"name": "throttle", "values": [1, 2]}, GOOD["signals"][1]]),
-            "expected 3 evenly spaced control points with linear interpolation, got 2",
-        ),
-        (
-            changed(signals=[{"name": "throttle", "values": [1, 2, 101]}, GOOD["signals"][1]]),
-            r"'throttle' at t = 10 s: 101 is outside",
         ),
         (
             changed(signals=[{"name": "throttle", "values": [101]}, GOOD["signals"][1]]),
@@ -182,14 +172,6 @@ def test_interpolations_are_those_that_are_possible() -> None:
         form(smooth, gear).read(json.dumps({"rationale": "", "signals": signals}))
 
 
-def test_schema_without_inputs_or_without_parameters() -> None:
-    for space, part in (
-        (SearchSpace((), SPACE.parameters, 10.0), "parameters"),
-        (SearchSpace(SPACE.inputs, (), 10.0), "signals"),
-    ):
-        assert list(ReplyForm(space).schema()["properties"]) == ["rationale", part]
-
-
 def test_several_candidates() -> None:
     other = changed(parameters=[{"name": "mass", "value": 901}])
     found = ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [GOOD, other]})).candidates
@@ -249,34 +231,9 @@ def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
     reads_or_tells(ReplyForm(SPACE), f"{text}<point>{text}</point>")
 
 
-def test_a_value_beyond_its_range_by_a_rounding_is_clamped_and_by_more_is_told_with_the_range() -> None:
-    form = ReplyForm(lag_problem(parameters=[START]).space)
-
-    def text(u: float, x0: float) -> str:
-        return json.dumps(
-            {
-                "signals": [{"name": "u", "values": [u, 0, 0, 0]}],
-                "parameters": [{"name": "x0", "value": x0}],
-            }
-        )
-
-    (near,) = form.read(text(1.001, -1.0005)).candidates
-    assert near.signals["u"].values[0] == 1.0
-    assert near.parameters["x0"] == -1.0
-    with pytest.raises(RejectedReplyError, match=r"1\.1 is outside its range \[-1, 1\]"):
-        form.read(text(1.1, 0.0)).candidates
-    with pytest.raises(RejectedReplyError, match=r"'x0': -2 is outside its range \[-1, 1\]"):
-        form.read(text(0.0, -2.0)).candidates
-    (point,) = ReplyForm(form.space, named=False).read('{"point": [1.001, 0, 0, -1.001, 1.0]}').candidates
-    assert point.signals["u"].values == (1.0, 0.0, 0.0, -1.0)
-
-
-@pytest.mark.parametrize("times", ["", ', "times": []', ', "times": [0]', ', "times": [5]'])
-@pytest.mark.parametrize("free", [False, True])
-def test_one_value_is_a_constant_with_or_without_times(times: str, free: bool) -> None:
-    form = ReplyForm(lag_problem(free=FREE if free else None).space, free=free)
-    (found,) = form.read(f'{{"signals": [{{"name": "u", "values": [0.5]{times}}}]}}').candidates
-    assert found.signals["u"].values == (0.5,) * 4
+def test_a_value_beyond_its_range_by_a_rounding_is_clamped() -> None:
+    found = read("<point>100.05 0 -0.05 0 325 1100.1</point>")
+    assert found.key == read("<point>100 0 0 0 325 1100</point>").key
 
 
 class TestPoints:
@@ -289,9 +246,6 @@ class TestPoints:
         assert read(text, named=False, points=True).parameters == {"mass": 950}
         found = ReplyForm(SPACE, points=True, count=2).read(text).candidates
         assert [c.parameters["mass"] for c in found] == [900, 950]
-
-    def test_json_is_read_too(self) -> None:
-        assert read(GOOD, points=True).key == read(GOOD).key
 
     @pytest.mark.parametrize(
         ("text", "problem"),
@@ -307,10 +261,6 @@ class TestPoints:
         with pytest.raises(RejectedReplyError) as caught:
             read(text)
         assert "point>" not in str(caught.value)
-
-    def test_a_tool_takes_the_same_numbers(self) -> None:
-        schema = ReplyForm(SPACE, named=False, points=True, reasoned=False).schema()
-        assert list(schema["properties"]) == ["point"]
 
 
 ROWS = re.findall(

@@ -1,18 +1,14 @@
 """Patience with passing failures, shared between runs."""
 
-import threading
 from types import SimpleNamespace
 
 import pytest
 
 from falsifier.errors import ChatError
-from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.replay import ScriptedChat
 from falsifier.llm.retry import Gate, retried
-from tests.llm.server import Step, serving
-from tests.llm.test_client import REQUEST
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
@@ -67,38 +63,6 @@ def test_a_rate_limit_holds_up_all_runs_of_a_gate(
     assert now == 130.0
 
 
-def test_concurrency_is_limited() -> None:
-    with serving(*(Step("ok", together=2, delay=0.05) for _ in range(6))) as server:
-        gate = Gate(concurrency=2)
-        chats = [LiteLLMChat("openai/m", api_base=server.url, gate=gate) for _ in range(6)]
-        replies: list[ChatReply] = []
-        threads = [
-            threading.Thread(target=lambda chat=chat: replies.append(chat.complete(REQUEST)))
-            for chat in chats
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-    assert len(replies) == 6
-    assert server.most_at_once == 2
-
-
-def test_server_restarts_while_asked() -> None:
-    steps = [
-        Step(status=429, headers={"Retry-After": "0.05"}),
-        Step(hang_up=True),
-        Step(status=502),
-        Step("back"),
-    ]
-    with serving(*steps) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
-        reply = chat.complete(REQUEST)
-    assert reply.text == "back"
-    assert reply.attempts == 4
-    assert len(server.received) == 4
-
-
 def test_a_slot_and_the_end_of_a_pause_are_waited_for_only_so_long() -> None:
     gate = Gate(concurrency=1, sleep=lambda _: None)
     with (
@@ -112,24 +76,6 @@ def test_a_slot_and_the_end_of_a_pause_are_waited_for_only_so_long() -> None:
     with pytest.raises(ChatError, match="pause for another 100 s"), gate.passage(10.0):
         pass
     assert gate._slots.acquire(blocking=False), "the slot is free"
-
-
-def test_any_limit_can_be_waited_for() -> None:
-    gate = Gate(concurrency=1)
-    entered, done = threading.Event(), threading.Event()
-
-    def occupy() -> None:
-        with gate.passage():
-            entered.set()
-            done.wait()
-
-    other = threading.Thread(target=occupy)
-    other.start()
-    entered.wait()
-    threading.Timer(0.05, done.set).start()
-    with gate.passage(1e300):
-        pass
-    other.join()
 
 
 def test_a_wait_beyond_the_deadline_is_not_begun() -> None:

@@ -83,8 +83,3 @@ class TestPredictionTool:
         told = made.respond(about(*(0.01 * i for i in range(30))))
         assert len(foreteller.seen) == MOST_CANDIDATES
         assert "20 more: not predicted" in told
-
-    def test_its_schema_is_strict_and_asks_for_no_rationale(self) -> None:
-        item = tool()[0].offer.parameters["properties"]["candidates"]["items"]
-        assert list(item["properties"]) == item["required"] == ["signals"]
-        assert item["additionalProperties"] is False

@@ -78,12 +78,6 @@ def test_a_length_above_the_limit_is_refused_before_it_is_read() -> None:
         within(HANG, lambda: guarded_client().get(server.root, timeout=HANG))
 
 
-def test_requests_of_others_are_left_alone() -> None:
-    with misbehaving(sends(response(b"{}"))) as server:
-        within(HANG, lambda: httpx.get(server.root))
-    assert b"identity" not in server.requests[0]
-
-
 def test_cookies_are_not_kept() -> None:
     with misbehaving(sends(response(b"{}", headers="set-cookie: a=b\r\n"))) as server:
         client = guarded_client()

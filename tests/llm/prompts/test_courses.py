@@ -10,7 +10,6 @@ from falsifier.llm.prompts.courses import (
     change_list,
     course,
     dwell_list,
-    longest_stretch,
     oscillations,
 )
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals
@@ -48,12 +47,6 @@ def test_dwell_list_names_the_shortest_stay_after_an_entry() -> None:
         "4: entered at 7 s and still held at 10 s",
     ]
     assert "1: never entered again" in dwell_list(TIMES, steps((0, 1), (2, 2)), clock=2)
-
-
-def test_longest_stretch() -> None:
-    assert longest_stretch(TIMES, GEAR == 2) == pytest.approx((1.6, 4.35))
-    assert longest_stretch(TIMES, GEAR == 7) is None
-    assert longest_stretch(TIMES, GEAR > 0) == (0, 10)
 
 
 @pytest.mark.parametrize("name", ["AT1", "AT51", "CC4", "NN", "SC", "F16", "PulseMeter"])
@@ -132,21 +125,6 @@ def test_slow_signals_and_ripple_do_not_oscillate() -> None:
     assert oscillations(TIMES, np.sin(2 * np.pi * TIMES / 5), slower_than=0.5) == []
     assert oscillations(TIMES, 100 * TIMES + 0.1 * np.sin(60 * TIMES), slower_than=0.5) == []
     assert oscillations(TIMES, TIMES + 0.15 * np.sin(4 * np.pi * TIMES), slower_than=2.0) == []
-
-
-def test_envelopes_ignore_where_samples_fall_between_peaks() -> None:
-    # Seven samples per period of a triangle: sampled peaks differ by the place of the samples alone.
-    times = np.arange(0, 100, 0.01)
-    column = 10 + 5 * np.abs((times / 0.0733) % 1.0 - 0.5) * 2
-    (swing,) = oscillations(times, column, slower_than=5.0)
-    assert len(swing.lower) == len(swing.upper) == 2
-
-
-def test_what_reads_the_same_is_told_once_and_two_values_never_have_the_same_time() -> None:
-    late = np.where(TIMES < 9.99, 0.0, 5.0)
-    assert course(TIMES, late, tolerance=0.1, slower_than=0.5).text(clock=0) == "0:0 9.98:0 9.99:5 10:5"
-    slow = course(TIMES, 0.001 * TIMES, tolerance=0.1, slower_than=0.5, kept=(0.02,))
-    assert slow.text(clock=1) == "0:0 10:0.01"
 
 
 def test_digits_follow_the_margin_and_times_show_a_hundredth_of_the_simulation() -> None:

@@ -223,13 +223,3 @@ def test_doubts_and_start_values_are_scaled() -> None:
     sent = text_of(chat.requests)
     assert "a second simulation gave robustness +0.135. " in sent
     assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
-
-
-def test_what_is_simulated_in_place_of_an_answer_is_recognised_when_it_comes_back() -> None:
-    problem = lag_problem(parameters=[START])
-    chat = ScriptedChat(["nothing"] * 3 + ['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
-    engine = LLMEngine(problem, chat, anonymous=True)
-    (changed,) = engine.ask()
-    engine.tell([evaluate(problem, changed)])
-    engine.ask()
-    assert "Proposed and not" not in chat.requests[-1].messages[1].content

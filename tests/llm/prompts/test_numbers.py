@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.llm.prompts.numbers import as_signals, bounds, runs, signal_text
+from falsifier.llm.prompts.numbers import as_signals, bounds, runs
 from falsifier.llm.prompts.published import as_point, as_values
 from falsifier.llm.prompts.view import View
 from falsifier.testing import FREE, START, lag_problem
@@ -38,13 +38,6 @@ def test_signals_are_told_with_their_own_control_points() -> None:
     )
 
 
-def test_repeated_values_of_constant_pieces_are_left_out() -> None:
-    signal = Signal((0.0, 1.0, 2.0, 5.0), (0.0, 0.0, 1.0, 1.0), "constant")
-    assert signal_text(signal, stop_time=10.0).endswith("[[0, 0], [2, 1]]")
-    line = Signal((0.0, 1.0, 2.0, 5.0), (0.0, 0.0, 1.0, 1.0), "linear")
-    assert signal_text(line, stop_time=10.0).endswith("[[0, 0], [1, 0], [2, 1], [5, 1]]")
-
-
 def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     times = [0.0, 2.5, *(2.5 + 0.25 * k for k in range(1, 30))]
     signal = Signal(tuple(times), tuple(float(k % 2) for k in range(31)), "constant")
@@ -56,16 +49,6 @@ def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     )
     assert as_signals(VIEW, STEP, in_brief=True) == as_signals(VIEW, STEP)
     assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
-
-
-def test_a_signal_of_many_pieces_is_told_roughly() -> None:
-    values = [0.0, *(0.5 + 0.001 * k for k in range(20)), -1.0]
-    signal = Signal(tuple(0.4 * k for k in range(22)), tuple(values), "constant")
-    made = Candidate({"u": signal, "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25})
-    assert as_signals(VIEW, made)[0] == (
-        "u: told within 2% of the range: constant pieces from [time, value] points "
-        "[[0, 0], [0.4, 0.5], [8.4, -1]]"
-    )
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))

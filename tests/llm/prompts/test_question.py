@@ -7,9 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.signals import Signal
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
@@ -97,14 +95,6 @@ def test_what_decided_and_everything_there() -> None:
         assert part in changing, part
 
 
-def test_connectives_inside_a_chain_are_told_too_and_links_of_it_once() -> None:
-    problem = lag_problem("G[0,9] (x <= 0.9) and G[0,9] (x <= 0.8) and G[0,9] (x >= 0.1 -> u <= 0.5)")
-    _, changing = told(problem, "MP5", sampled(problem, [0.8] * 4))
-    (chain,) = (line for line in changing.splitlines() if line.startswith("  conjuncts"))
-    assert chain.count("robustness") == 3
-    assert "condition and consequence at t = 0.7 s: x >= 0.1 robustness" in changing
-
-
 def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
     problem = transmission("AT51")[0]
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
@@ -129,14 +119,6 @@ def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
     assert "chosen because: a step up and on" in text and text.count("and on") < 50
     assert "Your lessons so far: x follows u" in text
     assert text.count("these inputs are rounded: they differ from those of sample 1") == 1
-
-
-def test_runs_are_explained_where_there_is_one() -> None:
-    values = [0.0] * 99 + [1.0]
-    long = Candidate({"u": Signal.evenly(values, stop_time=10.0, interpolation="constant")}, {"x0": 0.0})
-    with_runs = told(PROBLEM, "MP5", [evaluate(PROBLEM, PROBLEM.space.admit(long))])
-    assert '["0 x 99", 1]' in with_runs[1] and "stands for 187 zeros" in with_runs[1]
-    assert "stands for" not in "".join(told(PROBLEM, "MP5", sampled(PROBLEM, [0.5] * 5)))
 
 
 def test_several_candidates_pending_ones_and_the_budget() -> None:

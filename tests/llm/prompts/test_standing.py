@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from falsifier.context.values import Compared, Context, Excerpt
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.errors import SpecError
 from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS, View, variant_named
@@ -126,13 +126,6 @@ def test_booleans_are_told_as_such_by_published_variants_with_names(variant: str
     assert "1, from 0 to 1" in kind_of_input("MP1", kind="boolean", low=0.0, high=1.0)
 
 
-def test_many_control_points_do_not_fill_the_prompt() -> None:
-    problem = lag_problem("G[0,10] (x <= 0.9)")
-    many = InputRange("u", -1.0, 1.0, control_points=400, interpolation="constant")
-    text = standing(replace(problem, space=SearchSpace((many,), (), 10.0)))
-    assert "400 control points every 0.025 s from t = 0" in text
-
-
 def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None:
     problem = lag_problem()
     assert "; at t = 0: 0.25\n" in standing(problem, start={"x": (0.25, 0.25)})
@@ -148,11 +141,6 @@ class TestReply:
 
     def example(self, variant: str, **more: Any) -> str:
         return next(x for x in standing(self.problem, variant, **more).splitlines() if x.startswith("{"))
-
-    def test_published_variants_show_blanks(self) -> None:
-        assert '"point": [5 numbers]' in self.example("MP1")
-        assert '"signals": [{"name": "u", "values": [4 numbers]}]' in self.example("MP4")
-        assert self.example("MP4", count=2).startswith('{"candidates": [{"rationale"')
 
     def test_the_example_can_be_read(self) -> None:
         for count in (1, 3):
@@ -195,15 +183,6 @@ class TestAdvice:
         assert "in the units of their signals" in standing(load_problem("AT6a"))
         assert "in the units of their signals" not in standing(load_problem("AT1"))
 
-    def test_inputs_that_only_jump_get_advice_on_order_and_times(self) -> None:
-        problem = lag_problem(inputs=2, free=FREE)
-        u, v = problem.space.inputs
-        mode = replace(v, low=0.0, high=1.0, kind="boolean", interpolation="constant")
-        both = told(replace(problem, space=replace(problem.space, inputs=(u, mode))), "MP5")
-        assert "slow changes" in both[0] and "v can only jump" in both[0] and "limits" in both[1]
-        only = told(replace(problem, space=replace(problem.space, inputs=(mode,))), "MP5")
-        assert "slow" not in only[0] and "One value throughout" in only[1] and "limits" not in only[1]
-
 
 def test_only_mp6_tells_context() -> None:
     excerpt = Excerpt("/home/me/a.md", "a.md", "0" * 64, "whole", "THE TEXT")
@@ -219,20 +198,3 @@ def test_only_mp6_tells_context() -> None:
     ):
         assert part in texts["MP6"]
     assert standing(replace(view, context=Context()), "MP6") == texts["MP5"]
-
-
-def test_freedom_is_told_as_far_as_it_goes_and_once() -> None:
-    assert "Alternatively, choose" not in standing(lag_problem()) and '"times"' not in standing(lag_problem())
-    assert "at most 7, at least 0.5 s apart" in standing(lag_problem(free=Freedom(7, 0.5)))
-    problem = lag_problem(inputs=2, free=Freedom(7, 0.5))
-    assert standing(problem).count("control points of u and v yourself: at most 7 each") == 1
-    u, v = problem.space.inputs
-    inputs = (u, replace(v, free=Freedom(9, 0.25)))
-    text = standing(replace(problem, space=replace(problem.space, inputs=inputs)))
-    assert "of u yourself: at most 7" in text and "of v yourself: at most 9, at least 0.25 s" in text
-
-
-def test_the_formulas_outputs_are_its_signals_that_are_not_searched() -> None:
-    problem = lag_problem("G[0,10] (u + x <= 3 and v >= x)", inputs=2)
-    partly = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
-    assert View.of(partly).formula_outputs == ("x", "v")
