@@ -71,10 +71,6 @@ def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_pa
     assert second.robustness != first.robustness
 
 
-def test_rows_that_claim_nothing_are_not_simulated(tmp_path: Path) -> None:
-    assert validate(read_rows(rows(tmp_path, "S,HARD,1,[],[],no,1500,1,1,0.1,10")), find=find) == []
-
-
 def test_unknown_requirements_are_findings_not_errors(tmp_path: Path) -> None:
     (finding,) = validate(read_rows(rows(tmp_path, 'SB,SB1,2,"[0 1]",[],yes,3,1,1,-0.4,10')))
     assert not finding.holds

@@ -4,8 +4,6 @@ import pytest
 
 from falsifier.campaigns.directory import (
     campaign_lock,
-    campaign_mark,
-    is_campaign,
     is_worked_on,
     read_campaign,
     run_directories,
@@ -15,23 +13,6 @@ from falsifier.campaigns.directory import (
 from falsifier.errors import JournalError
 from falsifier.record.run import falsify
 from tests.problems import impossible
-
-
-def test_a_campaign_says_what_was_asked_for(campaign: Path, tmp_path: Path) -> None:
-    record = read_campaign(campaign)
-    assert is_campaign(campaign) and not is_campaign(tmp_path)
-    assert len(record.runs) == 8
-    assert list(record.runs) == [p.name for p in run_directories(campaign)], "in its order"
-    write_campaign(tmp_path, record)
-    assert read_campaign(tmp_path) == record
-
-
-def test_a_campaign_is_known_by_its_content(campaign: Path, tmp_path: Path) -> None:
-    assert campaign_mark(tmp_path) == ""
-    write_campaign(tmp_path, read_campaign(campaign))
-    assert campaign_mark(tmp_path) == campaign_mark(campaign) != ""
-    (tmp_path / "campaign.json").write_text("{}")
-    assert campaign_mark(tmp_path) != campaign_mark(campaign)
 
 
 def test_only_runs_that_have_begun_are_listed(campaign: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from falsifier.campaigns import (
     resume_campaign,
     run_campaign,
 )
-from falsifier.campaigns.directory import campaign_lock, run_directory
+from falsifier.campaigns.directory import campaign_lock
 from falsifier.counterexamples.store import load, problem_of, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
@@ -129,26 +129,6 @@ def test_a_changed_model_is_refused(tmp_path: Path) -> None:
 def test_requirements_of_the_same_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="both named 'EASY'"):
         run_campaign(request("easy", "easy_again"), tmp_path / "c")
-
-
-def test_best_trajectories_only_are_kept(tmp_path: Path) -> None:
-    wanted = request("impossible", seeds=1, budget=30)
-    run_campaign(wanted, tmp_path)
-    (name,) = wanted.named()
-    kept = list((run_directory(tmp_path, name) / "trajectories").iterdir())
-    assert len(kept) == 1
-
-
-def test_a_torn_last_line_is_dropped(tmp_path: Path) -> None:
-    wanted = request("impossible", seeds=1, budget=12)
-    run_campaign(wanted, tmp_path / "whole")
-    run_campaign(wanted, tmp_path / "torn")
-    (journal,) = (tmp_path / "torn").rglob("journal.jsonl")
-    content = journal.read_bytes()
-    journal.write_bytes(content[: len(content) * 2 // 3])
-    assert Follower(tmp_path / "torn").look().counts["running"] == 1
-    resume_campaign(tmp_path / "torn")
-    assert outcomes(tmp_path / "torn") == outcomes(tmp_path / "whole")
 
 
 def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.campaigns.analysis import group, load, statistics
+from falsifier.campaigns.analysis import load, statistics
 from falsifier.campaigns.statistics import bootstrap, wilson
 
 
@@ -54,13 +54,3 @@ def test_from_five_runs_on_there_are_intervals(campaign: Path) -> None:
     assert found.rate_interval == wilson(5, 5)
     assert found.mean_interval is not None
     assert statistics(runs[:4]).mean_interval is None
-
-
-def test_methods_are_never_counted_together(campaign: Path) -> None:
-    groups = group(load(campaign))
-    assert [(r, m.engine, len(runs)) for (r, m), runs in groups.items()] == [
-        ("HARD", "uniform", 2),
-        ("HARD", "corners", 2),
-        ("NEVER", "uniform", 2),
-        ("NEVER", "corners", 2),
-    ]

@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, llms_table, load, main_table
-from falsifier.campaigns.tables import Table, statistics_json
+from falsifier.campaigns.tables import statistics_json
 
 PUBLISHED = Published(
     {
@@ -64,13 +64,6 @@ def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
     assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
 
 
-def test_published_columns_are_shown_only_if_there_is_something_to_compare(runs: list[Run]) -> None:
-    free = [replace(run, method=replace(run.method, parameterization="free")) for run in runs]
-    table = main_table(free, PUBLISHED)
-    assert table.header[-1] == "cost $" and "Rank" not in table.text()
-    assert "rank" in main_table([*free, *runs], PUBLISHED).header
-
-
 def asked(run: Run, variant: str) -> Run:
     return replace(run, method=Method(llm="openai/gpt-5-nano", effort="low", variant=variant))
 
@@ -93,17 +86,6 @@ def test_formats_carry_the_same_cells(runs: list[Run]) -> None:
     table = main_table(runs, PUBLISHED)
     assert table.csv().splitlines()[0] == ",".join(table.header)
     assert "| HARD | uniform | 2/2 |" in table.markdown()
-    assert len({len(line.split("|")) for line in table.markdown().splitlines() if line.startswith("|")}) == 1
     assert table.text().splitlines()[4].split()[:3] == ["HARD", "uniform", "2/2"]
-    data = json.loads(statistics_json(runs))
-    assert [(row["requirement"], row["label"], row["falsified"]) for row in data][:2] == [
-        ("HARD", "uniform", 2),
-        ("HARD", "corners", 2),
-    ]
-
-
-def test_a_table_can_be_narrowed_to_some_columns() -> None:
-    table = Table("t", ("a", "b", "c"), (("1", "2", "3"),), ("note",))
-    assert table.only("c", "a") == Table("t", ("c", "a"), (("3", "1"),), ("note",))
-    with pytest.raises(ValueError, match="not in tuple"):
-        table.only("d")
+    first = json.loads(statistics_json(runs))[0]
+    assert (first["requirement"], first["label"], first["falsified"]) == ("HARD", "uniform", 2)
