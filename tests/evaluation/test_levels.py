@@ -15,7 +15,6 @@ from falsifier.engines.briefing import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.usage import count_tokens
-from falsifier.problem.loading import load_problem
 from falsifier.stl import Monitor, parse
 from falsifier.testing import lag_problem
 from falsifier.views.analyses_text import coverage_json, coverage_text
@@ -119,11 +118,3 @@ def test_a_prompt_tells_what_is_missing_and_nothing_of_it_under_neutral_names() 
     assert "counts up" not in anonymous[1].content
     published = preview(commands_problem(), variant="MP4", evaluations=evaluations)
     assert "Few values" not in published[1].content
-
-
-def test_the_phase_that_a_charger_never_reached(tmp_path: Path) -> None:
-    falsify(load_problem("ChargerHandshake"), "uniform", budget=20, seed=1, directory=tmp_path)
-    text = coverage_text(coverage(tmp_path), "R")
-    assert "closed > 0.5, which held in none of 20 simulations" in text
-    assert "phase counts up: it reached Precharging in " in text
-    assert "the step from Precharging to Ready was never made" in text
