@@ -51,8 +51,8 @@ def own(problem: Problem, engine: str, *, seed: int, budget: int) -> Run:
 
 
 def peer(problem: Problem, optimizer: str, python: Path, *, seed: int, budget: int) -> Run:
-    """Search with one of psy-taliro's optimizers."""
-    found = peer_search(problem, optimizer, python, seed=seed, budget=budget)
+    """Search with one of psy-taliro's optimizers, whose seeds begin with 1."""
+    found = peer_search(problem, optimizer, python, seed=seed + 1, budget=budget)
     return Run(found.simulations, found.falsified, (found.seconds - found.simulating) / found.simulations)
 
 
@@ -126,7 +126,7 @@ def main() -> None:
     """Print one of the two tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("folder", type=Path, help="folder with spec files")
-    parser.add_argument("--engines", nargs="+", choices=sorted(set(ENGINES) - {"hybrid"}), default=COMPARED)
+    parser.add_argument("--engines", nargs="*", choices=sorted(set(ENGINES) - {"hybrid"}), default=COMPARED)
     parser.add_argument("--systems", nargs="+", default=(), metavar="NAME", help="default: all of the folder")
     parser.add_argument("--seeds", type=seeds_from, default=range(10), help="for example 0-9")
     parser.add_argument("--budget", type=int, default=300)
