@@ -1,17 +1,26 @@
-"""Optimisation on predicted trajectories: evolution, then steps towards bounds along the gradient."""
+"""Optimisation on predicted trajectories: evolution, then steps towards bounds along the gradient.
 
-from collections.abc import Callable
+Where the robustness shows no way down, an output is driven further than any simulation has. A limiter, a mode
+or a counter often depends on a signal that the requirement does not name: as long as the signal stays within
+its usual range, the robustness stays the same.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.box import Array
 from falsifier.engines.layout import Layout
+from falsifier.engines.surrogate.history import Sample
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points
 
 # Two points that differ by less than this in every coordinate count as the same simulation.
 _SAME_POINT = 1e-3
+# Number of plans that drive an output one way without anything new happening, after which it is left alone.
+_MOST_TRIES = 3
 # Number of blocks of coordinates by which a gradient is taken; more take longer.
 _DIRECTIONS = 60
 
@@ -105,3 +114,70 @@ def _towards_bounds(predict: Callable[[Array], Array], base: Array, blocks: NDAr
 def is_seen(point: Array, seen: Array) -> bool:
     """Whether a point, shape (d,), is the same simulation as one of others, shape (s, d)."""
     return bool(len(seen)) and bool((np.abs(seen - point).max(axis=1) < _SAME_POINT).any())
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """An output and the direction in which it is driven.
+
+    Attributes:
+        output: name of the output.
+        column: its column in the states of traces.
+        sign: 1: up, -1: down.
+    """
+
+    output: str
+    column: int
+    sign: int
+
+    def heights(self, states: Array) -> Array:
+        """Return how far the output went at each time, shape (..., cells + 1), in states with columns."""
+        return np.asarray(self.sign * states[..., self.column])
+
+    def __str__(self) -> str:
+        """Return what a plan does, in words."""
+        return f"drives {self.output} further {'up' if self.sign > 0 else 'down'}"
+
+
+@dataclass(slots=True)
+class Pushes:
+    """Which outputs were driven which way, and how often since that last brought something new."""
+
+    _tries: dict[Push, int] = field(default_factory=dict)
+
+    def know(self, outputs: Sequence[str], continuous: Sequence[str]) -> None:
+        """Add the outputs, of all that are predicted, that are continuous."""
+        for name in continuous:
+            for sign in (1, -1):
+                self._tries.setdefault(Push(name, outputs.index(name), sign), 0)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing is left that is worth trying."""
+        return min(self._tries.values(), default=_MOST_TRIES) >= _MOST_TRIES
+
+    def next(self, rng: np.random.Generator) -> Push:
+        """Return the one that was tried the least, and count it."""
+        push = min(self._tries, key=lambda p: (self._tries[p], rng.random()))
+        self._tries[push] += 1
+        return push
+
+    def succeeded(self, push: Push) -> None:
+        """Note that it made a discrete signal do something new: it is worth more tries."""
+        self._tries[push] = 0
+
+
+def by_height(push: Push, samples: Sequence[Sample], cells: int) -> tuple[list[int], Array]:
+    """Return the indices of the samples, that in which the output went furthest first, and when each did so.
+
+    Args:
+        push: the output and the direction.
+        samples: at least one sample.
+        cells: number of cells of the horizon.
+
+    Returns:
+        The order of the samples, and the times as shares of the horizon, shape (samples,).
+    """
+    heights = np.array([push.heights(s.trace.states[: cells + 1]) for s in samples])
+    order = np.argsort(-heights.max(axis=1), kind="stable")
+    return order.tolist(), np.argmax(heights, axis=1) / cells

@@ -17,10 +17,9 @@ from falsifier.engines.surrogate.dynamics import Forecast, Forecaster
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.history import History, Sample
 from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
-from falsifier.engines.surrogate.planning import is_seen, plan
+from falsifier.engines.surrogate.planning import Push, Pushes, by_height, is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
-from falsifier.engines.surrogate.pushing import Push, Pushes, by_height
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
