@@ -10,13 +10,7 @@ HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
 def test_a_system_without_violations_gets_a_bound(tmp_path: Path) -> None:
     done = falsifier("assess", NEVER, "--budget", "60", "--out", "o", cwd=tmp_path)
     assert done.code == 0, done.err
-    for part in (
-        "NEVER: ",
-        "0 of 60 random simulations",
-        "at most 0.0487",
-        "4 control points",
-        "o/assurance.json",
-    ):
+    for part in ("NEVER: ", "0 of 60 random simulations", "at most 0.0487", "o/assurance.json"):
         assert part in done.out
     recorded = json.loads((tmp_path / "o" / "assurance.json").read_text())
     assert (recorded["drawn"], recorded["violations"]) == (60, 0)

@@ -116,17 +116,6 @@ def test_suites_and_instances(command: Any, requested: list[Any]) -> None:
     assert first.suite == "arch-comp"
 
 
-def test_run_and_bench_state_the_same_defaults(command: Any) -> None:
-    for name, budget, parameterization in (
-        ("run", "[default: 100;", "[default: free]"),
-        ("bench", "[default: (100; with --suite 1500);", "[default: (free; with --suite fixed)]"),
-    ):
-        text = " ".join(command(name, "--help").stdout.split())
-        assert budget in text and parameterization in text
-        assert "Default: surrogate, or the language model" in text
-        assert "\b" not in text and "\\b" not in text
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -33,10 +33,7 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
         (["--seed", "-1"], "-1 is not in the range x>=0"),
         (["--jobs", "0"], "0 is not in the range x>=1"),
         (["--max-cost", "1"], "--max-cost: applies to language models only; add --llm NAME"),
-        (
-            ["--max-tokens", "10", "--max-cost", "1"],
-            "--max-tokens, --max-cost: applies to language models",
-        ),
+        (["--max-tokens", "10", "--max-cost", "1"], "--max-tokens, --max-cost: applies to language models"),
         (["--anonymous"], "--anonymous: applies to language models only"),
         (["--llm", "nobody/x", "--llm-option", "timeout=nan"], "timeout=nan: expected a number of seconds"),
         (["--llm", "nobody/x", "--llm-option", "price=2"], "price=2: expected SENT:RECEIVED, finite numbers"),

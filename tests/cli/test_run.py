@@ -1,5 +1,4 @@
 import json
-import os
 import re
 import signal
 import subprocess
@@ -40,82 +39,15 @@ def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
     assert json.loads((run / "counterexample.json").read_text())["robustness"] == found["robustness"]
 
 
-def test_the_text_names_what_was_found_and_where_it_is(tmp_path: Path) -> None:
-    done = falsifier("run", "AT1", "--engine", "corners", "--quiet", "--out", "run", cwd=tmp_path)
-    assert done.err == ""
-    for part in (
-        "AT1: falsified after",
-        "-0.213",
-        "critical time  20 s",
-        "speed = 120.2",
-        "constant 100",
-        "run",
-    ):
-        assert part in done.out
-
-
-_ONE_AFTER_THE_OTHER = """
-import json, sys
-from contextlib import redirect_stderr
-from io import StringIO
-from falsifier.cli import main
-ended = []
-for arguments in json.loads(sys.argv[1]):
-    sys.argv, said = ["falsifier", *arguments], StringIO()
-    try:
-        with redirect_stderr(said):
-            main()
-    except SystemExit as ending:
-        ended.append((ending.code, said.getvalue()))
-print(json.dumps(ended))
-"""
-
-
-def test_wrong_names_are_told_without_loading_what_takes_seconds(tmp_path: Path) -> None:
-    """A stand-in for litellm that cannot be imported is not asked for until everything else is right."""
-    (tmp_path / "litellm.py").write_text("raise ImportError('this is imported')")
-    run = ("run", "AT1", "--llm")
-    wrong = [(*run, "nobody/x", *more) for more in (("--variant", "MP9"), ("--fallback", "corner"))]
-    mixed, no_key = (*run, "nobody/x", "--engine", "uniform"), (*run, "openai/x", "--max-cost", "1")
-    done = subprocess.run(
-        [sys.executable, "-c", _ONE_AFTER_THE_OTHER, json.dumps([*wrong, mixed, no_key, (*run, "nobody/x")])],
-        cwd=tmp_path,
-        env={k: v for k, v in os.environ.items() if not k.endswith("_API_KEY")}
-        | {"PYTHONPATH": f"{tmp_path}{os.pathsep}{ROOT}"},
-        capture_output=True,
-        text=True,
-        timeout=HANG,
-        check=True,
-    )
-    *early, last = json.loads(done.stdout)
-    assert [(code, "imported" in text) for code, text in early] == [(2, False)] * 4
-    assert "OPENAI_API_KEY" in early[-1][1]
-    assert (last[0], "imported" in last[1]) == (3, True), last
-
-
-def test_an_input_by_its_name_alone_takes_the_range_that_is_known(tmp_path: Path) -> None:
-    fmu, stl = str(bundled("fmus") / "AT.fmu"), "G[0,20] (speed <= 200)"
-    common = ("--engine", "corners", "--budget", "1", "--quiet", "--json")
-    done = falsifier("run", fmu, "--stl", stl, "--search", "throttle", *common, cwd=tmp_path)
-    assert done.json["best"]["signals"].keys() == {"throttle"}
-    assert done.json["best"]["signals"]["throttle"]["values"] == [100.0] * 5
-    manifest = json.loads((Path(tmp_path) / done.json["directory"] / "manifest.json").read_text())
-    assert [(i["name"], i["low"], i["high"]) for i in manifest["inputs"]] == [("throttle", 0.0, 100.0)]
-
-
 SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            (*SPEED, "--set", "throttle=50", "--set", "brake=0"),
-            "nothing is left to search: --set keeps throttle and brake",
-        ),
+        ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "nothing is left to search: --set keeps"),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
         ((*SPEED, "--search", "throttle=0-100"), "for example --search throttle=0:100"),
-        ((*SPEED, "--search", "throttle=-5.5..7"), "expected NAME=LOW:HIGH, with a colon"),
         ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=0:100"),
         ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
