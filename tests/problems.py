@@ -52,6 +52,11 @@ def mostly_broken(
     return {"x": x}
 
 
+def straight(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give the parameter ``bias`` itself: what can be reached, and how probably, is known."""
+    return {"x": np.full(times.shape, parameters["bias"])}
+
+
 def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Fail always."""
     raise RuntimeError("out of order")

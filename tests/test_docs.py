@@ -24,7 +24,6 @@ from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS
 from falsifier.problem.spec import Spec, parse_spec
 from falsifier.problem.templates import TEMPLATES
-from falsifier.record.manifest import Manifest
 from tests.command import ROOT, forked
 
 WRITTEN = [
@@ -236,11 +235,6 @@ def test_the_layout_note_names_every_room_in_order() -> None:
     for room in ("core", "problem", "search"):
         (line,) = re.findall(rf"^  {room}/ +(.+)$", note, re.MULTILINE)
         assert set(line.split()) == {p.stem for p in (ROOT / "falsifier" / room).glob("[a-z]*.py")}
-
-
-def test_the_page_on_run_directories_has_every_key_of_the_manifest() -> None:
-    page = (ROOT / "docs" / "run-directory.md").read_text(encoding="utf-8")
-    assert [key for key in Manifest.model_fields if f"`{key}`" not in page] == []
 
 
 def table_rows(text: str) -> dict[str, list[str]]:

@@ -41,21 +41,8 @@ def test_known_names_are_listed_with_the_nearest_first() -> None:
         ("Input should be 1 or 2", 3, "expected 1 or 2, got 3"),
         ("Field required", None, "Field required"),
         ("Input should be greater than 0", -5.0, "expected a number greater than 0, got -5.0"),
-        (
-            "Input should be greater than or equal to 1",
-            0,
-            "expected a number greater than or equal to 1, got 0",
-        ),
-        (
-            "Input should be a valid number, unable to parse string as a number",
-            "x",
-            "expected a number, got 'x'",
-        ),
-        (
-            "Input should be a valid integer, got a number with a fractional part",
-            2.5,
-            "expected a whole number, got 2.5",
-        ),
+        ("Input should be a valid number, unable to parse string", "x", "expected a number, got 'x'"),
+        ("Input should be a valid integer, got a number with", 2.5, "expected a whole number, got 2.5"),
     ],
 )
 def test_a_rejected_value_is_shown_where_only_the_expected_one_is_told(

@@ -13,16 +13,11 @@ from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
 from falsifier.testing import BIAS, FREE, START, Array, lag_problem
-from tests.problems import mostly_broken, never
-
-
-def direct(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Give the parameter itself, so that the probability of a violation is that of a uniform number."""
-    return {"x": np.full(times.shape, parameters["bias"])}
+from tests.problems import mostly_broken, never, straight
 
 
 def system(limit: float):  # type: ignore[no-untyped-def]
-    return lag_problem(f"G[0,10] (x <= {limit})", inputs=0, parameters=[BIAS], response=direct)
+    return lag_problem(f"G[0,10] (x <= {limit})", inputs=0, parameters=[BIAS], response=straight)
 
 
 def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
@@ -52,7 +47,7 @@ def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
 
 def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
     problem = lag_problem(
-        "G[0,10] (x >= 5 -> x <= 0)", inputs=0, parameters=[BIAS], response=direct, name="VACUOUS"
+        "G[0,10] (x >= 5 -> x <= 0)", inputs=0, parameters=[BIAS], response=straight, name="VACUOUS"
     )
     found = assess(problem, budget=30, seed=1)
     run = falsify(problem, "uniform", budget=30, seed=1)

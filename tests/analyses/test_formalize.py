@@ -12,6 +12,7 @@ from falsifier.analyses.formalize import Formalized, formalize
 from falsifier.analyses.lint import ranges_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError, SpecError
+from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.writing import subject_of
 from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, parse
@@ -185,17 +186,8 @@ def test_a_wrong_reading_goes_back_with_the_reason(server: Server, target: str, 
     assert found.spent.calls == 2
 
 
-@pytest.mark.parametrize("unit", ["MPH", "mi/h", "miles per hour"])
-def test_a_unit_is_known_however_it_is_written(server: Server, target: str, unit: str) -> None:
-    good = {"formula": GOOD, "meaning": "", "satisfied": LOW, "violated": HIGH}
-    found = ask(server, target, replying(good | {"units": [{"signal": "speed", "unit": unit}]}))
-    assert found.rejected == () and [str(r.formula) for r in found.readings] == [GOOD]
-
-
-@pytest.mark.parametrize(
-    "formula", ["G[0,20] (gear == 3 -> rpm <= 4000)", "G[0,20] (gear != 3)", "F (gear == 3)"]
-)
-def test_whole_numbers_may_be_equal(server: Server, target: str, formula: str) -> None:
+def test_whole_numbers_may_be_equal(server: Server, target: str) -> None:
+    formula = "G[0,20] (gear == 3 -> rpm <= 4000)"
     reading = answer(target, formula, units=[{"signal": "rpm", "unit": "U/min"}])
     found = ask(server, target, replying(reading), sentence="Im dritten Gang höchstens 4000 U/min.")
     assert found.rejected == ()
@@ -253,8 +245,6 @@ def test_an_empty_sentence_is_not_sent(server: Server, target: str) -> None:
 
 
 def test_readings_are_judged_on_a_nominal_simulation(target: str) -> None:
-    from falsifier.llm.replay import ScriptedChat
-
     good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
     found = formalize(target, "It is slow.", ScriptedChat([json.dumps({"readings": [good]})]))
     nominal = found.readings[0].nominal

@@ -1,22 +1,14 @@
-from collections.abc import Mapping
-
-import numpy as np
 import pytest
 
 from falsifier.analyses.margin import margin
 from falsifier.errors import SimulationError, SpecError
 from falsifier.problem.problem import Problem
-from falsifier.testing import BIAS, Array, lag_problem
-from tests.problems import never
-
-
-def direct(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Give the parameter itself, between -1 and 1: the threshold that can be reached is known."""
-    return {"x": np.full(times.shape, parameters["bias"])}
+from falsifier.testing import BIAS, lag_problem
+from tests.problems import never, straight
 
 
 def system() -> Problem:
-    return lag_problem(inputs=0, parameters=[BIAS], response=direct)
+    return lag_problem(inputs=0, parameters=[BIAS], response=straight)
 
 
 @pytest.mark.parametrize(

@@ -191,11 +191,3 @@ def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
     assert "--refine</code>" in text
     assert "falsified after" in text
     assert falsifier("explain", "run", cwd=tmp_path).code == 0
-
-
-def test_known_inputs_of_a_refined_search_keep_what_its_finer_levels_can_express(tmp_path: Path) -> None:
-    (tmp_path / "u.csv").write_text("time,u\n0,-1\n4,-1\n4,1\n10,1\n")
-    known = ("--engine", "uniform", "--budget", "3", "--inputs", "u.csv", "--refine", "--json")
-    done = falsifier("run", "python:tests.problems:fast_only", *known, cwd=tmp_path)
-    assert done.code == 1, done.err
-    assert done.json["spent"]["simulations"] == 1

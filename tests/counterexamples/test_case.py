@@ -76,13 +76,6 @@ def test_a_csv_file_is_fitted_and_says_where_it_is_from(tmp_path: Path) -> None:
         known_inputs(file, lag_problem(points=3))
 
 
-def test_of_a_run_the_nearest_miss_is_taken(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    result = falsify(problem, "uniform", budget=5, directory=tmp_path / "run")
-    assert result.best is not None
-    assert known_inputs(tmp_path / "run", problem).candidate.key == result.best.candidate.key
-
-
 def test_a_counterexample_file_is_taken_as_it_is(tmp_path: Path) -> None:
     problem = lag_problem(points=1)
     violation = simulate(problem, {"u": Signal((0.0,), (1.0,), "linear")})

@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from falsifier.cli import cli
+from falsifier.record.manifest import Manifest
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "run-directory.md"
 
@@ -42,14 +43,9 @@ def test_the_schema_refuses_what_is_no_record() -> None:
 def test_the_page_names_every_file_and_every_kind_of_record(campaign: Path) -> None:
     page = PAGE.read_text(encoding="utf-8")
     kinds = schema("journal")["discriminator"]["mapping"]  # type: ignore[index]
-    for name in [
-        *kinds,
-        *(p.name for p in campaign.iterdir()),
-        "manifest.json",
-        "journal.jsonl",
-        "trajectories/",
-    ]:
+    files = ("manifest.json", "journal.jsonl", "trajectories/", *(p.name for p in campaign.iterdir()))
+    for name in (*kinds, *files):
         assert f"`{name}" in page, name
     fields = [f for d in schema("journal")["$defs"].values() for f in d.get("properties", {})]  # type: ignore[attr-defined]
-    for field in fields:
+    for field in (*fields, *Manifest.model_fields):
         assert f"`{field}`" in page, field

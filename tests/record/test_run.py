@@ -1,6 +1,7 @@
 """The one way to search, as users call it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,15 +74,7 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
 
 @pytest.mark.parametrize(
     ("name", "given"),
-    [
-        ("seed", -1),
-        ("seed", 0.5),
-        ("jobs", 0),
-        ("jobs", True),
-        ("budget", 2.5),
-        ("budget", "10"),
-        ("budget", True),
-    ],
+    [("seed", -1), ("seed", 0.5), ("jobs", 0), ("budget", 2.5), ("budget", "10"), ("budget", True)],
 )
 def test_numbers_that_cannot_be_used_are_named(name: str, given: object) -> None:
     with pytest.raises(SpecError, match=f"{name}: expected a whole number, at least"):
@@ -193,8 +186,6 @@ class TestResume:
 
 
 def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     problem = load_problem("AT1")
     changed = replace(problem, experiment=replace(problem.experiment, step_size=0.005))
     falsify(changed, "corners", budget=1, directory=tmp_path)

@@ -1,6 +1,5 @@
 """Who leads a search, from the names that a user gives."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,12 +23,6 @@ CHAT = ScriptedChat([], llm="script")
 def request(engine: str | None = None, llm: str | None = None, **settings: object) -> RunRequest:
     named = LLMSettings(name=llm, **settings) if llm else None
     return RunRequest(problems=(), engine=engine, llm=named, seed=3)
-
-
-@pytest.fixture(autouse=True)
-def no_keys(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
-    yield
 
 
 def test_without_names_the_default_engine_leads() -> None:

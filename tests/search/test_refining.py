@@ -74,13 +74,6 @@ def test_a_resumed_run_goes_on_at_the_level_on_which_it_stopped(stopped: int, tm
     assert again.levels == whole.levels
 
 
-def test_a_problem_made_in_python_is_given_as_it_was_to_resume(tmp_path: Path) -> None:
-    listeners = stop_after(13)
-    falsify(fast_only(), "cma", budget=BUDGET, refine=True, directory=tmp_path, listeners=listeners)
-    (again,) = resume(tmp_path, problems=[fast_only()])
-    assert again.falsified
-
-
 def test_a_larger_budget_for_the_rest_does_not_move_the_levels(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x <= 2)", points=3)
     result = falsify(problem, "uniform", budget=6, refine=True, directory=tmp_path)

@@ -16,7 +16,7 @@ from falsifier.search.findings import Finding
 from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
-from falsifier.views.text import counterexample_name, result_json, result_text, results_text
+from falsifier.views.text import result_json, result_text, results_text
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 
 
@@ -119,18 +119,6 @@ def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:
     assert "and a part of it was not tested, robustness" in lines[0]
     whole = "(12.3 s; simulator 10.00 s, engine 2.00 s)"
     assert lines[-1].endswith(whole), "the time of the whole run"
-
-
-def test_a_shared_directory_has_a_counterexample_for_each_requirement(tmp_path: Path, found: Result) -> None:
-    shared = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path / "shared")
-    alone = falsify(easy(), "corners", budget=5, directory=tmp_path / "alone")
-    names = [counterexample_name(r) for r in (*shared, alone, found)]
-    assert names == [
-        "counterexample-NEVER.json",
-        "counterexample-HARD.json",
-        "counterexample.json",
-        "counterexample.json",
-    ]
 
 
 def test_json_has_the_same_and_plain_values_only(found: Result) -> None:

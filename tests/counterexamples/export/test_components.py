@@ -109,8 +109,7 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
 
 
 def again(model: System, tmp_path: Path, resources: dict[str, Path] | None = None) -> System:
-    found = read_package(write_package(model, 3.0, resources or {}, tmp_path / "again.ssp"))
-    return found
+    return read_package(write_package(model, 3.0, resources or {}, tmp_path / "again.ssp"))
 
 
 def test_trajectories_conversions_and_the_stop_time_stay(tmp_path: Path) -> None:

@@ -12,15 +12,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.testing import START, lag_problem
-from falsifier.views.plotting import (
-    plot,
-    plot_evaluation,
-    plot_requirement,
-    plot_trajectory,
-    png,
-)
-from falsifier.views.plotting.panels import Panel
-from falsifier.views.plotting.simulation import plot_panel
+from falsifier.views.plotting import plot, plot_evaluation, plot_requirement, plot_trajectory, png
 from tests.fmu.small_systems import LOOP, system
 from tests.pictures import CRITICAL
 from tests.problems import conditional, hard, unusable
@@ -88,21 +80,6 @@ def test_what_broke_is_marked_and_what_decided_is_only_a_ring() -> None:
     assert ax.get_ylabel() == "x [m]"
 
 
-def test_the_title_has_all_parameters_on_as_many_lines_as_they_need() -> None:
-    problem = lag_problem()
-    values = {f"parameter{k}": k / 7 for k in range(8)}
-    candidate = replace(problem.space.decode([1.0] * 4), parameters=values)
-    figure = plot_evaluation(
-        problem, replace(evaluate(problem, problem.space.decode([1.0] * 4)), candidate=candidate)
-    )
-    title = figure.get_suptitle()
-    assert max(map(len, title.splitlines())) <= 110
-    assert all(f"{name} = {value:.6g}" in " ".join(title.split()) for name, value in values.items())
-    figure.draw_without_rendering()
-    (box,) = (text.get_window_extent() for text in figure.texts if text.get_text() == title)
-    assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
-
-
 def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
     problem = lag_problem()
     figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([0.0] * 4)))
@@ -122,20 +99,6 @@ def test_a_margin_that_the_scale_hides_is_enlarged() -> None:
     seen = lag_problem("G[0,10] (x <= 0.5)")
     figure = plot_evaluation(seen, evaluate(seen, seen.space.decode([1.0] * 4)))
     assert not figure.axes[0].child_axes
-
-
-def test_whole_numbers_have_whole_ticks_and_the_names_of_their_items() -> None:
-    labels = {"state": {1: "Idle", 2: "Limp"}, "count": {}}
-    times = np.linspace(0.0, 10.0, 101)
-    for name, expected in (("state", ["Idle", "Limp"]), ("count", ["1", "2"])):
-        panel = Panel(name, times, np.where(times > 5, 2.0, 1.0), labels=labels[name])
-        figure = Figure()
-        ax = figure.subplots()
-        plot_panel(ax, panel)
-        figure.draw_without_rendering()
-        low, high = ax.get_ylim()
-        shown = [t for t in ax.yaxis.get_major_ticks() if low <= t.get_loc() <= high]
-        assert [tick.label1.get_text() for tick in shown] == expected
 
 
 def test_signals_that_are_not_real_are_drawn_in_steps_with_their_names() -> None:

@@ -1,18 +1,13 @@
 """The page in a real browser: pictures are drawn, scripts do not run, nothing is asked of the network."""
 
-import re
 from base64 import b64encode
-from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from falsifier.campaigns.analysis import Table
 from falsifier.views.report import html_report
-from falsifier.views.report.content import gather
-from falsifier.views.report.page import page as page_of
 from tests.views.chromium import attribute, chromium, needs_chromium
 
 pytestmark = needs_chromium
@@ -33,7 +28,6 @@ document.documentElement.setAttribute('data-probe', JSON.stringify({
   ink: style('body').color, page: style('body').backgroundColor,
   edges: visible('.card').map(e => getComputedStyle(e).borderLeftColor),
   resources: performance.getEntriesByType('resource').filter(e => !e.name.startsWith('data:')).length,
-  wide: visible('.scroll').filter(e => e.scrollWidth > e.clientWidth).map(e => e.ariaLabel),
 }));
 });
 """
@@ -69,24 +63,6 @@ def test_everything_is_drawn_and_reached_by_keyboard(page: Path, tmp_path: Path,
     assert seen["edges"] == ["rgb(179, 38, 30)", "rgb(47, 125, 79)"], "violated is red, the other green"
 
 
-def test_a_table_with_published_columns_fits_on_a_screen(campaign: Path, tmp_path: Path) -> None:
-    """On a narrow one it scrolls within its own box, and the page does not."""
-    content = gather(campaign)
-    (side,) = content.sides
-    assert side.table is not None
-    header = (*side.table.header, "rank", "best ARCH-COMP tool", "LLM-Falsifier", "uniform random")
-    method = "openai/gpt-5-mini-2025-08-07 MP4, high, free, anonymous"
-    cells = ("12 (tie)", "FReaK 10 / 4.8", "10 / 1000.0", "10 / 1000.0")
-    rows = tuple((row[0], method, *row[2:], *cells) for row in side.table.rows)
-    file = tmp_path / "wide.html"
-    wider = replace(side, table=Table("Falsification", header, rows), sections=[])
-    file.write_text(page_of(replace(content, sides=[wider])), encoding="utf-8")
-    wide = probe(file, tmp_path, "--window-size=1300,5000")
-    assert (wide["sideways"], wide["wide"]) == (0, [])
-    narrow = probe(file, tmp_path, "--window-size=700,5000")
-    assert (narrow["sideways"], narrow["wide"]) == (0, ["Falsification"])
-
-
 def test_a_foreign_script_does_not_run(page: Path, tmp_path: Path) -> None:
     attacked = tmp_path / "attacked.html"
     attack = "<script>document.documentElement.setAttribute('data-evil', '1')</script>"
@@ -101,19 +77,3 @@ def test_a_foreign_script_does_not_run(page: Path, tmp_path: Path) -> None:
 def test_dark_mode_turns_the_colours_round(page: Path, tmp_path: Path) -> None:
     seen = probe(page, tmp_path, "--blink-settings=preferredColorScheme=0", "--window-size=1200,5000")
     assert (seen["ink"], seen["page"]) == ("rgb(230, 233, 237)", "rgb(20, 24, 29)")
-
-
-def test_it_prints_with_what_is_folded(page: Path, tmp_path: Path) -> None:
-    closed = tmp_path / "closed.html"
-    text = page.read_text(encoding="utf-8")
-    rule = "details:not([open])::details-content { content-visibility: visible; }"
-    assert rule in text
-    closed.write_text(text.replace(rule, ""), encoding="utf-8")
-    assert pages(page, tmp_path) > pages(closed, tmp_path) >= 2
-
-
-def pages(page: Path, folder: Path) -> int:
-    """Number of pages that a document is printed on."""
-    pdf = folder / f"{page.stem}.pdf"
-    chromium(f"--print-to-pdf={pdf}", page.as_uri(), profile=folder / "profile")
-    return len(re.findall(rb"/Type ?/Page\b", pdf.read_bytes()))

@@ -103,13 +103,6 @@ def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(cam
     assert "Robustness" not in text.partition("required")[0]
 
 
-def test_several_directories_are_compared(campaign: Path, tmp_path: Path) -> None:
-    falsify(hard(), "corners", budget=3, directory=tmp_path / "again")
-    text = markdown_report(campaign, tmp_path / "again")
-    assert "## HARD in nightly: violated" in text and "## HARD in again: violated" in text
-    assert "## NEVER in again: not searched" in text
-
-
 def test_junit_has_a_case_for_each_run(campaign: Path) -> None:
     root = ElementTree.fromstring(junit_report(campaign))
     suites = {suite.get("name"): suite for suite in root}

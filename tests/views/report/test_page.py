@@ -135,10 +135,8 @@ def test_links_lead_somewhere_and_ids_are_unique(page: Element) -> None:
 def test_each_requirement_has_a_card_with_its_verdict_first(page: Element) -> None:
     assert "1 of 2 requirements violated, 8 runs" in page.all("header")[0].content
     violated, held = page.all("article")
-    assert [card.all("span", "badge")[0].content for card in (violated, held)] == [
-        "violated",
-        "no violation found",
-    ]
+    badges = [card.all("span", "badge")[0].content for card in (violated, held)]
+    assert badges == ["violated", "no violation found"]
     assert "violated" in (violated.attributes["class"] or "").split()
     assert re.search(r"found in 4 of 4 runs, the quickest after \d+ simulation", violated.content)
     limits = violated.all("div", "limits")[0].content
@@ -156,12 +154,7 @@ def test_the_order_is_verdict_picture_inputs_confirmation_and_the_rest_is_folded
     assert places == sorted(places)
     (more,) = page.all("article")[0].all("details", "more")
     assert "open" not in more.attributes
-    for folded in (
-        "uniform, seed 0",
-        "rationale",
-        "falsifier replay",
-        "falsifier run python:tests.problems:hard",
-    ):
+    for folded in ("uniform, seed 0", "rationale", "falsifier replay", "falsifier run python:tests"):
         assert folded in more.content
     versions = page.all("details")[-1].content
     assert "numpy" in versions and "Python" in versions
