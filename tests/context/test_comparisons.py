@@ -34,26 +34,6 @@ def test_blocks_and_charts_that_compare(tmp_path: Path) -> None:
     assert "limphome/Mode logic" in behind
 
 
-def test_constants_and_names_of_several_words() -> None:
-    blocks = (
-        Block("Constant", "c", (("Value", "2.5"),)),
-        Block("Gain", "my gain"),
-        Block("RelationalOperator", "r", (("Operator", "~="),)),
-        Block("Reference", "cmp", (("relop", "<="), ("const", "7"))),
-    )
-    wires = (
-        Wire(End("my gain", "1"), (End("r", "1"), End("cmp", "1"))),
-        Wire(End("c", "1"), (End("r", "2"),)),
-    )
-    leave = (Transition("", "On", "[y > limit]"),)
-    chart = Chart("C", (), leave, (ChartData("limit", "constant", "3"), ChartData("x", "local", "1")))
-    other = Chart("D", (), leave, (ChartData("limit", "constant", "4"),))
-    diagram = Diagram("m", BlockSystem(blocks, wires), (chart, other))
-    assert [t.text for t in diagram_thresholds(diagram)] == [
-        "'my gain' != 2.5", "'my gain' <= 7", "y > limit (limit = 3)", "y > limit (limit = 4)"
-    ]  # fmt: skip
-
-
 def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
     blocks = (
         Block("Inport", "u2", number=1),

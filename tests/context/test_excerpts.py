@@ -63,8 +63,3 @@ def test_documents_keep_headings_and_paragraphs_that_name_a_signal() -> None:
     )
     assert told["headings"] == "# One\n## Two"
     assert told["size only"] == "8 lines"
-
-
-def test_pages_whose_head_is_not_closed_keep_their_text() -> None:
-    page = "<html><head><title>no</title><body>The limit is 5 R&D"
-    assert texts(of_text(page, "a.html", []))["whole"] == "The limit is 5 R&D"

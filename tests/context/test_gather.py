@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.context.gather import MAX_CHARACTERS, MAX_TOTAL, gather
-from falsifier.context.values import Compared, Context
+from falsifier.context.gather import MAX_TOTAL, gather
+from falsifier.context.values import Context
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from tests.fixtures import simulink
@@ -44,24 +44,6 @@ def test_a_file_that_is_too_long_is_summarized(tmp_path: Path) -> None:
     (excerpt,) = read(path).excerpts
     assert excerpt.form == "headings, and paragraphs that name a signal, because the rest is too long"
     assert excerpt.text == "# Title\n\nThe power is limited."
-
-
-def test_a_long_model_fits(tmp_path: Path) -> None:
-    lines = [f"  Real x{i};" for i in range(600)]
-    equations = [f"  x{i} = if x{i - 1} > {i} then 1 else u;" for i in range(1, 600)]
-    path = tmp_path / "big.mo"
-    path.write_text(
-        "model Big\n  input Real u;\n  output Real y;\n  Real w;\n"
-        + "\n".join(lines)
-        + "\nequation\n"
-        + "\n".join(equations)
-        + "\n  w = 2 * u;\n  y = if w > 7.25 then 1 else 0;\nend Big;\n"
-    )
-    context = gather([str(path)], [], seeds=["y"], signals=["y", "u"])
-    (excerpt,) = context.excerpts
-    assert excerpt.form == "lines with the requirement's signals, because the rest is too long"
-    assert "w > 7.25" in excerpt.text
-    assert len(excerpt.text) <= MAX_CHARACTERS
 
 
 def test_all_files_together_fit(tmp_path: Path) -> None:
@@ -188,13 +170,6 @@ def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
     assert size + sum(len(e.text) + len(e.name) + len(e.form) for e in context.excerpts) <= MAX_TOTAL
 
 
-def test_long_names_are_shortened(tmp_path: Path) -> None:
-    name = "M" * 50_000
-    (tmp_path / "a.mdl").write_text(f'Model {{\nName "{name}"\nSystem {{\n}}\n}}\n')
-    (excerpt,) = read(tmp_path / "a.mdl").excerpts
-    assert excerpt.text == f"{'M' * 200}... (50,000 characters)"
-
-
 def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
     base = "partial model Base\n  input Real power;\n  Real trips;\n  parameter Real limit = 3;\nend Base;\n"
     (tmp_path / "base.mo").write_text(base)
@@ -214,9 +189,3 @@ def test_levels_of_inputs_within_their_ranges_are_crossings(tmp_path: Path) -> N
     read_only = gather([str(path)], [], seeds=(), signals=(), ranges=ranges, is_told=False)
     assert read_only == Context(crossings=read_only.crossings)
     assert [(c.signal, c.value) for c in read_only.crossings] == [("plant.power", i) for i in range(3, 27)]
-
-
-def test_what_is_known_of_a_signal() -> None:
-    context = Context(comparisons=(Compared(("u",), "u > 3", "a.mo:1"), Compared((), "x > 1", "a.mo:2")))
-    assert context.of("u") == ("u > 3",)
-    assert context.of("x") == ()

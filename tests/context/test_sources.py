@@ -4,7 +4,6 @@ import pytest
 
 from falsifier.context.excerpts import Readable, of_source, source_of
 from falsifier.context.sources import Source
-from falsifier.core.files import bundled
 
 MODEL = """model M
  parameter Real p = 3;
@@ -103,13 +102,6 @@ def test_conditions_of_modelica_whatever_class_they_belong_to() -> None:
 )
 def test_what_is_not_closed_or_nested_deep_is_told_all_the_same(text: str, shown: str) -> None:
     assert read(text, shown).forms[0][1] == text.removesuffix(" annotation(").strip()
-
-
-def test_every_bundled_source_is_read() -> None:
-    folder = bundled("fmus").parent / "modelica"
-    read_sources = {path.stem: source(path.read_text("utf-8"), path.name) for path in folder.glob("*/*.mo")}
-    assert read_sources["HeaterLimpHome"].constants["enterAbove"] == ["6.8"]
-    assert sum(bool(each.constants) for each in read_sources.values()) > 5
 
 
 def test_constants_are_resolved() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.context.thresholds import number_in, thresholds, tokens_of, within
+from falsifier.context.thresholds import thresholds, tokens_of
 
 
 def found(text: str, **constants: str) -> list[str]:
@@ -29,22 +29,10 @@ def test_names_values_and_place() -> None:
     assert (one.names, one.place) == (frozenset({"pause"}), "a.c:3")
 
 
-def test_numbers() -> None:
-    assert [number_in(t) for t in ("1.5", "(2)", "3f", "-1e3", "a", "1 + 2", "")] == [
-        1.5, 2.0, 3.0, -1000.0, None, None, None
-    ]  # fmt: skip
-
-
 def test_long_values_of_constants_are_not_told() -> None:
     assert found("a + 1 > b", b="c + " * 100) == ["a + 1 > b"]
     assert found("a > 3 " + "or b " * 3000) == ["a > 3"]
     assert found("a > 3 " + "+ b " * 3000) == []
-
-
-def test_names_within_stand_for_others_outside() -> None:
-    (one,) = thresholds("d - t > 3", {}, "a.slx")
-    seen = within(one, {"d": "speed", "t": "", "other": "x"})
-    assert (seen.text, seen.names) == ("d - t > 3 (d = speed)", frozenset({"speed"}))
 
 
 def test_kinds_of_tokens_of_all_languages() -> None:
