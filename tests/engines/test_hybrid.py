@@ -13,9 +13,8 @@ from falsifier.engines.briefing import Briefing
 from falsifier.engines.hybrid import Hybrid, Settings, Turns, helps
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
-from falsifier.engines.surrogate import Surrogate
 from falsifier.errors import ChatError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
 from falsifier.llm.replay import ScriptedChat
@@ -220,15 +219,6 @@ def test_the_model_is_told_why_the_surrogate_chose_its_samples() -> None:
     assert any(note.startswith("The optimiser would simulate this next") for note in script.notes[1])
 
 
-def test_scaled_robustness_is_explained_where_a_reason_speaks_of_it() -> None:
-    problem = wide_problem("G[0,10] (x <= 9)")
-    engine, script = hybrid(problem, [[0.1], [0.3], [0.4], [0.5]])
-    drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=40)
-    spoken_of = [any("a scaled robustness of" in note for note in notes) for notes in script.notes]
-    explained = [any(note.startswith("Scaled robustness is") for note in notes) for notes in script.notes]
-    assert any(spoken_of) and spoken_of == explained
-
-
 def test_the_model_is_told_when_the_surrogate_errs() -> None:
     problem = wide_problem("G[0,10] (x <= 1)")
     engine, script = hybrid(problem, [[-1.0, 0.5], [0.0]])
@@ -267,71 +257,3 @@ def test_a_scripted_chat_leads_through_the_real_prompts() -> None:
     assert {c.origin for c in asked} == {adviser.name, "hybrid"}
     assert len(chat.requests) >= 2
     assert "The optimiser would simulate this next" in chat.requests[1].messages[-1].content
-
-
-SEVERAL = "not (F[0,10] (x > 0.9) and F[0,10] (x < -0.9))"
-JOINT = lag_problem(SEVERAL, free=FREE, inputs=2)
-NESTED = lag_problem("G[0,8] F[0,2] (x <= 0.85)", free=FREE)
-PLAIN = lag_problem("G[0,10] (x <= 0.99)", free=FREE, inputs=2)
-# Up for half of the time, then down: violates JOINT, and held up, the others.
-RIGHT = {
-    id(JOINT): Signal((0.0, 5.0), (1.0, -1.0), "constant"),
-    id(NESTED): Signal((0.0,), (1.0,), "constant"),
-    id(PLAIN): Signal((0.0,), (1.0,), "constant"),
-}
-
-
-@dataclass
-class Kind(Script):
-    """An LLM that always helps from its second answer on, never, or once it has seen a stepping input."""
-
-    kind: str = "never"
-    seed: int = 0
-    has_seen_steps: bool = False
-
-    def propose(self, count: int, notes: Sequence[str] = (), **_: Any) -> list[Candidate]:
-        self.notes.append(tuple(notes))
-        knows = {"second": len(self.notes) > 1, "never": False, "steps": self.has_seen_steps}[self.kind]
-        level = -0.3 + 0.2 * float(np.random.default_rng((self.seed, len(self.notes))).random())
-        signal = RIGHT[id(self.problem)] if knows else Signal((0.0,), (level,), "constant")
-        signals = {r.name: signal for r in self.problem.space.inputs}
-        return [self.problem.space.admit(Candidate(signals, {}, self.name, self.kind))]
-
-    def ask(self, n: int = 1) -> list[Candidate]:
-        """Lead a search alone."""
-        return self.propose(n)
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        self.has_seen_steps |= any(s.switches > 3 for e in evaluations for s in e.candidate.signals.values())
-
-
-def simulations(engine: Engine, problem: Problem, most: int = 40) -> int:
-    """Number of simulations until a violation."""
-    for count in range(1, most + 1):
-        evaluation = evaluate(problem, engine.ask()[0])
-        if evaluation.violated:
-            return count
-        engine.tell([evaluation])
-    return most
-
-
-SYSTEMS, SEEDS = (JOINT, NESTED, PLAIN), range(5)
-
-
-@pytest.fixture(scope="module")
-def surrogate_alone() -> float:
-    return float(
-        np.mean([simulations(Surrogate(p, seed=s, settings=HASTY), p) for p in SYSTEMS for s in SEEDS])
-    )
-
-
-@pytest.mark.parametrize("kind", ["second", "never", "steps"])
-def test_it_needs_at_most_one_simulation_more_than_its_better_half(kind: str, surrogate_alone: float) -> None:
-    alone, both = [], []
-    for problem in SYSTEMS:
-        for seed in SEEDS:
-            alone.append(simulations(Kind([], problem, kind=kind, seed=seed), problem))
-            adviser = Kind([], problem, kind=kind, seed=seed)
-            engine = Hybrid(problem, seed=seed, adviser=adviser, surrogate_settings=SETTINGS)
-            both.append(simulations(engine, problem))
-    assert np.mean(both) <= min(surrogate_alone, float(np.mean(alone))) + 1, (surrogate_alone, alone, both)

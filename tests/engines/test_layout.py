@@ -87,11 +87,6 @@ PROBLEM = lag_problem(inputs=2, limit=2.0, free=FREE, parameters=[START])
 BOX = fixed_layout(PROBLEM.space)
 
 
-def test_points_outside_are_brought_to_the_bounds() -> None:
-    candidate = BOX.candidate(np.full(BOX.dimension, 1.5), origin="", rationale="")
-    assert set(candidate.signals["u"].values) == {2.0}
-
-
 def test_a_free_signal_is_read_at_the_fixed_control_points_and_does_not_represent_a_point() -> None:
     step = Candidate(
         {"u": Signal((0.0, 5.0), (-2.0, 2.0), "constant"), "v": Signal((0.0,), (0.0,), "constant")},
@@ -139,10 +134,3 @@ def test_an_engine_is_told_points_and_costs_and_no_candidates_of_another_form() 
     )
     assert [cost for _, cost in engine.learnt] == [0.25, None]
     np.testing.assert_allclose(engine.learnt[0][0], BOX.point(first))
-
-
-@pytest.mark.parametrize("wanted", [0, 1, 3])
-def test_at_least_one_candidate_is_given_each_with_origin_and_reason(wanted: int) -> None:
-    candidates = Noting().ask(wanted)
-    assert len({c.key for c in candidates}) == len(candidates) == max(wanted, 1)
-    assert {(c.origin, c.rationale) for c in candidates} == {("noting", "a reason")}

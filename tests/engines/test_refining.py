@@ -116,15 +116,6 @@ def test_what_was_simulated_on_an_earlier_level_is_told_and_not_asked_for_again(
     assert second.told[1].robustness == judge(asked[0]).robustness
 
 
-def test_held_pieces_of_a_finer_level_that_are_the_same_input_are_not_simulated() -> None:
-    _, held, finer = spaces(free=False)
-    second = listening(finer)
-    engine = Refining([Stage(listening(held), held, 0), Stage(second, finer, 2)])
-    asked = drive(engine, judge, rounds=3)
-    assert asked[2].rationale == "uniform random"
-    assert [len(e.candidate.signals["u"].times) for e in second.told] == [8, 8, 8]
-
-
 def test_known_inputs_that_a_coarse_level_cannot_express_wait_for_a_finer_one() -> None:
     coarse, fine, _ = spaces(free=True)
     known = Candidate({"u": Signal((0.0, 2.5), (-1.0, 1.0), "constant")})

@@ -1,7 +1,5 @@
 """Uniform and Sobol points, corners: the engines that are yardsticks."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -65,16 +63,6 @@ def test_an_input_without_effect_costs_one_simulation() -> None:
 
     asked = drive(make_engine("corners", lag_problem(inputs=3), seed=0), judge, rounds=4)
     assert min(judge(c).robustness or 0.0 for c in asked) == 1.0
-
-
-def test_what_has_a_single_value_has_one_extreme_and_reasons_name_the_levels() -> None:
-    problem = lag_problem(inputs=2)
-    u, v = problem.space.inputs
-    problem = replace(problem, space=replace(problem.space, inputs=(replace(u, low=0.5, high=0.5), v)))
-    first, second, third = make_engine("corners", problem, seed=0).ask(3)
-    assert {first.rationale, second.rationale} == {"constant extremes: v low", "constant extremes: v high"}
-    assert third.rationale == "uniform random: all corners were tried"
-    assert first.signals["u"].values == second.signals["u"].values
 
 
 def levels(candidate: Candidate) -> tuple[float, ...]:

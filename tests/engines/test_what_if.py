@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from falsifier.engines.hybrid import Hybrid, Settings
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
-from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
 from falsifier.llm.replay import ScriptedChat
 from falsifier.record.journal import holds_run, read_journal
@@ -24,11 +22,9 @@ from falsifier.search.result import Result
 from falsifier.testing import drive, simulated
 from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS
-from tests.llm.server import Received, Step, serving
 
 EAGER = Settings(promising=-9.0)
 Line = str | ChatReply | Exception
-OnExchange = Callable[[Exchange], None]
 
 
 def exchanges_in(directory: Path) -> list[Exchange]:
@@ -52,19 +48,9 @@ def call(*levels: float, name: str = "u") -> ChatReply:
     )
 
 
-def opened(*later: Line, name: str = "u") -> list[Line]:
-    return [candidates(-1.0, 0.5, name=name), *later]
-
-
-def hybrid(
-    chat: Chat,
-    *,
-    anonymous: bool = False,
-    settings: Settings = EAGER,
-    on_exchange: OnExchange = lambda _: None,
-) -> Hybrid:
-    adviser = LLMEngine(wide_problem(), chat, anonymous=anonymous, on_exchange=on_exchange)
-    return Hybrid(wide_problem(), seed=0, adviser=adviser, settings=settings, surrogate_settings=SETTINGS)
+def hybrid(chat: Chat, *, anonymous: bool = False) -> Hybrid:
+    adviser = LLMEngine(wide_problem(), chat, anonymous=anonymous)
+    return Hybrid(wide_problem(), seed=0, adviser=adviser, settings=EAGER, surrogate_settings=SETTINGS)
 
 
 def run(engine: Engine, rounds: int = 14) -> list[str]:
@@ -85,7 +71,7 @@ def test_it_calls_twice_and_then_answers() -> None:
     # Until forecasts have proved good, no tool is offered; from then on every question offers it.
     def script(request: ChatRequest) -> Line:
         if not request.tools:
-            return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
+            return candidates(-1.0, 0.5) if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
         told = answers(request)
         return call(0.5, 1.5) if not told else call(1.75) if len(told) == 1 else candidates(1.75, told="best")
 
@@ -100,54 +86,6 @@ def test_it_calls_twice_and_then_answers() -> None:
     assert "by x <= 9" in third[0]
     assert "2 more calls can be answered" in third[0] and "1 more call can be answered" in third[1]
     assert any(re.fullmatch(r"best \[predicted robustness 7\.\d+\]", r) for r in rationales)
-
-
-def test_no_tool_where_no_call_is_allowed() -> None:
-    def script(request: ChatRequest) -> Line:
-        return opened()[0] if len(chat.requests) == 1 else candidates(0.1 * len(chat.requests))
-
-    chat = ScriptedChat(script)
-    run(hybrid(chat, settings=Settings(promising=-9.0, what_if_calls=0)))
-    assert len(chat.requests) > 2 and not any(r.tools for r in chat.requests)
-
-
-def test_a_server_that_refuses_tools_is_asked_without() -> None:
-    refusal = Step(status=400, message="this model does not support tools")
-    with serving() as server:
-        chat = LiteLLMChat("openai/mine", api_base=server.url)
-        engine = hybrid(chat)
-        judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
-        refused: list[Received] = []
-        for turn in range(20):
-            # The next request is refused where it offers tools; what follows is answered.
-            server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3
-            if server.received and not refused and engine.surrogate.is_trusted:
-                server.script[:] = [refusal, *server.script]
-            before = len(server.received)
-            engine.tell([judge(c) for c in engine.ask()])
-            refused += [r for r in server.received[before:] if "tools" in r.body]
-    assert len(refused) == 1, "once refused, tools are not offered again"
-    later = server.received[server.received.index(refused[0]) + 1 :]
-    assert "response_format" in later[0].body
-
-
-def test_calls_come_over_the_wire_beside_the_schema() -> None:
-    asking = Step(calls=(("predict", json.loads(candidates(1.25))),))
-    with serving() as server:
-        engine = hybrid(LiteLLMChat("openai/mine", api_base=server.url))
-        judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
-        for turn in range(20):
-            server.script[:] = [Step(candidates(0.011 * turn - 0.9, 0.013 * turn + 0.3))] * 3
-            if engine.surrogate.is_trusted:
-                server.script[:0] = [asking]
-            engine.tell([judge(c) for c in engine.ask()])
-            if any("tools" in r.body for r in server.received):
-                break
-    first, second = (r.body for r in server.received[-2:])
-    assert first["response_format"] == second["response_format"]
-    assert first["tools"] == second["tools"]
-    assert [m["role"] for m in second["messages"]] == ["system", "user", "assistant", "tool"]
-    assert second["messages"][-1]["content"].startswith("Candidate 1: predicted robustness +7.")
 
 
 def test_neutral_names_hold_in_calls_and_answers() -> None:

@@ -2,7 +2,6 @@
 
 import json
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -21,7 +20,6 @@ class Step:
     message: str = "out of order"
     finish: str = "stop"
     headers: dict[str, str] = field(default_factory=dict)
-    delay: float = 0.0
     raw: str | None = None
     extra: dict[str, Any] = field(default_factory=dict)
     calls: tuple[tuple[str, dict[str, Any]], ...] = ()
@@ -36,8 +34,6 @@ class Step:
     hang_up: bool = False
     # It never answers: the client must give up.
     silent: bool = False
-    # It answers when so many requests are there at the same time.
-    together: int = 1
 
 
 @dataclass(frozen=True)
@@ -59,10 +55,7 @@ class Server:
     def __init__(self, script: list[Step]) -> None:
         self.script = script
         self.received: list[Received] = []
-        self.asides: list[Received] = []
-        self.most_at_once = 0
-        self._at_once = 0
-        self._lock = threading.Condition()
+        self._lock = threading.Lock()
         self._closing = threading.Event()
         outer = self
 
@@ -73,26 +66,13 @@ class Server:
                 length = int(self.headers.get("content-length", 0))
                 body = json.loads(self.rfile.read(length) or b"{}")
                 if self.path.endswith("/api/show"):  # what Ollama knows of a model, asked in the background
-                    self._not_found(body)
+                    self._not_found()
                     return
                 with outer._lock:
                     outer.received.append(Received(self.path, dict(self.headers), body))
                     step = outer.script.pop(0) if outer.script else Step(status=410, message="script ended")
-                    outer._at_once += 1
-                    outer.most_at_once = max(outer.most_at_once, outer._at_once)
-                    outer._lock.notify_all()
-                try:
-                    self._answer(step, body)
-                finally:
-                    with outer._lock:
-                        outer._at_once -= 1
-
-            def _answer(self, step: Step, body: dict[str, Any]) -> None:
-                with outer._lock:
-                    outer._lock.wait_for(lambda: outer.most_at_once >= step.together, timeout=HANG)
                 if step.silent:
                     outer._closing.wait(HANG)
-                time.sleep(step.delay)
                 if step.hang_up or step.silent:
                     self.close_connection = True
                     return
@@ -112,11 +92,9 @@ class Server:
                     self.wfile.write(payload)
 
             def do_GET(self) -> None:
-                self._not_found({})
+                self._not_found()
 
-            def _not_found(self, body: dict[str, Any]) -> None:
-                with outer._lock:
-                    outer.asides.append(Received(self.path, dict(self.headers), body))
+            def _not_found(self) -> None:
                 self.send_response(404)
                 self.send_header("content-length", "0")
                 self.end_headers()
