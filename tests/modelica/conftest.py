@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.modelica.exporter import FEATURES, exporter
+from tests.modelica.exporter import ROOT, exporter
 from tests.patience import HANG
 
-ROOT = Path(__file__).parents[2]
+FEATURES = Path(__file__).parent / "Features"
 Build = Callable[..., Path]
 
 
@@ -29,7 +29,7 @@ def exporter_python() -> str:
 
 
 def run_exporter(*arguments: str, fresh: bool = False) -> subprocess.CompletedProcess[str]:
-    """Run the exporter's command line, in a new interpreter or in a copy of one that has run before."""
+    """Run the exporter's command line, in a new interpreter or in one that has run before."""
     if not fresh:
         return exporter(exporter_python()).run(*arguments)
     command = [exporter_python(), str(ROOT / "modelica" / "export_fmu.py"), *arguments]
@@ -47,17 +47,8 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Build:
         key = (name, fmi)
         if key not in made:
             target = folder / f"{name}-{fmi}.fmu"
-            done = run_exporter(
-                name,
-                "--source",
-                str(source),
-                "--output",
-                str(target),
-                "--fmi",
-                str(fmi),
-                "--platform",
-                "linux64",
-            )
+            options = ["--source", str(source), "--output", str(target), "--fmi", str(fmi)]
+            done = run_exporter(name, *options, "--platform", "linux64")
             assert done.returncode == 0, done.stderr
             made[key] = target
         return made[key]

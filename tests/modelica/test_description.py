@@ -32,6 +32,8 @@ def test_the_validator_has_no_complaint(path: Path) -> None:
             assert variable.description, variable.name
         if variable.causality == "input" and variable.type in ("Real", "Float64", "Integer", "Int32"):
             assert variable.min is not None and variable.max is not None and variable.start is not None
+        if variable.causality == "input" and variable.type in ("Real", "Float64"):
+            assert variable.unit, variable.name  # the unit 1, if it has no dimension
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from typing import Any
 
 import pytest
 
-from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem, load_problems
 from tests.systems.driving import ROOT
 
@@ -67,27 +66,6 @@ def test_a_split_system_has_the_requirements_and_ranges_of_the_single_fmu(parts:
         assert [d.time for d in split.space.dimensions] == [d.time for d in one.space.dimensions]
         assert [r.hold for r in split.space.inputs] == [r.hold for r in one.space.inputs]
         assert split.experiment.samples == one.experiment.samples
-
-
-@pytest.mark.parametrize("system", SYSTEMS)
-def test_fmu_speaks_for_itself(system: str) -> None:
-    from fmpy import read_model_description
-
-    problem = load_problems(system)[0]
-    info = problem.info
-    assert isinstance(problem.model, FmuModel)
-    # Dimensionless variables have the unit 1 in the file.
-    units = {v.name: v.unit for v in read_model_description(str(problem.model.path)).modelVariables}
-    assert len(info.description.split()) > 15
-    assert set(info.interfaces) == {"co-simulation", "model-exchange"}
-    for variable in (*info.inputs, *info.outputs, *info.parameters):
-        assert variable.description, variable.name
-    for variable in info.inputs:
-        if variable.kind != "real":
-            assert variable.literals or variable.kind == "boolean", variable.name
-            continue
-        assert units[variable.name], variable.name
-        assert variable.low is not None and variable.high is not None, variable.name
 
 
 def test_instance_2_of_nnx_is_over_after_three_seconds() -> None:

@@ -51,10 +51,3 @@ def test_the_defaults_violate_nothing(spec: Path) -> None:
         problem = load_problem(f"{spec}:{requirement}", parameterization="fixed")
         middle = problem.space.decode(problem.space.bounds.mean(axis=1))
         assert not evaluate(problem, middle).violated, requirement
-
-
-@pytest.mark.parametrize("spec", SPECS, ids=lambda spec: spec.stem)
-def test_source_and_fmu_stand_beside_the_spec(spec: Path) -> None:
-    assert set(witnesses(spec)) == set(REQUIREMENTS)
-    assert f"model {spec.stem} " in spec.with_suffix(".mo").read_text("utf-8")
-    assert spec.with_suffix(".fmu").stat().st_size < 150_000
