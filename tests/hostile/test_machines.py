@@ -1,33 +1,34 @@
-"""Machines that lack what a search needs: one clear line, and the exit code of a machine that failed."""
+"""Machines that lack what a search needs: one clear line, and the exit code of a machine that failed.
+
+What was found decides the exit code; failures afterwards are messages.
+"""
 
 import os
 import resource
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+from falsifier.campaigns.analysis import load
+from falsifier.cli import run as command
+from falsifier.record.journal import Journal
+from falsifier.record.run import falsify
+from falsifier.search.events import Confirmed, Event, RunEnded
 from tests.command import ROOT
+from tests.problems import easy
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
 FMU = ROOT / "tests" / "fixtures" / "fmus" / "Lag_2.fmu"
 RUN = [
     *("run", str(FMU), "--search", "u=0:1", "--interface", "co-simulation", "--stop-time", "1", "--quiet"),
-    *(
-        "--stl",
-        "G[0,1] (x <= 2)",
-        "--output-interval",
-        "0.1",
-        "--engine",
-        "corners",
-        "--budget",
-        "2",
-        "--quiet",
-    ),
+    *("--stl", "G[0,1] (x <= 2)", "--output-interval", "0.1", "--engine", "corners", "--budget", "2"),
 ]
+FALSIFIED = ["run", "python:tests.problems:easy", "--engine", "corners", "--quiet"]
+STANDS = ["run", "python:tests.problems:impossible", "--engine", "corners", "--budget", "3", "--quiet"]
 
 
 def limited(number: int, most: int) -> Callable[[], None]:
@@ -36,12 +37,19 @@ def limited(number: int, most: int) -> Callable[[], None]:
 
 
 def run(
-    folder: Path, *, before: Callable[[], None] | None = None, out: str = "run", **environment: str
+    folder: Path,
+    arguments: Sequence[str] = RUN,
+    *,
+    shell: str = "",
+    before: Callable[[], None] | None = None,
+    **environment: str,
 ) -> tuple[int, str]:
-    """Search in another process; return its exit code and its messages."""
+    """Search in another process, whose streams a shell sets up; return its exit code and its messages."""
+    script = f'exec "$0" -c "from falsifier.cli import main; main()" "$@" --out run {shell}'
     done = subprocess.run(
-        [sys.executable, "-c", "from falsifier.cli import main; main()", *RUN, "--out", out],
+        ["sh", "-c", script, sys.executable, *arguments],
         cwd=folder,
+        stdin=subprocess.DEVNULL,
         env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
         capture_output=True,
         text=True,
@@ -67,20 +75,36 @@ def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tm
     assert says in said and said.count("\n") == 1
 
 
-@pytest.mark.parametrize("closed", [(2,), (0, 1, 2)])
+@pytest.mark.parametrize("shell", ["2>&-", "<&- >&- 2>&-"])
 def test_simulations_need_no_open_streams_and_no_folder_for_temporary_files(
-    closed: tuple[int, ...], tmp_path: Path
+    shell: str, tmp_path: Path
 ) -> None:
-    def close() -> None:
-        for stream in closed:
-            os.close(stream)
+    assert run(tmp_path, shell=shell, TMPDIR=str(tmp_path / "none"))[0] == 0
 
-    assert run(tmp_path, before=close, TMPDIR=str(tmp_path / "none"))[0] == 0
+
+@pytest.mark.parametrize(
+    ("shell", "arguments", "code"),
+    [
+        ("2>/dev/full", FALSIFIED, 1),
+        (">/dev/full 2>&1", FALSIFIED, 1),
+        ("<&- >&- 2>&-", FALSIFIED, 1),
+        (">/dev/full", STANDS, 0),
+        (">/dev/full 2>&1", ["run", "no-such-problem"], 2),
+        ("2>&-", ["run", "--no-such-option"], 2),
+    ],
+)
+def test_full_and_closed_streams_leave_the_code(
+    shell: str, arguments: list[str], code: int, tmp_path: Path
+) -> None:
+    assert run(tmp_path, arguments, shell=shell)[0] == code
+    if code < 2:
+        assert load(tmp_path / "run")[0].falsified == (code == 1)  # nothing printed landed in its files
 
 
 @pytest.mark.parametrize(
     ("most", "where"),
     [
+        (0, "run/manifest.json"),
         (500, "run/manifest.json"),
         (10_000, "Lag_2.fmu is unpacked"),
         (200_000, "memory shared with the processes of FMUs"),
@@ -93,3 +117,39 @@ def test_a_limit_on_the_size_of_files_is_told_with_the_file_and_the_cure(
     assert code == 3
     assert f"{where}: File too large" in said and said.count("\n") == 1
     assert "ulimit -f" in said and "free" not in said
+
+
+def test_a_picture_that_cannot_be_drawn_is_a_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("no font")
+
+    monkeypatch.setattr("falsifier.views.plotting.plot_evaluation", fail)
+    results = [falsify(easy(), "corners", directory=tmp_path / "run")]
+    with pytest.raises(SystemExit) as end:
+        command._finish(results, as_json=False)
+    assert end.value.code == 1
+    assert "cannot be drawn: no font" in capsys.readouterr().err
+    assert (tmp_path / "run" / "counterexample.json").is_file()
+
+
+@pytest.mark.parametrize("last", [Confirmed, RunEnded])
+def test_a_search_that_can_no_longer_be_recorded_has_found_what_it_found(
+    last: type[Event], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = Journal.__call__
+
+    def until_full(journal: Journal, event: Event) -> None:
+        if isinstance(event, last):
+            raise OSError(28, "No space left on device")
+        record(journal, event)
+
+    monkeypatch.setattr(Journal, "__call__", until_full)
+    result = falsify(easy(), "corners", directory=tmp_path / "run")
+    assert result.falsified
+    assert "No space left" in result.unrecorded
+    with pytest.raises(SystemExit) as end:
+        command._finish([result], as_json=False)
+    assert end.value.code == 1
+    assert "could not be recorded" in capsys.readouterr().err
