@@ -13,7 +13,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from tests.modelica.conftest import ROOT, Build, exporter_python, run_exporter
+from tests.modelica.conftest import Build, exporter_python, run_exporter
+from tests.modelica.exporter import ROOT
 from tests.patience import HANG
 
 FMUS = sorted((ROOT / "fmus").glob("*.fmu"))

@@ -11,7 +11,8 @@ from fmpy.fmi1 import FMICallException
 
 from falsifier.core.model import Experiment
 from falsifier.fmu import FmuModel
-from tests.modelica.conftest import ROOT, Build
+from tests.modelica.conftest import Build
+from tests.modelica.exporter import ROOT
 from tests.modelica.support import INTERFACES, opened, said_on_failure
 
 AT = ROOT / "fmus" / "AT.fmu"
