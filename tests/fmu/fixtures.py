@@ -7,7 +7,7 @@ from typing import Final
 from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, System
 from falsifier.fmu.process import REGISTRY
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.worker import Worker
@@ -28,7 +28,7 @@ def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:
     return FmuModel(path(name), interface)
 
 
-def runners(model: FmuModel) -> list[Runner]:
+def runners(model: FmuModel | System) -> list[Runner]:
     """What simulates a model in this process, in each thread that has simulated it."""
     return [runner for (key, _), runner in REGISTRY._runners.items() if key == model.order.key]
 
@@ -47,7 +47,7 @@ def worker(model: FmuModel) -> Worker:
 
 
 def run(
-    model: FmuModel,
+    model: FmuModel | System,
     outputs: Sequence[str],
     *,
     stop: float = 1.0,

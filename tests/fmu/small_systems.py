@@ -2,17 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment
-from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import Component, Connection, Coupling, System
-from falsifier.fmu.process import REGISTRY
+from tests.fmu import fixtures
 from tests.fmu.fixtures import path
-from tests.patience import HANG
 
 LOOP: dict[str, str | Connection] = {"plant.u": "pi.y", "pi.measured": "plant.y"}
 STEP = 0.1
@@ -30,8 +28,7 @@ def system(
 
 def pids(model: System) -> list[int]:
     """The worker processes of a system."""
-    key = model.order.key
-    workers = [runner._worker for (own, _), runner in REGISTRY._runners.items() if own == key]
+    workers = [runner._worker for runner in fixtures.runners(model)]
     return [worker.pid for worker in workers if worker is not None]
 
 
@@ -40,19 +37,9 @@ def loop(coupling: Coupling | None = None, *, plant: str = "Plant_2", pi: str = 
     return system({"plant": plant, "pi": pi}, LOOP, coupling)
 
 
-def run(
-    model: System,
-    *outputs: str,
-    stop: float = 1.0,
-    interval: float = STEP,
-    step_size: float | None = None,
-    signals: Mapping[str, Signal] | None = None,
-    parameters: Mapping[str, float] | None = None,
-    time_limit: float = HANG,
-) -> Trajectory:
-    """Simulate once."""
-    experiment = Experiment(stop, interval, outputs, step_size, time_limit=time_limit)
-    return model.simulate(signals or {}, parameters or {}, experiment)
+def run(model: System, *outputs: str, **given: Any) -> Trajectory:
+    """Simulate once, with arguments of the other ``run``."""
+    return fixtures.run(model, outputs, **given)
 
 
 def sampled_loop(late: int, *, steps: int = 10, step: float = STEP, gain: float = 2.0) -> NDArray[np.float64]:

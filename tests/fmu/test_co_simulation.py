@@ -8,7 +8,6 @@ from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from tests.fmu.fixtures import ME, isolated, ramp, run
-from tests.fmu.support import END
 
 LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
 Floats = NDArray[np.float64]
@@ -105,11 +104,6 @@ def test_where_an_input_is_driven_its_range_is_looked_at_over_the_whole_time() -
     signal = Signal((0.0, 0.5, 0.7), (0.0, 300.0, 0.0), "constant")
     with pytest.raises(SimulationError, match=r"from 0 to 300 .*'in_UInt8'"):
         run(isolated("Echo_3"), ("out_UInt8",), signals={"in_UInt8": signal})
-
-
-def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time() -> None:
-    with pytest.raises(SimulationError, match=r"terminated the simulation at t = 0\.6 s"):
-        run(isolated("Misdeeds_3"), ("y",), parameters={"misdeed": END})
 
 
 @pytest.mark.parametrize("interface", ["co-simulation", ME])

@@ -9,7 +9,7 @@ import pytest
 
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
-from falsifier.evaluation.evaluate import Evaluation, evaluate, simulate
+from falsifier.evaluation.evaluate import evaluate, simulate
 from falsifier.fmu import FmuModel, read_info
 from falsifier.problem.problem import Problem
 from tests.fmu import fixtures
@@ -195,32 +195,14 @@ def test_repeated_folder_entries_do_no_harm_but_repeated_files_do(tmp_path: Path
         read_info(path)
 
 
-def test_static_data_that_even_a_new_instance_keeps_does_not_cost_a_process() -> None:
-    model = isolated("KeepsStatic_2")
-    pids = set()
-    for _ in range(6):
-        assert run(model, ("y",))["y"].tolist() == list(range(11))
-        fmu = fixtures.runner(model)
-        pids |= {fmu._worker.pid} if fmu._worker else set()
-    assert fmu._experience.reuse == "library"
-    assert len(pids) == 1
-    model.close()
-
-
-def evaluated(formula: str, value: float) -> Evaluation:
-    problem = Problem.from_fmu(fixtures.path("NoOutputs_2dymola"), formula)
-    (dimension, *_) = problem.space.dimensions
-    candidate = problem.space.decode([value] * len(problem.space.dimensions), origin="test")
-    assert dimension.name == "u"
-    evaluation = evaluate(problem, candidate)
-    problem.model.close()
-    return evaluation
-
-
 def test_without_outputs_states_and_locals_are_observed() -> None:
     info = read_info(fixtures.path("NoOutputs_2dymola"))
     assert [v.name for v in info.observables] == ["x"]
-    evaluation = evaluated("G[0,10] (y <= 5)", 10.0)
+    problem = Problem.from_fmu(fixtures.path("NoOutputs_2dymola"), "G[0,10] (y <= 5)")
+    candidate = problem.space.decode([10.0] * len(problem.space.dimensions), origin="test")
+    assert list(candidate.signals) == ["u"]
+    evaluation = evaluate(problem, candidate)
+    problem.model.close()
     assert evaluation.trajectory is not None
     assert evaluation.trajectory.names == ("x", "y", "u")
     assert evaluation.violated

@@ -5,20 +5,31 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, with_local_files
+from falsifier.fmu import Coupling, FmuModel, System, fmu_files, fmus_sha256, with_local_files
 from falsifier.testing import lag_problem
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, run
-from tests.fmu.small_systems import loop
+from tests.fmu.small_systems import loop, system
+
+LAG, LOOP = isolated("Lag_2"), loop()
 
 
-def test_models_travel_between_processes_and_are_equal_by_content(tmp_path: Path) -> None:
-    model = isolated("Lag_2")
+@pytest.mark.parametrize(
+    ("model", "others"),
+    [
+        (LAG, [isolated("Lag_3"), FmuModel(LAG.path, "model-exchange")]),
+        (LOOP, [loop(Coupling("jacobi")), loop(pi="Gain_3"), system({"plant": "Plant_2"}, {})]),
+    ],
+    ids=["FMU", "system"],
+)
+def test_models_travel_between_processes_and_are_equal_by_content(
+    model: FmuModel | System, others: list[FmuModel | System]
+) -> None:
     twin = pickle.loads(pickle.dumps(model))
-    assert twin == model and hash(twin) == hash(model)
-    assert run(twin, ("y",))["y"].tolist() == run(model, ("y",))["y"].tolist()
-    assert isolated("Lag_3") != model
-    assert FmuModel(model.path, "model-exchange") != model
+    assert twin == model and hash(twin) == hash(model) and twin.order.key == model.order.key
+    name = model.info.outputs[0].name
+    assert run(twin, (name,))[name].tolist() == run(model, (name,))[name].tolist()
+    assert all(other != model and other.order.key != model.order.key for other in others)
 
 
 def test_a_file_that_changes_after_loading_is_refused(tmp_path: Path) -> None:

@@ -3,11 +3,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from falsifier.core.model import Variable
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description.model_description import Description, parse, read_description
-from falsifier.fmu.description.variables import Slot, with_aliases_marked
 from tests.fmu import fixtures
 
 ALL = sorted(p.stem for p in fixtures.FOLDER.glob("*.fmu"))
@@ -29,6 +27,7 @@ def test_agrees_with_fmpy(name: str) -> None:
     assert description.token == expected.guid
     default = expected.defaultExperiment
     assert info.stop_time == float(default.stopTime)
+    assert info.step_size == (None if default.stepSize is None else float(default.stepSize))
     assert info.tolerance == (None if default.tolerance is None else float(default.tolerance))
     assert ("co-simulation" in info.interfaces) == (expected.coSimulation is not None)
     assert ("model-exchange" in info.interfaces) == (expected.modelExchange is not None)
@@ -41,6 +40,8 @@ def test_agrees_with_fmpy(name: str) -> None:
         assert slot.reference == twin.valueReference
         assert variable.unit == ("" if twin.unit == "1" else twin.unit or "")
         assert variable.description == (twin.description or "")
+        assert variable.display_unit == (twin.displayUnit or "")
+        assert variable.nominal == (None if twin.nominal is None else float(twin.nominal))
         # Limits that stand for "none" in some exporters are none here.
         low = None if twin.min is None else float(twin.min)
         assert variable.low == (low if low is None or abs(low) < 1e30 else None)
@@ -50,17 +51,6 @@ def test_agrees_with_fmpy(name: str) -> None:
             assert variable.start == float(twin.start)
         if variable.causality in ("input", "output"):
             assert variable.causality == twin.causality
-
-
-def test_facts_of_a_model() -> None:
-    info = read_info(fixtures.path("Lag_2"))
-    assert [v.name for v in info.inputs] == ["u"]
-    assert (info["u"].low, info["u"].high, info["u"].unit) == (-10.0, 10.0, "m")
-    assert (info["y"].display_unit, info["y"].nominal) == ("mm", 5.0)
-    assert [v.name for v in info.variables if v.is_state] == ["x"]
-    assert [v.name for v in info.variables if v.settable] == ["u", "x", "T", "gain"]
-    assert info["x"].description == "lagged input"
-    assert info.step_size == 0.01
 
 
 @pytest.mark.parametrize("name", ["Echo_1", "Echo_2", "Echo_3"])
@@ -89,6 +79,9 @@ def test_what_cannot_be_set_says_why() -> None:
     assert "computes its initial value" in slots["y"].refusal
     assert "time" in slots["t"].refusal
     assert slots["p"].refusal == ""
+    lag = read_info(fixtures.path("Lag_2"))
+    assert [v.name for v in lag.variables if v.is_state] == ["x"]
+    assert [v.name for v in lag.variables if v.settable] == ["u", "x", "T", "gain"]
 
 
 def test_array_sizes_from_structural_parameters_and_aliases() -> None:
@@ -117,24 +110,6 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
 def test_wrong_descriptions_are_named(text: str, message: str) -> None:
     with pytest.raises(ModelError, match=rf"test\.fmu: .*{message}"):
         described(text)
-
-
-def test_one_reference_has_one_name_that_can_be_set_and_an_input_keeps_its_own() -> None:
-    variables = (
-        Variable("start.u", settable=True),
-        Variable("u", causality="input", settable=True),
-        Variable("y", causality="output"),
-        Variable("y2", causality="output"),
-    )
-    slots = {"start.u": Slot(1, "Real"), "u": Slot(1, "Real"), "y": Slot(2, "Real"), "y2": Slot(2, "Real")}
-    marked, changed = with_aliases_marked(variables, slots)
-    assert [(v.name, v.alias_of, v.settable) for v in marked] == [
-        ("start.u", "u", False),
-        ("u", "", True),
-        ("y", "", False),
-        ("y2", "", False),
-    ]
-    assert changed["start.u"].refusal == "it is another name of 'u'; set that one"
 
 
 def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() -> None:

@@ -1,6 +1,4 @@
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -30,24 +28,6 @@ def test_a_folder_whose_owner_lives_is_not_swept() -> None:
     folder.remove()
 
 
-KILLED = """
-import os, sys, tempfile
-tempfile.tempdir = sys.argv[1]
-from falsifier.fmu.process.workplace import WorkFolder
-folder = WorkFolder()
-(folder.path / "left").write_text("behind")
-os.kill(os.getpid(), 9)
-"""
-
-
-def test_the_folder_of_a_killed_owner_is_swept(temporary: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    subprocess.run([sys.executable, "-c", KILLED, str(temporary)], env=environment, check=False)
-    assert len(list(temporary.iterdir())) == 2
-    sweep()
-    assert list(temporary.iterdir()) == []
-
-
 @pytest.mark.parametrize("name", ["falsifier-fmu-mine", "falsifier-fmu-" + "g" * 32, "falsifier-build-x"])
 def test_nothing_else_is_swept(temporary: Path, name: str) -> None:
     (temporary / name).mkdir()
@@ -64,13 +44,9 @@ def test_a_lock_without_folder_is_swept_when_it_is_old(temporary: Path) -> None:
     assert list(temporary.iterdir()) == [young]
 
 
-def prints(output: Output, text: bytes) -> int:
-    return os.write(output.fileno(), text)
-
-
 def test_of_much_output_the_end_is_taken() -> None:
     output = Output()
-    prints(output, b"first\n" + b"x" * 100_000 + b"\nlast\n")
+    os.write(output.fileno(), b"first\n" + b"x" * 100_000 + b"\nlast\n")
     lines = output.take()
     assert lines[-1] == "last"
     assert "first" not in lines
@@ -82,13 +58,13 @@ def test_no_process_can_make_it_longer_or_shorter() -> None:
     written = 0
     with pytest.raises(PermissionError):
         while True:
-            written += prints(output, b"x" * 99_999)
+            written += os.write(output.fileno(), b"x" * 99_999)
     assert written == _MOST_BYTES
     for size in (0, 2 * _MOST_BYTES):
         with pytest.raises(PermissionError):
             os.ftruncate(output.fileno(), size)
     assert output.take()[-1] == _DROPPED
-    prints(output, b"again\n")
+    os.write(output.fileno(), b"again\n")
     assert output.take() == ("again",)
     output.close()
 
@@ -98,6 +74,6 @@ def test_a_moved_position_does_no_harm(position: int) -> None:
     output = Output()
     os.lseek(output.fileno(), position, os.SEEK_SET)
     assert sum(map(len, output.take())) < _MOST_BYTES
-    prints(output, b"again\n")
+    os.write(output.fileno(), b"again\n")
     assert output.take() == ("again",)
     output.close()

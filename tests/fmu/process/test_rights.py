@@ -49,9 +49,8 @@ def test_what_was_refused_is_told_with_the_way_out() -> None:
 def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
     may, may_not = described(Rights(), ALL).split("may not")
     assert "network" in may and "programs" in may_not and "enforce" not in may_not
-    may, may_not = described(Rights((Path("/data/logs"),), programs=True, network=False), ALL).split(
-        "may not"
-    )
+    rights = Rights((Path("/data/logs"),), programs=True, network=False)
+    may, may_not = described(rights, ALL).split("may not")
     assert "/data/logs" in may and "programs" in may and "network" in may_not
     assert "other known places of keys" in may_not, "what may be changed may be read"
     may, may_not = described(Rights(readable=(Path("/home/me/.config"),)), ALL).split("may not")

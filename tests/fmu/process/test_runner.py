@@ -18,7 +18,7 @@ from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from falsifier.fmu.process.runner import Runner
 from tests import patience
 from tests.fmu import fixtures
-from tests.fmu.fixtures import isolated, run, worker
+from tests.fmu.fixtures import isolated, ramp, run, worker
 from tests.fmu.support import (
     ABORT,
     ALLOCATE,
@@ -81,8 +81,9 @@ def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
     model.close()
 
 
-def test_ending_with_the_last_step_is_a_full_trajectory() -> None:
+def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time() -> None:
     model = isolated("Misdeeds_3")
+    assert "terminated the simulation at t = 0.6 s" in str(commit(model, END))
     got = run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})
     assert got["y"].tolist() == list(range(11))
     model.close()
@@ -255,7 +256,13 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
 )
 def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: str) -> None:
     model = isolated(name)
-    found = [run(model, ("y",))["y"].tolist() for _ in range(4)]
-    assert found == [found[0]] * 4
-    assert fixtures.runner(model)._experience.reuse == reuse
+    signals = {v.name: ramp(1.0) for v in model.info.inputs}
+    found, pids = [], set()
+    for _ in range(6):
+        found.append(run(model, ("y",), signals=signals)["y"].tolist())
+        runner = fixtures.runner(model)
+        pids |= {runner._worker.pid} if runner._worker else set()
+    assert found == [found[0]] * 6 and found[0][-1] > 0
+    assert runner._experience.reuse == reuse
+    assert reuse != "library" or len(pids) == 1, "even a library that is loaded again costs no process"
     model.close()

@@ -154,13 +154,6 @@ def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyP
         run(model, ("y",))
 
 
-def test_the_description_says_that_it_runs_through_wine() -> None:
-    notes = read_info(FOLDER / "Lag_3.fmu").notes
-    assert [note for note in notes if note.startswith("win64 only")] == (
-        [libraries.windows_text()] if libraries.can_run_windows() else []
-    )
-
-
 def test_the_windows_library_of_an_fmu_without_one_is_refused() -> None:
     with pytest.raises(ModelError, match=r"Lag_2\.fmu: the FMU has no library for x86_64-windows, only "):
         FmuModel(fixtures.path("Lag_2"), windows=True)

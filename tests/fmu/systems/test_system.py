@@ -1,5 +1,3 @@
-import pickle
-
 import pytest
 
 from falsifier.core.model import Experiment
@@ -7,15 +5,6 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Coupling, System
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
-
-
-def test_systems_travel_between_processes_and_are_equal_by_content() -> None:
-    model = loop()
-    twin = pickle.loads(pickle.dumps(model))
-    assert twin == model and hash(twin) == hash(model) and twin.key == model.key
-    assert run(twin, "plant.y")["plant.y"].tolist() == run(model, "plant.y")["plant.y"].tolist()
-    for other in (loop(Coupling("jacobi")), loop(pi="Gain_3"), system({"plant": "Plant_2"}, {})):
-        assert other != model and other.key != model.key
 
 
 def test_a_connected_input_cannot_be_driven() -> None:
