@@ -7,31 +7,16 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import CandidateError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.testing import BIAS, START, EngineContract, lag_problem
+from tests.searches import Wrapped
 
 
 class Refused(Exception):
     """Some engine's own complaint."""
-
-
-class Wrapped:
-    """A uniform engine, to be broken."""
-
-    name = "wrapped"
-
-    def __init__(self, problem: Problem, seed: int) -> None:
-        self.inner = make_engine("uniform", problem, seed=seed)
-
-    def ask(self, n: int = 1) -> list[Candidate]:
-        return self.inner.ask(n)
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        self.inner.tell(evaluations)
 
 
 class OutOfRange(Wrapped):

@@ -41,14 +41,6 @@ UNITS = {"speed": "mph", "rpm": "rev/min", "throttle": "%"}
 # Sentences about an automatic transmission, and what engineers mean by them.
 SENTENCES: list[tuple[str, list[str]]] = [
     ("The speed reaches 80 within 10 s.", ["F[0,10] (speed >= 80)", "G[10,10] (speed >= 80)"]),
-    ("The speed settles at 60, give or take 3, for at least 5 s.", ["F[0,45] G[0,5] (abs(speed - 60) <= 3)"]),
-    ("Whenever the brake is pressed, speed falls below 30 within 10 s.", [
-        "G[0,40] (brake > 1 -> F[0,10] (speed < 30))",
-    ]),
-    ("Whenever the gear changes to 3 it stays there for at least 2.5 s.", [
-        "G[0,47] ((not (abs(gear - 3) <= 0.5) and X (abs(gear - 3) <= 0.5))"
-        "-> X G[0,2.5] (abs(gear - 3) <= 0.5))"
-    ]),
     ("The car does not reach 50 before the engine has reached 4000 rpm.", [
         "G[0,50] (speed < 50) or (speed < 50 or rpm >= 4000) U[0,50] (rpm >= 4000)",
         "(speed < 50) U[0,50] (rpm >= 4000)",

@@ -4,10 +4,9 @@ from typing import Any
 
 import pytest
 
-from falsifier.campaigns import Follower
 from falsifier.campaigns.directory import campaign_lock
 from falsifier.context.values import Crossing
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import SpecError
 from falsifier.record import manifest
 from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
@@ -56,17 +55,8 @@ def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> N
     assert "falsifier resume c" in stopped.stderr
     resumed = command("resume", "c", "--total", "simulations=1000", "--quiet")
     assert resumed.exit_code == 0, resumed.output
-    whole = bench(command, "--out", "whole", "--quiet")
-    times = {"simulation_seconds", "seconds"}
-    tables = [
-        [
-            {k: v for k, v in row.items() if k not in times}
-            for row in json.loads((tmp_path / d / "table.json").read_text())
-        ]
-        for d in ("c", "whole")
-    ]
-    assert tables[0] == tables[1]
-    assert whole.exit_code == 0
+    rows = json.loads((tmp_path / "c" / "table.json").read_text())
+    assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
 
 @pytest.fixture
@@ -144,8 +134,6 @@ def test_watch_follows_single_runs_too(command: Any, tmp_path: Path) -> None:
     assert "LAG surrogate, shared search seed 0: " in result.stdout
     assert "2/3 runs finished, 1 falsified, 8 simulations" in result.stdout
     assert "stopped; to continue: falsifier resume r" in result.stdout
-    with pytest.raises(JournalError, match="not a run or campaign"):
-        Follower(tmp_path)
 
 
 def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:

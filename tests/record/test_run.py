@@ -22,6 +22,7 @@ from falsifier.search.events import Event, RunStarted
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
 from tests.problems import easy, easy_again, hard, impossible
+from tests.searches import Wrapped
 
 EASY = "python:tests.problems:easy"
 
@@ -161,18 +162,10 @@ class TestResume:
         falsify(lag_problem(), "uniform", budget=2, directory=tmp_path / "problem")
         with pytest.raises(JournalError, match=r"problems=\[...\]"):
             resume(tmp_path / "problem")
-
-        class Mine:
-            name = "mine"
-
-            def __init__(self) -> None:
-                inner = make_engine("uniform", easy(), seed=0)
-                self.ask, self.tell = inner.ask, inner.tell
-
-        falsify(EASY, Mine(), budget=2, directory=tmp_path / "engine")
+        falsify(EASY, Wrapped(easy()), budget=2, directory=tmp_path / "engine")
         with pytest.raises(JournalError, match="engine="):
             resume(tmp_path / "engine")
-        (result,) = resume(tmp_path / "engine", engine=Mine(), budget=3)
+        (result,) = resume(tmp_path / "engine", engine=Wrapped(easy()), budget=3)
         assert result.spent.simulations == 3
 
     def test_a_changed_problem_is_refused(self, tmp_path: Path) -> None:

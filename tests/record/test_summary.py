@@ -3,7 +3,6 @@ from falsifier.llm.messages import ChatReply, Exchange, Message, Usage
 from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
-    EndedRecord,
     EvaluatedRecord,
     ExchangeRecord,
 )
@@ -60,16 +59,6 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
     assert (summary.status, summary.spent.seconds, summary.spent.cost) == ("falsified", 9.0, None)
 
 
-def test_what_others_do_after_a_requirement_was_falsified_is_not_its_own() -> None:
-    summary = Summary("R")
-    summary.add(evaluated(0, -1.0))
-    summary.add(confirmed(0, "confirmed", "yes", Spent(simulations=1)))
-    other = evaluated(1, 5.0).model_copy(update={"verdicts": {"S": None}})
-    summary.add(other)
-    summary.add(EndedRecord(status="not falsified", reason="S stands", spent=Spent(simulations=2)))
-    assert (status(summary), summary.reason, summary.spent.simulations) == ("falsified", "yes", 1)
-
-
 def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     summary = Summary()
     usage = Usage(prompt_tokens=100, completion_tokens=20, reasoning_tokens=5, cost=0.25)
@@ -82,11 +71,3 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     for each in (exchange, unanswered, exchange):
         summary.add(ExchangeRecord(exchange=each.model_dump(mode="json"), elapsed=1.0))
     assert (summary.spent.tokens, summary.spent.reasoning_tokens, summary.spent.cost) == (240, 10, 0.5)
-
-
-def test_a_run_that_goes_on_is_running_again() -> None:
-    summary = Summary()
-    summary.add(EndedRecord(status="interrupted", reason="", spent=Spent()))
-    assert status(summary) == "interrupted"
-    summary.add(evaluated(0, 1.0))
-    assert status(summary) == "running"

@@ -1,4 +1,3 @@
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import mostly_broken, never
 from tests.record.support import run
+from tests.searches import Wrapped, stop_after
 
 
 def test_stops_at_the_first_confirmed_violation() -> None:
@@ -101,12 +101,7 @@ def test_a_model_that_always_fails_ends_the_run_early() -> None:
 
 def test_interruption_loses_nothing(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
-
-    def interrupt(event: Event) -> None:
-        if isinstance(event, Evaluated) and event.index == 4:
-            raise KeyboardInterrupt
-
-    result = falsify(problem, "uniform", seed=1, budget=20, directory=tmp_path, listeners=[interrupt])
+    result = falsify(problem, "uniform", seed=1, budget=20, directory=tmp_path, listeners=stop_after(5))
     assert result.status == "interrupted"
     assert sum(isinstance(r, EvaluatedRecord) for r in read_journal(tmp_path)) == 5
     resumed = run(problem, tmp_path)
@@ -130,23 +125,16 @@ def test_batches_are_told_in_the_order_of_asking() -> None:
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
 
 
-class Silent:
+class Silent(Wrapped):
     """An engine whose language model gives up after two candidates."""
 
-    name = "silent"
-
-    def __init__(self, problem: Problem) -> None:
-        self.inner = make_engine("uniform", problem, seed=0)
-        self.asked = 0
+    asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:
         self.asked += 1
         if self.asked > 2:
             raise ChatError("no usable reply")
         return self.inner.ask(n)
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        self.inner.tell(evaluations)
 
 
 def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Path) -> None:

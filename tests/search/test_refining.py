@@ -14,21 +14,13 @@ from falsifier.problem.loading import load_problem
 from falsifier.record import manifest
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.refine_levels import level_results, level_starts
 from falsifier.search.result import Result
 from falsifier.testing import BIAS, FREE, START, lag_problem
 from tests.problems import fast_only
+from tests.searches import stop_after
 
 BUDGET = 30
-
-
-def stop_after(count: int) -> list[Listener]:
-    def stop(event: Event) -> None:
-        if isinstance(event, Evaluated) and event.index + 1 == count:
-            raise KeyboardInterrupt
-
-    return [stop]
 
 
 def candidates(result: Result) -> list[object]:

@@ -16,6 +16,7 @@ from falsifier.search.vacuity import Effects
 from falsifier.testing import Array, lag, lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
+from tests.searches import stop_after
 
 
 def findings(problem: Problem, budget: int = 5) -> list[Finding]:
@@ -109,12 +110,7 @@ def test_a_falsified_requirement_has_no_findings() -> None:
 
 def test_a_resumed_run_finds_the_same(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
-
-    def interrupt(event: Event) -> None:
-        if isinstance(event, Evaluated) and event.index == 2:
-            raise KeyboardInterrupt
-
-    falsify(problem, "sobol", budget=5, directory=tmp_path / "a", listeners=[interrupt])
+    falsify(problem, "sobol", budget=5, directory=tmp_path / "a", listeners=stop_after(3))
     (resumed,) = resume(tmp_path / "a", problems=[problem])
     assert resumed.findings == falsify(problem, "sobol", budget=5).findings
 

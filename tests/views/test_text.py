@@ -11,13 +11,13 @@ from falsifier.errors import ChatError
 from falsifier.llm.replay import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
-from falsifier.search.events import Evaluated, Event
 from falsifier.search.findings import Finding
 from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.text import result_json, result_text, results_text
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
+from tests.searches import stop_after
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +59,7 @@ def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:
 
 
 def test_a_run_that_can_be_continued_says_how(tmp_path: Path) -> None:
-    def interrupt(event: Event) -> None:
-        if isinstance(event, Evaluated) and event.index == 1:
-            raise KeyboardInterrupt
-
-    result = falsify(impossible(), "uniform", budget=9, directory=tmp_path, listeners=[interrupt])
+    result = falsify(impossible(), "uniform", budget=9, directory=tmp_path, listeners=stop_after(2))
     assert result.status == "interrupted"
     assert f"falsifier resume {shlex.quote(str(tmp_path))}" in result_text(result)
 

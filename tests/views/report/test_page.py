@@ -2,7 +2,7 @@
 
 import re
 from base64 import b64decode
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from itertools import pairwise
@@ -13,12 +13,11 @@ import pytest
 
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.core.candidate import Candidate
-from falsifier.engines import make_engine
-from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record.run import falsify
 from falsifier.testing import START, lag_problem
 from falsifier.views.report import html_report
 from tests.problems import easy, hard
+from tests.searches import Wrapped
 
 VOID = {"meta", "link", "br", "hr", "img"}
 EVIL = "<script>alert(1)</script> & \"quotes\" <img src=x onerror='alert(2)'>"
@@ -81,26 +80,18 @@ def parse(page: str) -> Element:
     return parser.root
 
 
-class Talker:
+class Talker(Wrapped):
     """Proposes what corners propose, and says something nasty."""
-
-    name = "talker"
-
-    def __init__(self) -> None:
-        self.inner = make_engine("corners", easy(), seed=0)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         return [replace(c, rationale=EVIL) for c in self.inner.ask(n)]
-
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        self.inner.tell(evaluations)
 
 
 @pytest.fixture(scope="module")
 def talked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run whose engine's rationale is an attack."""
     directory = tmp_path_factory.mktemp("talked")
-    falsify(easy(), Talker(), budget=5, directory=directory)
+    falsify(easy(), Talker(easy(), inner="corners"), budget=5, directory=directory)
     return directory
 
 
