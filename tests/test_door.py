@@ -40,10 +40,7 @@ def test_importing_is_cheap() -> None:
 # What a user without a type checker may write.
 untyped: Any = falsifier
 WRONG: dict[str, tuple[Callable[[], object], str]] = {
-    "a tuple of limits": (
-        lambda: untyped.InputRange("u", 0.0, 1.0, free=(3, 1)),
-        r"'u': free: .*Freedom.*\(3, 1\)",
-    ),
+    "a tuple of limits": (lambda: untyped.InputRange("u", 0.0, 1.0, free=(3, 1)), r"'u': free: .*Freedom"),
     "no formula": (lambda: untyped.parse(None), "text of a formula, got None"),
     "a number as description": (
         lambda: untyped.Requirement("R", untyped.parse("G[0,1] (x <= 1)"), description=5),

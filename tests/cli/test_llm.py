@@ -38,15 +38,6 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     assert (other.code, "run is a run of AT1 on the model" in other.err) == (2, True)
 
 
-def test_what_the_model_wrote_down_is_in_the_next_prompt(tmp_path: Path) -> None:
-    answer = json.dumps({"lessons": "braking helps", **json.loads(reply(FULL).content or "")})
-    with serving(Step(answer)) as server:
-        name = ("--llm", "openai/gpt-5-mini", "--api-base", server.url, "--out", "run")
-        falsifier("run", "AT1", *name, "--budget", "1", cwd=tmp_path, env=ENV)
-    text = falsifier("llm", "prompt", "AT1", "--after", "run", cwd=tmp_path).out
-    assert "Your lessons so far: braking helps" in text and "chosen because: " in text
-
-
 def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
     first = falsifier("llm", "prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
     assert "Propose the first sample" in first.out

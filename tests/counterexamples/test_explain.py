@@ -100,7 +100,7 @@ def test_a_language_model_is_given_the_findings_and_its_words_are_returned() -> 
         "A first-order lag.",
         "- u [V]: drive",
         explanation.text,
-        "u [V] constant 1",
+        "constant 1",
         "\n10, 0.99997, 1\n",
     ):
         assert part in f"{told}\n"

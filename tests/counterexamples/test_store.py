@@ -101,15 +101,11 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [
-        ("hello", "c.json: not a counterexample file: expected the counterexample.json of a run"),
-        ("[1]", "c.json: not a counterexample file: expected the counterexample.json of a run"),
-        ('{"format": 2}', "c.json: format: not a counterexample"),
-    ],
+    [("hello", "not a counterexample file"), ("[1]", "json of a run"), ('{"format": 2}', "format: not a")],
 )
 def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "c.json").write_text(content)
-    with pytest.raises(SpecError, match=message):
+    with pytest.raises(SpecError, match=f"c.json: .*{message}"):
         load(tmp_path / "c.json")
 
 

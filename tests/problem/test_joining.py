@@ -110,10 +110,8 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
     fmu = tmp_path / "Protocol.fmu"
     with ZipFile(fixture("Echo_2")) as old, ZipFile(fmu, "w") as new:
         for item in old.infolist():
-            stated = old.read(item).replace(
-                b'<Integer start="0"/>', b'<Integer start="0" min="0" max="5"/>', 1
-            )
-            new.writestr(item, stated)
+            limits = b'<Integer start="0" min="0" max="5"/>'
+            new.writestr(item, old.read(item).replace(b'<Integer start="0"/>', limits, 1))
     problem = Problem.from_fmu(fmu, "G[0,1] (out_Real <= 1)")
     found = {r.name: (r.low, r.high, r.kind, r.interpolation) for r in problem.space.inputs}
     assert found["in_Integer"] == (0, 5, "integer", "constant")

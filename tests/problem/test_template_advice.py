@@ -128,15 +128,8 @@ def test_every_template_has_a_section_that_can_be_filled_in() -> None:
     sentences = ["settles", "overshoot", "rise", "response", "between", "exclusive", "dwell", "ramp", "order"]
     found = {a.template: a for s in sentences for a in advised_templates(s, INFO)}
     assert found.keys() == set(TEMPLATES)
-    numbers = {
-        "REFERENCE": "8",
-        "MARGIN": "1",
-        "PER_SECOND": "2",
-        "SECONDS": "1",
-        "LOW": "0",
-        "HIGH": "9",
-        "LEVEL": "3",
-    }
+    numbers = {"REFERENCE": "8", "MARGIN": "1", "PER_SECOND": "2", "SECONDS": "1"}
+    numbers |= {"LOW": "0", "HIGH": "9", "LEVEL": "3"}
     for one in found.values():
         text = one.section
         for word, number in numbers.items():

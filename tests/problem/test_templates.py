@@ -173,18 +173,8 @@ def test_signals_are_named_with_their_arguments() -> None:
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
     text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=1"
-    assert template_arguments(text) == {
-        "template": "settles",
-        "signal": "y2-y1",
-        "reference": 80,
-        "within": "2%",
-        "after": "brake > 0.5",
-        "during": [0, 5],
-        "stays": 1,
-    }
-
-
-def test_quotes_and_lists_are_those_of_toml() -> None:
+    read = {"reference": 80, "within": "2%", "after": "brake > 0.5", "during": [0, 5], "stays": 1}
+    assert template_arguments(text) == {"template": "settles", "signal": "y2-y1"} | read
     text = """never_together conditions=["a > 1", 'F[0,2] (b > 1)'] during=[0,5]"""
     assert template_arguments(text)["conditions"] == ["a > 1", "F[0,2] (b > 1)"]
     assert template_arguments("order conditions=['a','b']")["conditions"] == ["a", "b"]

@@ -83,8 +83,6 @@ def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["Lag_1cs", "Lag_2", "Lag_3", "Arrays_3", "Aliases_3", "ClocksAndBinary_3"])
 def test_every_starter_can_be_loaded(tmp_path: Path, name: str) -> None:
-    if not fmu_path(name).is_file():
-        pytest.skip("no such fixture")
     assert loaded(written(name, tmp_path)).name == "R1"
 
 
@@ -120,7 +118,7 @@ def test_an_fmu_gets_a_starter_spec_with_this_requirement_only(tmp_path: Path) -
     fmu = Path(shutil.copy(AT, tmp_path / "car.fmu"))
     subject = subject_of(str(fmu))
     assert subject.spec == tmp_path / "car.toml"
-    text, name = with_requirement(subject, tmp_path / "car.toml", "G[0,9] (speed <= 'x')".replace("'x'", "3"))
+    text, name = with_requirement(subject, tmp_path / "car.toml", "G[0,9] (speed <= 3)")
     (tmp_path / "car.toml").write_text(text)
     assert name == "R1"
     assert str(load_problem(str(tmp_path / "car.toml")).requirement.formula) == "G[0,9] (speed <= 3)"
@@ -142,12 +140,10 @@ def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder
 def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
     subject = subject_of(spec(folder, GOOD))
     _, problem = subject.parsed("G[0,0.125] (speed <= 1)")
-    assert 0.125 / problem.experiment.output_interval == pytest.approx(
-        round(0.125 / problem.experiment.output_interval)
-    )
-    fixed = subject_of(
-        spec(folder, GOOD.replace("[inputs.throttle]", "output_interval = 0.1\n[inputs.throttle]"))
-    )
+    intervals = 0.125 / problem.experiment.output_interval
+    assert intervals == pytest.approx(round(intervals))
+    stated = GOOD.replace("[inputs.throttle]", "output_interval = 0.1\n[inputs.throttle]")
+    fixed = subject_of(spec(folder, stated))
     with pytest.raises(SpecError, match="not a multiple"):
         fixed.parsed("G[0,0.125] (speed <= 1)")
     with pytest.raises(SpecError, match="position"):

@@ -46,11 +46,8 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         summary.add(evaluated(i, robustness))
     assert (summary.best, summary.best_robustness) == (4, -3.0)
-    assert (summary.spent.simulations, summary.spent.simulation_seconds, summary.spent.seconds) == (
-        5,
-        2.5,
-        5.0,
-    )
+    spent = summary.spent
+    assert (spent.simulations, spent.simulation_seconds, spent.seconds) == (5, 2.5, 5.0)
     summary.add(confirmed(2, "fragile", "vanishes", Spent()))
     assert status(summary) == "running"
     summary.add(confirmed(4, "confirmed", "yes", Spent(simulations=5, seconds=9.0, cost=None)))

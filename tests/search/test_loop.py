@@ -10,7 +10,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace, ValueKind
 from falsifier.engines import make_engine
 from falsifier.errors import ChatError, SpecError
-from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 from falsifier.llm.replay import ScriptedChat
@@ -113,13 +113,8 @@ def test_interruption_loses_nothing(tmp_path: Path) -> None:
 def test_batches_are_told_in_the_order_of_asking() -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     with ThreadPoolExecutor(3) as executor:
-        (parallel,) = search(
-            [problem],
-            [make_engine("uniform", problem, seed=5)],
-            Budget(10),
-            jobs=4,
-            steps=Steps(executor),
-        )
+        engines = [make_engine("uniform", problem, seed=5)]
+        (parallel,) = search([problem], engines, Budget(10), jobs=4, steps=Steps(executor))
     (alone,) = search([problem], [make_engine("uniform", problem, seed=5)], Budget(10), jobs=4)
     assert len(parallel.evaluations) == 10
     assert [e.candidate.key for e in parallel.evaluations] == [e.candidate.key for e in alone.evaluations]
@@ -151,14 +146,7 @@ def test_a_silent_language_model_ends_the_run_with_everything_kept(tmp_path: Pat
 
 def test_a_refuted_violation_does_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
     def refute(problem: Problem, evaluation: Evaluation) -> Confirmation:
-        return Confirmation(
-            problem=problem,
-            evaluation=evaluation,
-            outcome="refuted",
-            robustness=0.1,
-            reference=0.1,
-            reason="did not happen again",
-        )
+        return replace(confirm(problem, evaluation), outcome="refuted", reason="did not happen again")
 
     monkeypatch.setattr("falsifier.search.steps.confirm", refute)
     result = run(lag_problem(), engine="corners", budget=4)

@@ -51,14 +51,8 @@ def test_levels_share_the_budget_equally_and_the_last_one_gets_the_rest() -> Non
 @pytest.mark.parametrize("stopped", [4, 13])
 def test_a_resumed_run_goes_on_at_the_level_on_which_it_stopped(stopped: int, tmp_path: Path) -> None:
     whole = falsify(fast_only(), "cma", budget=BUDGET, refine=True)
-    first = falsify(
-        "python:tests.problems:fast_only",
-        "cma",
-        budget=BUDGET,
-        refine=True,
-        directory=tmp_path,
-        listeners=stop_after(stopped),
-    )
+    name, stop = "python:tests.problems:fast_only", stop_after(stopped)
+    first = falsify(name, "cma", budget=BUDGET, refine=True, directory=tmp_path, listeners=stop)
     assert (first.status, len(first.evaluations)) == ("interrupted", stopped)
     (again,) = resume(tmp_path)
     assert again.falsified
@@ -104,13 +98,8 @@ def test_what_the_last_level_left_out_is_told() -> None:
 
 
 def test_a_search_that_ended_on_a_coarse_level_says_so() -> None:
-    result = falsify(
-        lag_problem("G[0,10] (x <= 2)", points=3),
-        "uniform",
-        budget=30,
-        refine=True,
-        listeners=stop_after(4),
-    )
+    problem = lag_problem("G[0,10] (x <= 2)", points=3)
+    result = falsify(problem, "uniform", budget=30, refine=True, listeners=stop_after(4))
     (told,) = [f.text for f in result.findings if f.kind == "parameterization"]
     assert "more simulations; the search ended on level 1 of 3" in told
 

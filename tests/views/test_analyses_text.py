@@ -32,15 +32,7 @@ FOUND = coverage_of(
 def test_what_was_never_tried_is_said_in_words() -> None:
     text = coverage_text(FOUND, "AT1")
     assert text.startswith("AT1: what 1 simulation tried\n")
-    for part in (
-        "throttle [%]  0 to 100  0 to 95",
-        "2 of 10",
-        "steps in 1",
-        "throttle             values 10 to 90\n",
-        "changes: slow, medium, fast and steps\n",
-        "throttle with brake  98 of 100 combinations at the same time",
-        "gear  nothing recorded; never N, D, R",
-    ):
+    for part in ("2 of 10", "steps in 1", "values 10 to 90\n", "98 of 100 combinations", "never N, D, R"):
         assert part in text, text
 
 
