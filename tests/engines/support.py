@@ -7,6 +7,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, EngineContract, lag_problem
@@ -46,6 +47,13 @@ def bowl(problem: Problem, candidate: Candidate) -> Evaluation:
 
     distance = problem.space.encode(candidate) - TARGET
     return Evaluation(candidate, verdict=Verdict(1.0 + 4.0 * float(distance @ distance), 0.0, "bowl"))
+
+
+def doubtful(problem: Problem, evaluation: Evaluation) -> Confirmation:
+    """A violation of robustness -1 that does not count, because it is fragile."""
+    return Confirmation(
+        problem=problem, evaluation=evaluation, outcome="fragile", robustness=-1.0, reference=-1.0, reason=""
+    )
 
 
 def best_of(name: str, *, simulations: int) -> float:

@@ -148,14 +148,6 @@ def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_d
     assert len(script.notes) > 2, "it was asked again"
 
 
-def test_after_the_trial_an_answer_is_simulated_while_predictions_are_not_trusted() -> None:
-    problem = wide_problem()
-    script = Script([[-1.0], [0.0], [-0.5]], problem)
-    engine = Hybrid(problem, seed=0, adviser=script, settings=Settings(misses=0), surrogate_settings=SETTINGS)
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=8)
-    assert course(asked) == "LSL" + 4 * "S" + "L"
-
-
 def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
@@ -168,14 +160,6 @@ def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told(
         note for note in script.notes[2] if "was not simulated: sample 1 differs from it by at most" in note
     ]
     assert len(told) == 1 and "10 % of each range" in told[0]
-
-
-def test_of_one_answer_what_is_new_comes_before_what_repeats_a_sample() -> None:
-    problem = wide_problem()
-    engine, _ = hybrid(problem, [[-1.0], [-1.1, 1.5]])
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=3)
-    assert course(asked) == "LSL"
-    assert asked[2].signals["u"].values == pytest.approx((1.5,), abs=0.01)
 
 
 @pytest.mark.parametrize("rounding", [0.0, 1e-6])

@@ -96,14 +96,6 @@ def test_a_free_signal_is_read_at_the_fixed_control_points_and_does_not_represen
     assert BOX.point(step).tolist() == [0, 0, 1, 1, 0.5, 0.5, 0.5, 0.5, 0]
 
 
-def test_a_range_of_one_value_has_a_coordinate_without_effect() -> None:
-    (u,) = lag_problem().space.inputs
-    box = fixed_layout(replace(lag_problem().space, inputs=(replace(u, low=0.5, high=0.5),)))
-    candidate = box.candidate(np.array([0.0, 0.3, 0.7, 1.0]), origin="", rationale="")
-    assert set(candidate.signals["u"].values) == {0.5}
-    assert box.point(candidate).tolist() == [0.0] * 4
-
-
 class Noting(BoxEngine):
     """Proposes random points and notes what it is told."""
 

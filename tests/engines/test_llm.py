@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ from falsifier.engines import make_engine
 from falsifier.engines.llm import LLMEngine, random_change
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
@@ -26,6 +26,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.events import Event, Exchanged
 from falsifier.search.result import Result
 from falsifier.testing import START, EngineContract, lag_problem
+from tests.engines.support import doubtful
 from tests.llm.server import Step, serving
 
 
@@ -38,17 +39,10 @@ def transmission_reply(throttle: list[float], brake: list[float]) -> str:
     return json.dumps({"rationale": "because", "signals": signals})
 
 
-@pytest.mark.parametrize("form", ["json", "point"])
-def test_transmission_in_two_simulations(form: str) -> None:
+def test_transmission_in_two_simulations() -> None:
     problem = load_problem("AT1")
     first, second = [100.0] * 3 + [0.0] * 4, [100.0] * 7
-    answers = [
-        transmission_reply(t, [0.0] * 3)
-        if form == "json"
-        else f"<point>{', '.join(map(str, [*t, 0, 0, 0]))}</point>"
-        for t in (first, second)
-    ]
-    with serving(*(Step(a) for a in answers)) as server:
+    with serving(*(Step(transmission_reply(t, [0.0] * 3)) for t in (first, second))) as server:
         chat = LiteLLMChat("openai/gpt-5-mini", effort="high", api_base=server.url)
         events: list[Event] = []
         engine = LLMEngine(problem, chat, variant="MP4")
@@ -56,7 +50,7 @@ def test_transmission_in_two_simulations(form: str) -> None:
     assert result.status == "falsified"
     assert [e.robustness for e in result.evaluations] == pytest.approx([0.419, -0.213], abs=1e-3)
     assert result.evaluations[1].candidate.origin == "openai/gpt-5-mini MP4"
-    assert result.evaluations[1].candidate.rationale == ("because" if form == "json" else "")
+    assert result.evaluations[1].candidate.rationale == "because"
     assert [r.body["reasoning_effort"] for r in server.received] == ["high", "high"]
     opening, following = (r.texts[-1] for r in server.received)
     assert "Sample" not in opening
@@ -134,17 +128,7 @@ def test_a_violation_that_does_not_count_is_told_with_the_reason() -> None:
     (found,) = engine.ask()
     evaluation = evaluate(problem, found)
     assert evaluation.violated
-    engine.doubt(
-        Confirmation(
-            problem=problem,
-            evaluation=evaluation,
-            outcome="fragile",
-            robustness=evaluation.robustness,
-            reference=evaluation.robustness,
-            reason="",
-            halved=0.5,
-        )
-    )
+    engine.doubt(replace(doubtful(problem, evaluation), robustness=evaluation.robustness, halved=0.5))
     engine.tell([evaluation])
     engine.ask()
     asked = chat.requests[-1].messages[1].content

@@ -62,12 +62,6 @@ def test_annealing_gets_deeper_than_a_few_random_points() -> None:
     assert best_of("annealing", simulations=150) < best_of("uniform", simulations=10)
 
 
-@pytest.mark.parametrize("name", ["annealing", "cma", "bayesian", "optuna", "botorch"])
-def test_candidates_that_are_asked_for_at_once_are_all_different(name: str) -> None:
-    made_if_installed(name)
-    assert len({c.key for c in make_engine(name, box_problem(), seed=3).ask(12)}) == 12
-
-
 @pytest.mark.parametrize("name", ["optuna", "botorch"])
 def test_in_a_known_valley_it_does_not_ask_for_the_same_place_several_times_at_once(name: str) -> None:
     made_if_installed(name)

@@ -9,12 +9,12 @@ from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.engines.refining import COPIES, Refining, Stage
 from falsifier.engines.simple import Uniform
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.problem.refinement import level_spaces
 from falsifier.stl import Verdict
-from falsifier.testing import FREE, EngineContract, drive, lag_problem, simulated
+from falsifier.testing import FREE, EngineContract, drive, lag_problem
+from tests.engines.support import doubtful
 
 PROBLEM = lag_problem(free=FREE, points=3)
 
@@ -116,35 +116,17 @@ def test_what_was_simulated_on_an_earlier_level_is_told_and_not_asked_for_again(
     assert second.told[1].robustness == judge(asked[0]).robustness
 
 
-def test_known_inputs_that_a_coarse_level_cannot_express_wait_for_a_finer_one() -> None:
-    coarse, fine, _ = spaces(free=True)
-    known = Candidate({"u": Signal((0.0, 2.5), (-1.0, 1.0), "constant")})
-    first, second = listening(coarse), listening(fine)
-    engine = Refining([Stage(first, coarse, 0), Stage(second, fine, 2)])
-    engine.tell([judge(known)])
-    drive(engine, simulated(PROBLEM, lambda x: 1.0), rounds=2)
-    assert known.key not in {e.candidate.key for e in first.told}
-    assert known.key in {e.candidate.key for e in second.told}
-
-
 def test_a_violation_that_does_not_count_is_told_to_the_next_level_too() -> None:
     coarse, fine, _ = spaces(free=True)
     second = listening(fine)
     engine = Refining([Stage(listening(coarse), coarse, 0), Stage(second, fine, 1)])
     engine.begin(5)
     candidate = engine.ask()[0]
-    doubtful = Confirmation(
-        problem=PROBLEM,
-        evaluation=judge(candidate),
-        outcome="fragile",
-        robustness=-1.0,
-        reference=-1.0,
-        reason="",
-    )
-    engine.doubt(doubtful)
+    doubt = doubtful(PROBLEM, judge(candidate))
+    engine.doubt(doubt)
     engine.tell([judge(candidate)])
     engine.ask()
-    assert second.doubted == [doubtful]
+    assert second.doubted == [doubt]
 
 
 def test_remarks_are_those_of_the_engines_that_were_asked() -> None:

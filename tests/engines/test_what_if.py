@@ -110,21 +110,6 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
     assert shown == sent[0].tools[0]
 
 
-def test_candidates_are_described_as_the_model_knows_them() -> None:
-    made = wide_problem().space.decode([0.5, 1.0, -1.0, 2.0])
-    told = {
-        (variant, anonymous): LLMEngine(
-            wide_problem(), ScriptedChat([]), variant=variant, anonymous=anonymous
-        ).briefing.describe(made)
-        for variant in ("MP1", "MP5")
-        for anonymous in (False, True)
-    }
-    assert told["MP5", False].startswith("u linear: 0.5 at 0 s, 1 at 3.333 s")
-    assert told["MP5", True].startswith("u1 linear: 0.625 at 0 s, 0.75 at 3.333 s")
-    assert told["MP1", False] == "point = [0.5, 1, -1, 2]"
-    assert told["MP1", True] == "point = [0.625, 0.75, 0.25, 1]"
-
-
 class TestResume:
     """A run that was killed in the middle of a turn goes on with the same candidate."""
 

@@ -66,17 +66,6 @@ WIRES = [
         options={"temperature": 0.5},
     ),
     Wire(
-        "openai/some-model",
-        {
-            "model": "some-model",
-            "reasoning_effort": "low",
-            "response_format": STRICT,
-            "temperature": 0.5,
-        },
-        header=("authorization", "Bearer sk-openai-secret"),
-        options={"temperature": 0.5},
-    ),
-    Wire(
         "hosted_vllm/openai/gpt-oss-20b",
         {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
         header=None,

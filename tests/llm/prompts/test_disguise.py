@@ -12,7 +12,6 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.engines.briefing import preview
 from falsifier.engines.llm import LLMEngine
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate, start_values
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
@@ -22,6 +21,7 @@ from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem
+from tests.engines.support import doubtful
 
 WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|integer"
 # Ends of ranges, thresholds, and a factor of a threshold, each as a number of its own.
@@ -209,16 +209,7 @@ def test_doubts_and_start_values_are_scaled() -> None:
     chat = ScriptedChat(['{"point": [0.5, 0.5, 0.5, 0.5, 0.5]}'])
     engine = LLMEngine(problem, chat, anonymous=True)
     engine.tell([violation])
-    engine.doubt(
-        Confirmation(
-            problem=problem,
-            evaluation=violation,
-            outcome="refuted",
-            robustness=0.585,
-            reference=None,
-            reason="",
-        )
-    )
+    engine.doubt(replace(doubtful(problem, violation), outcome="refuted", robustness=0.585, reference=None))
     engine.ask()
     sent = text_of(chat.requests)
     assert "a second simulation gave robustness +0.135. " in sent

@@ -1,22 +1,16 @@
 """What is seen of one sample, on trajectories made by hand."""
 
-import re
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts.observations import monitor_for, observed
 from falsifier.llm.prompts.view import View
-from falsifier.problem.requirement import Requirement
-from falsifier.stl import parse
-from falsifier.testing import Array, lag_problem
+from falsifier.testing import lag_problem
 
 TIMES = lag_problem().experiment.times
 
@@ -118,23 +112,3 @@ def test_without_a_trajectory_there_is_the_verdict_alone() -> None:
     bare = Evaluation(found.candidate, "ok", found.verdict)
     assert facts(View.of(problem), bare) == ["decided at t = 10 s by x <= 0.9"]
     assert observed(View.of(problem), found).line == "decided at t = 10 s by x <= 0.9"
-
-
-def test_no_more_signals_than_can_be_read() -> None:
-    def many(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
-        return {f"y{i}": np.sin(times + i) for i in range(40)}
-
-    problem = lag_problem()
-    names = tuple(f"y{i}" for i in range(40))
-    variables = tuple(Variable(n, causality="output") for n in names)
-    info = ModelInfo("many", variables=(*problem.info.variables[:1], *variables))
-    problem = replace(
-        problem,
-        model=FunctionModel(many, info),
-        requirement=Requirement("MANY", parse("G[0,10] (y7 <= 2)")),
-        experiment=replace(problem.experiment, outputs=names),
-    )
-    lines = facts(View.of(problem), evaluate(problem, problem.space.decode([0.0] * 4)))
-    told = {each.split(":")[0] for each in lines if re.match(r"y\d+: ", each)}
-    assert len(told) == 16
-    assert "y7" in told, "those of the formula come first"

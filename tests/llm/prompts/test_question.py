@@ -143,16 +143,6 @@ def test_doubts_are_told_and_the_budget_by_own_variants_only(variant: str) -> No
     assert ("30 simulations" in text and "; at t = 0:" in text) == (variant in ("MP5", "MP6"))
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
-def test_requirements_over_inputs_only_and_samples_without_trajectory(variant: str) -> None:
-    problem = lag_problem("G[0,10] (u <= 0.5)")
-    assert told(problem, variant, sampled(problem, [0, 0, 0, 0]))
-    (bare,) = sampled(lag_problem(), [0.5] * 4)
-    _, changing = told(lag_problem(), variant, [replace(bare, trajectory=None)])
-    if variant in ("MP4", "MP5"):
-        assert "decided at t = 10" in changing
-
-
 def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9)")
     mode = Variable("x", kind="enumeration", literals={"Idle": 0, "Run": 1})

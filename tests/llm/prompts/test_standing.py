@@ -119,13 +119,6 @@ def test_whole_numbers_are_asked_for() -> None:
     assert '"values": [1.0, 2.0, 1.0, 2.0]' in gears
 
 
-@pytest.mark.parametrize("variant", ["MP2", "MP3", "MP4"])
-def test_booleans_are_told_as_such_by_published_variants_with_names(variant: str) -> None:
-    text = kind_of_input(variant, kind="boolean", low=0.0, high=1.0)
-    assert "1: u at t = 0.0 s, 0 (false) or 1 (true)" in text
-    assert "1, from 0 to 1" in kind_of_input("MP1", kind="boolean", low=0.0, high=1.0)
-
-
 def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None:
     problem = lag_problem()
     assert "; at t = 0: 0.25\n" in standing(problem, start={"x": (0.25, 0.25)})
