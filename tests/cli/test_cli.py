@@ -126,13 +126,6 @@ def test_a_shell_completes_what_is_typed(typed: str, completed: str, tmp_path: P
     assert (done.code, completed in done.out.splitlines()) == (0, True)
 
 
-def test_help_of_run_has_headings(tmp_path: Path) -> None:
-    text = falsifier("run", "--help", cwd=tmp_path).out
-    headings = ("What is searched:", "Search:", "Budget:", "Language model:", "Output:")
-    assert [text.count(f"\n{heading}\n") for heading in headings] == [1] * len(headings)
-    assert "\nOptions:" not in text, "each option has a heading"
-
-
 def test_a_closed_pipe_is_not_a_falsification(tmp_path: Path) -> None:
     program = f"{shlex.quote(sys.executable)} -c 'from falsifier.cli import main; main()'"
     command = program + " info AT.fmu | true; echo ${PIPESTATUS[0]}"

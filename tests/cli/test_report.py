@@ -1,5 +1,4 @@
 import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +58,6 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     assert "row 1, AT2: reproduced, robustness -" in result.stdout
     assert "row 2, AT2: not reproduced, robustness +" in result.stdout
     assert "1 of 2 counterexamples accepted" in result.stdout
-    (found, other) = json.loads(command("tools", "validate", "v.csv", "--json").stdout)
-    assert (found["holds"], other["holds"]) == (True, False)
 
 
 NEVER = "python:tests.problems:impossible"

@@ -3,7 +3,7 @@ from dataclasses import replace
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
-from falsifier.counterexamples.simplicity import digits, rest_value, rounder, simplicity
+from falsifier.counterexamples.simplicity import rest_value, simplicity
 from falsifier.testing import lag_problem
 
 FREE = Freedom(max_control_points=20, min_interval=0.1)
@@ -38,10 +38,3 @@ def test_rest_is_the_start_value_within_the_range() -> None:
     moved = replace(problem.space.inputs[0], low=0.2)
     space = replace(problem.space, inputs=(moved,))
     assert rest_value(replace(problem, space=space), "u") is None
-
-
-def test_digits_and_rounder_numbers() -> None:
-    assert [digits(v) for v in (0.0, 100.0, 0.05, -33.25, 1e-7)] == [1, 1, 1, 4, 1]
-    assert list(rounder(33.25)) == [30.0, 40.0, 33.0, 34.0, 33.2, 33.3]
-    assert list(rounder(-0.12)) == [-0.1, -0.2]
-    assert list(rounder(7.0)) == []

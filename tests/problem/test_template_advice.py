@@ -117,13 +117,6 @@ def test_a_template_without_a_place_for_a_number_is_not_proposed(sentence: str) 
     assert advised_templates(sentence, MODEL) == []
 
 
-def test_advice_is_a_section_to_fill_in() -> None:
-    advice = advised_templates("The speed reaches 80 in 10 s.", INFO)[0]
-    assert advice.section.splitlines()[:3] == ["[requirements.NAME]", 'template = "rise"', 'signal = "speed"']
-    spec = parse_spec(tomllib.loads(f'[model]\nfmu = "a.fmu"\n{advice.section}'), file="my.toml")
-    assert spec.requirements["NAME"].expanded(50.0) == "F[0,10] (speed >= 80)"
-
-
 def test_every_template_has_a_section_that_can_be_filled_in() -> None:
     sentences = ["settles", "overshoot", "rise", "response", "between", "exclusive", "dwell", "ramp", "order"]
     found = {a.template: a for s in sentences for a in advised_templates(s, INFO)}

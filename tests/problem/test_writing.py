@@ -114,17 +114,6 @@ def test_in_another_folder_the_fmu_is_found(folder: Path) -> None:
     assert load_problem(f"{out}:N").name == "N"
 
 
-def test_an_fmu_gets_a_starter_spec_with_this_requirement_only(tmp_path: Path) -> None:
-    fmu = Path(shutil.copy(AT, tmp_path / "car.fmu"))
-    subject = subject_of(str(fmu))
-    assert subject.spec == tmp_path / "car.toml"
-    text, name = with_requirement(subject, tmp_path / "car.toml", "G[0,9] (speed <= 3)")
-    (tmp_path / "car.toml").write_text(text)
-    assert name == "R1"
-    assert str(load_problem(str(tmp_path / "car.toml")).requirement.formula) == "G[0,9] (speed <= 3)"
-    assert subject_of(str(fmu)).is_new, "whether its spec is in the way depends on where is written"
-
-
 def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder(tmp_path: Path) -> None:
     fmu = Path(shutil.copy(AT, tmp_path / "car.fmu"))
     path = tmp_path / "car.toml"

@@ -48,13 +48,8 @@ def test_one_requirement_of_several_is_a_manifest_of_its_own() -> None:
         DESCRIBED.of("AT3")
 
 
-def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(JournalError, match=str(tmp_path)):
-        manifest.read(tmp_path)
+def test_a_key_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     content = DESCRIBED.model_dump(mode="json") | {"stop_time": "late"}
     write_manifest(tmp_path, content)
     with pytest.raises(JournalError, match="stop_time"):
-        manifest.read(tmp_path)
-    (tmp_path / "manifest.json").write_text("{")
-    with pytest.raises(JournalError, match="is damaged"):
         manifest.read(tmp_path)

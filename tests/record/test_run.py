@@ -173,10 +173,6 @@ class TestResume:
         with pytest.raises(JournalError, match="LAG has changed"):
             resume(tmp_path, problems=[lag_problem(limit=2.0)])
 
-    def test_no_run_no_resumption(self, tmp_path: Path) -> None:
-        with pytest.raises(JournalError, match="not a run directory"):
-            resume(tmp_path)
-
 
 def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Path) -> None:
     problem = load_problem("AT1")

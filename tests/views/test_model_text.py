@@ -1,8 +1,6 @@
-from dataclasses import replace
-
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import Connection, Coupling, Frame, System, read_info
-from falsifier.views.model_text import MOST_PORTS, diagram, diagram_text, info_text, model_json
+from falsifier.views.model_text import diagram, diagram_text, info_text, model_json
 from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, component, system
 
@@ -62,15 +60,3 @@ def test_iterated_loops_are_named_and_one_component_has_no_order() -> None:
     assert "plant, pi: repeated until the outputs agree" in text and "late" not in text
     single = diagram_text(diagram(system({"a": "Plant_2"}, {})))
     assert single.startswith("system: 1 component (gauss-seidel)")
-
-
-def test_of_many_ports_the_connected_ones_are_shown() -> None:
-    model = system({"a": "Plant_2", "b": "Plant_2"}, {"b.u": "a.y"})
-    (first, second) = model.network.members
-    more = tuple(Variable(f"in{k}", causality="input") for k in range(MOST_PORTS + 3))
-    info = second.description.info
-    wide = replace(second.description, info=replace(info, variables=(*more, *info.variables)))
-    object.__setattr__(model.network, "members", (first, replace(second, description=wide)))
-    box = diagram(model).boxes[1]
-    assert len(box.inputs) == MOST_PORTS and box.inputs[0].name == "u" and box.left_out == 4
-    assert "... and 4 more that are not connected" in diagram_text(diagram(model))
