@@ -29,6 +29,10 @@ KEYS = (
         ("MYPASS", "x"),
         ("GH_PAT", "x"),
         ("SESSION_JWT", "x"),
+        ("myPASSPHRASE", "x"),
+        ("A_B_CREDENTIALS_1", "x"),
+        ("MY_ACCESS_KEYS", "x"),
+        ("ADDRESS", "https://me:hunter22@host"),
         *(("PLAIN", key) for key in KEYS),
     ],
 )

@@ -24,7 +24,6 @@ def path(name: str) -> Path:
 
 
 def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:
-    """A test FMU."""
     return FmuModel(path(name), interface)
 
 
@@ -58,11 +57,9 @@ def run(
     tolerance: float | None = None,
     time_limit: float = HANG,
 ) -> Trajectory:
-    """Simulate once."""
     experiment = Experiment(stop, interval, tuple(outputs), step_size, tolerance, time_limit)
     return model.simulate(signals or {}, parameters or {}, experiment)
 
 
 def ramp(stop: float, slope: float = 1.0) -> Signal:
-    """The signal slope * t."""
     return Signal((0.0, stop), (0.0, slope * stop), "linear")

@@ -21,19 +21,16 @@ def system(
     connections: Mapping[str, str | Connection],
     coupling: Coupling | None = None,
 ) -> System:
-    """A system of test FMUs."""
     found = {n: path(each) if isinstance(each, str) else each for n, each in components.items()}
     return System(found, connections, coupling=coupling or Coupling())
 
 
 def pids(model: System) -> list[int]:
-    """The worker processes of a system."""
     workers = [runner._worker for runner in fixtures.runners(model)]
     return [worker.pid for worker in workers if worker is not None]
 
 
 def loop(coupling: Coupling | None = None, *, plant: str = "Plant_2", pi: str = "Gain_2") -> System:
-    """The controlled plant."""
     return system({"plant": plant, "pi": pi}, LOOP, coupling)
 
 
@@ -52,10 +49,8 @@ def sampled_loop(late: int, *, steps: int = 10, step: float = STEP, gain: float 
 
 
 def solved(name: str, step: float | None = None) -> Component:
-    """A component of model exchange."""
     return Component(Path(path(name)), step, "model-exchange")
 
 
 def component(name: str, step: float) -> Component:
-    """A component with a step of its own."""
     return Component(Path(path(name)), step)

@@ -54,7 +54,6 @@ def test_every_type_goes_in_rounded_and_comes_out(name: str) -> None:
             "boolean": (points >= 0.5).astype(float),
         }.get(variable.kind, np.rint(raw))
         np.testing.assert_allclose(got[variable.name][1:], expected, err_msg=variable.name)
-    model.close()
 
 
 def test_elements_of_arrays_are_driven_set_and_recorded_alone() -> None:

@@ -7,33 +7,28 @@ Damage = Callable[[bytes, Random], bytes]
 
 
 def flip(content: bytes, random: Random) -> bytes:
-    """Flip one bit."""
     changed = bytearray(content)
     changed[random.randrange(len(changed))] ^= 1 << random.randrange(8)
     return bytes(changed)
 
 
 def cut(content: bytes, random: Random) -> bytes:
-    """Lose the end."""
     return content[: random.randrange(len(content))]
 
 
 def lose_line(content: bytes, random: Random) -> bytes:
-    """Lose a line."""
     lines = content.splitlines(keepends=True)
     del lines[random.randrange(len(lines))]
     return b"".join(lines)
 
 
 def double_line(content: bytes, random: Random) -> bytes:
-    """Repeat a line somewhere."""
     lines = content.splitlines(keepends=True)
     lines.insert(random.randrange(len(lines) + 1), random.choice(lines))
     return b"".join(lines)
 
 
 def swap_lines(content: bytes, random: Random) -> bytes:
-    """Swap two lines."""
     lines = content.splitlines(keepends=True)
     i, j = random.randrange(len(lines)), random.randrange(len(lines))
     lines[i], lines[j] = lines[j], lines[i]

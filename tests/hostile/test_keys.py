@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from falsifier.core.secrets import holds_credentials, redact, redact_held
 from falsifier.errors import ChatSetupError
-from falsifier.fmu.process.workplace import worker_environment
 from falsifier.search.request import LLMSettings
 from tests.command import Done, falsifier
 from tests.hostile.servers import Behaviour, answers, completion, misbehaving, response, sends
@@ -21,24 +20,7 @@ OTHER = "another-plain-value"
 LETTERS = string.ascii_letters + string.digits
 PREFIXES = ["sk-", "hf_", "gsk_", "xai-", "nvapi-", "pplx-", "github_pat_", "ghp_", "glpat-", "xoxb-"]
 KEYS = st.tuples(st.sampled_from(PREFIXES), st.text(LETTERS, min_size=20, max_size=60)).map("".join)
-NAMES = st.tuples(
-    st.sampled_from(["", "MY_", "my", "A_B_"]),
-    st.sampled_from(
-        ["API_KEY", "TOKEN", "SECRET", "PASSWORD", "PASS", "PASSPHRASE", "JWT", "CREDENTIALS", "ACCESS_KEY"]
-    ),
-    st.sampled_from(["", "_1", "S"]),
-).map("".join)
 TEXTS = st.text(st.sampled_from(" .,;:'\"()\n=äx"), max_size=5)
-
-
-@given(NAMES, st.text(LETTERS, min_size=1))
-def test_no_variable_with_the_name_of_a_secret_reaches_an_fmu(name: str, value: str) -> None:
-    assert name not in worker_environment({name: value}, Path())
-
-
-@given(KEYS)
-def test_no_variable_with_the_value_of_a_key_reaches_an_fmu(key: str) -> None:
-    assert "PLAIN" not in worker_environment({"PLAIN": key, "ADDRESS": f"https://me:{key}@host"}, Path())
 
 
 @given(KEYS, TEXTS, TEXTS)

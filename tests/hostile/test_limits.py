@@ -109,20 +109,11 @@ def stated(value: str, **headers: str) -> float | None:
     return found.retry_after
 
 
-NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
-
-
-def test_a_date_is_when_to_ask_again_by_the_servers_clock() -> None:
-    later = format_datetime(NOW + timedelta(seconds=70), usegmt=True)
-    assert stated(later, date=format_datetime(NOW, usegmt=True)) == 70.0
-
-
-def test_a_date_without_the_servers_clock_is_compared_with_this_machines() -> None:
-    later = format_datetime(datetime.now(UTC) + timedelta(hours=10), usegmt=True)
-    found = stated(later)
-    assert found is not None and 9 * 3600 < found <= 10 * 3600
-
-
-@pytest.mark.parametrize(("value", "seconds"), [("7", 7.0), ("-5", 0.0), ("nan", None), ("inf", None)])
-def test_a_number_is_taken_if_it_is_one(value: str, seconds: float | None) -> None:
-    assert stated(value) == seconds
+def test_a_number_is_taken_if_it_is_one_and_a_date_is_when_to_ask_again() -> None:
+    assert [stated(value) for value in ("7", "-5", "nan", "inf")] == [7.0, 0.0, None, None]
+    now = datetime.now(UTC)
+    clock = format_datetime(now - timedelta(days=30), usegmt=True)
+    later = format_datetime(now - timedelta(days=30, seconds=-70), usegmt=True)
+    assert stated(later, date=clock) == 70.0, "by the server's clock"
+    found = stated(format_datetime(now + timedelta(hours=10), usegmt=True))
+    assert found is not None and 9 * 3600 < found <= 10 * 3600, "by this machine's"

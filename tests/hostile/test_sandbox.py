@@ -69,11 +69,6 @@ class Place:
     def home(self) -> Path:
         return self.root / "home"
 
-    @property
-    def work(self) -> Path:
-        """Where falsifier and the FMUs have their folders."""
-        return self.root / "tmp"
-
     def run(
         self,
         misdeed: int,

@@ -71,4 +71,3 @@ def test_a_hang_is_ended_where_no_tenth_of_the_time_is_simulated(monkeypatch: py
     with pytest.raises(SimulationError, match=r"at t = 0\.5 s .*without another tenth") as caught:
         model.simulate({}, {"misdeed": HANG}, Experiment(1.0, 0.1, ("y",), tolerance=1e-7))
     assert caught.value.status == "timeout" and caught.value.time == 0.5
-    model.close()

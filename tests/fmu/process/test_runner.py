@@ -78,7 +78,6 @@ def test_misdeeds_are_failed_simulations(misdeeds: FmuModel, misdeed: int, statu
 def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
     model = isolated(name)
     assert commit(model, misdeed).status == status
-    model.close()
 
 
 def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time() -> None:
@@ -86,7 +85,6 @@ def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time() -> None:
     assert "terminated the simulation at t = 0.6 s" in str(commit(model, END))
     got = run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})
     assert got["y"].tolist() == list(range(11))
-    model.close()
 
 
 def test_an_endless_loop_is_stopped_at_the_time_limit(misdeeds: FmuModel) -> None:
@@ -122,7 +120,6 @@ def test_each_fmu_has_a_worker_of_its_own_without_secrets(
     assert len(pids) == 2
     if sys.platform == "linux":
         assert all("hidden" not in Path(f"/proc/{pid}/environ").read_text() for pid in pids)
-    other.close()
 
 
 def test_a_worker_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
@@ -226,7 +223,6 @@ def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None
         found = fixtures.runner(model)._worker
         pids |= {found.pid} if found else set()
     assert len(pids) == 2
-    model.close()
 
 
 @pytest.mark.parametrize("name", ["SavedState_2", "SavedState_3"])
@@ -238,7 +234,6 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
     for _ in range(5 * _MOST_INSTANCES):
         assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
     assert worker(model).pid == pid
-    model.close()
 
 
 @pytest.mark.parametrize(
@@ -265,4 +260,3 @@ def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: s
     assert found == [found[0]] * 6 and found[0][-1] > 0
     assert runner._experience.reuse == reuse
     assert reuse != "library" or len(pids) == 1, "even a library that is loaded again costs no process"
-    model.close()

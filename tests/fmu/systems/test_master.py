@@ -12,6 +12,7 @@ from falsifier.fmu import Component, Coupling
 from falsifier.fmu.systems.network import Method
 from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, STEP, loop, run, sampled_loop, solved, system
+from tests.fmu.support import ERROR, NAN
 
 DELAY = Coupling(loops="delay")
 
@@ -89,22 +90,26 @@ def test_a_step_that_does_not_converge_is_named_with_its_variables() -> None:
     assert run(model, "plant.y", signals=late, parameters={"pi.k": 0.5})["plant.y"][-1] > 0.0
 
 
-def test_components_of_a_loop_that_fail_while_they_iterate_are_named() -> None:
-    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
-    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Misdeeds_2"}, links, Coupling(loops="iterate"))
-    with pytest.raises(SimulationError, match=r"^bad: the step returned error at t = 0\.5 s"):
-        run(model, "plant.y", parameters={"bad.misdeed": 9, "pi.k": 1.0})
+# The controlled plant with a third component, which gives the reference.
+LED = {**LOOP, "pi.r": "bad.y"}
 
 
-@pytest.mark.parametrize("coupling", [Coupling(), Coupling(method="jacobi"), Coupling(loops="iterate")])
-def test_an_output_that_becomes_nan_is_named_and_not_the_component_that_receives_it(
-    coupling: Coupling,
+@pytest.mark.parametrize(
+    ("coupling", "misdeed", "said"),
+    [
+        (Coupling(), NAN, r"bad\.y became nan"),
+        (Coupling("jacobi"), NAN, r"bad\.y became nan"),
+        (Coupling(loops="iterate"), NAN, r"bad\.y became nan"),
+        (Coupling(loops="iterate"), ERROR, "the step returned error"),
+    ],
+)
+def test_a_component_that_fails_is_named_and_not_the_one_that_receives_its_output(
+    coupling: Coupling, misdeed: float, said: str
 ) -> None:
-    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
     plant = "Lead_2" if coupling.loops == "iterate" else "Plant_2"
-    model = system({"plant": plant, "pi": "Gain_2", "bad": "Misdeeds_2"}, links, coupling)
-    with pytest.raises(SimulationError, match=r"^bad: bad\.y became nan at t = 0\.5 s"):
-        run(model, "plant.x", parameters={"bad.misdeed": 5.0, "pi.k": 1.0})
+    model = system({"plant": plant, "pi": "Gain_2", "bad": "Misdeeds_2"}, LED, coupling)
+    with pytest.raises(SimulationError, match=rf"^bad: {said} at t = 0\.5 s"):
+        run(model, "plant.x", parameters={"bad.misdeed": misdeed, "pi.k": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -114,8 +119,7 @@ def test_an_output_that_becomes_nan_is_named_and_not_the_component_that_receives
 def test_an_output_that_is_nan_at_time_0_is_named_and_not_the_loop_that_it_spreads_in(
     parameter: str, named: str
 ) -> None:
-    links = {"plant.u": "pi.y", "pi.measured": "plant.y", "pi.r": "bad.y"}
-    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Gain_3"}, links, DELAY)
+    model = system({"plant": "Lead_2", "pi": "Gain_2", "bad": "Gain_3"}, LED, DELAY)
     with pytest.raises(SimulationError, match=f"^{named} is nan at t = 0 s, in the init") as failed:
         run(model, "plant.x", parameters={"pi.k": 0.5, parameter: float("nan")})
     assert failed.value.time == 0.0

@@ -43,7 +43,6 @@ def test_in_a_worker_it_simulates_the_same_and_a_component_that_crashes_is_named
     assert getattr(crash.value, "status", "") == "crashed"
     with pytest.raises(Exception, match=r"^bad: the step returned error at t = 0\.5 s.*the tank is empty"):
         run(model, "plant.x", parameters={"bad.misdeed": 9})
-    model.close()
 
 
 def test_variables_have_the_names_of_their_components() -> None:
