@@ -259,8 +259,9 @@ class _Reader:
         sinks: list[End] = []
         for (element, name), title in zip((wire.start, wire.end), shown, strict=True):
             path = at if element is None else f"{at}.{element}" if at else element
-            if element is not None and path not in self._elements:
-                near = did_you_mean(element, (child.name for child in system.parts))
+            children = [child.name for child in system.parts]
+            if element is not None and element not in children:
+                near = did_you_mean(element, children)
                 raise self._wrong(f"{text} names the unknown element {element!r}; {near}")
             connector = self._connectors.get((path, name))
             if connector is None:

@@ -129,6 +129,9 @@ MAPPED = FEEDBACK.replace('"u"/>', '"u"><ssc:IntegerMappingTransformation/></ssd
 ITSELF = '<ssd:Component name="me" source="SystemStructure.ssd" type="application/x-ssp-definition"/>'
 DEEP = '<ssd:System name="a"><ssd:Elements>' * 1500 + "</ssd:Elements></ssd:System>" * 1500
 BUS = '<ssd:SignalDictionaryReference name="bus" dictionary="d"/>'
+INNER = f'<ssd:System name="inner"><ssd:Elements>{PI}</ssd:Elements></ssd:System>'
+# Only an element's own system may connect it.
+FROM_INNER = FEEDBACK.replace('"pi"', '"inner.pi"')
 IN_KELVIN = PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "")
 SCHEDULED, EXCHANGED = (f'<ssd:Component implementation="{each}" ' for each in ("Scheduled", "ModelExchange"))
 WRONG = {
@@ -152,6 +155,7 @@ WRONG = {
     "the connector plant.u is in kg, but the FMU's variable in m": plant('unit="m"', 'unit="kg"'),
     "names the unknown connector 'plant.v'; known: u, y, T": feedback('Connector="u"', 'Connector="v"'),
     "names the unknown element 'po'; did you mean 'pi'": feedback('startElement="pi"', 'startElement="po"'),
+    "names the unknown element 'inner.pi'": structure(system(PLANT + INNER, FROM_INNER)),
     "the connection pi.y - plant.y joins two outputs": feedback('Connector="measured"', 'Connector="y"'),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
     "plant.y is in m, pi.measured in K; the package defines no": feedback("", "", pi=IN_KELVIN),
