@@ -162,7 +162,7 @@ def load(path: Path | str) -> StoredCounterexample:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         why = rejected(first["msg"], first["input"])
-        if first["type"] == "json_invalid" or not key:
+        if first["type"] in ("json_invalid", "missing") or not key:
             key, why = "", "expected the counterexample.json of a run, or a run directory"
         raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
     try:
@@ -200,11 +200,15 @@ def counterexample_file(path: Path) -> Path:
             f"this run has several counterexamples; choose one of these files: {names}", file=str(path)
         )
     if not found:
-        contains = "contains" if holds_run(path) else "not a run directory: it contains"
+        expected = (
+            "expected a counterexample file or the directory of a run that found one (of a campaign: a "
+            "directory in its runs/)"
+        )
+        if not holds_run(path):
+            raise SpecError(f"not a run directory; {expected}", file=str(path))
         raise SpecError(
-            f"{contains} no confirmed counterexample; expected a counterexample file or the directory of a "
-            "run that found one (of a campaign: a directory in its runs/). falsifier explain also "
-            "takes a run that found none",
+            f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that "
+            "found none",
             file=str(path),
         )
     return found[0]

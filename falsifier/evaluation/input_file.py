@@ -64,8 +64,11 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         raise SpecError(f"expected commas between the columns, got {other!r}: export it with commas")
     columns = [_inputs_of(name, info) for name in header[1:]]
+    named = [v.name for column in columns for v in column]
+    if twice := next((name for name in named if named.count(name) > 1), None):
+        raise SpecError(f"input {twice} is given by two columns; drop one of them")
     times: list[float] = []
-    values: dict[str, list[float]] = {v.name: [] for column in columns for v in column}
+    values: dict[str, list[float]] = {name: [] for name in named}
     for line, row in rows[1:]:
         if len(row) != len(header):
             raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)}")

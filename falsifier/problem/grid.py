@@ -68,9 +68,7 @@ def choose_grid(
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
-    if fmu_step and fmu_step > stop_time:
-        fmu_step = None
-    wanted = exact(fmu_step) if fmu_step else stop / _DEFAULT_INTERVALS
+    wanted = exact(fmu_step) if fmu_step and fmu_step <= stop_time else stop / _DEFAULT_INTERVALS
     count = _count(common, wanted, exact(step_size) if step_size else None)
     interval = common / count
     finest = min(wanted, stop / _MAX_INTERVALS)
@@ -145,8 +143,10 @@ def _digits(seconds: Fraction) -> int:
 
 def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step: float | None) -> str:
     fits = f"the stop time {_text(stop)} s" + (f" and the formula's times {_listed(named)}" if named else "")
-    if fmu_step is None:
+    if not fmu_step:
         return f"the FMU specifies no step; this divides {fits}"
+    if exact(fmu_step) > stop:
+        return f"the FMU's step {fmu_step:g} s is longer than the stop time; this divides {fits}"
     if interval == exact(fmu_step):
         return "the FMU's step"
     return f"the FMU's step {fmu_step:g} s does not divide {fits}; this does"

@@ -281,7 +281,11 @@ def _python_problem(source: ProblemSource) -> Problem:
     try:
         found = getattr(import_module(module), name)
     except (ImportError, ValueError, AttributeError) as error:
-        raise SpecError(f"{target}: expected python:MODULE:NAME that can be imported: {error}") from None
+        cure = "; in the folder of MODULE.py, start the command line with python -m falsifier"
+        cure = cure if isinstance(error, ModuleNotFoundError) and error.name == module else ""
+        raise SpecError(
+            f"{target}: expected python:MODULE:NAME that can be imported: {error}{cure}"
+        ) from None
     except Exception as error:  # whatever the user's module does
         raise SpecError(_raised(f"{target}: importing {module}", error)) from error
     try:

@@ -135,7 +135,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["explain", "run", "--map", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["replay", "gone.json"], "no such file"),
-        (["export", "."], "contains no confirmed counterexample"),
+        (["export", "."], "not a run directory"),
         (["explain", "run/manifest.json"], "not a counterexample file"),
         (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["coverage", "run", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),

@@ -44,6 +44,7 @@ def test_the_grid_divides_all_times(
 
 def test_the_reason_names_what_did_not_fit() -> None:
     assert choose_grid(10.0, fmu_step=0.1).reason == "the FMU's step"
+    assert "step 20 s is longer than the stop time" in choose_grid(10.0, fmu_step=20.0).reason
     assert choose_grid(10.0, times=[0.25], fmu_step=0.1).reason == (
         "the FMU's step 0.1 s does not divide the stop time 10 s and the formula's times 0.25 s; this does"
     )
