@@ -16,6 +16,8 @@ from falsifier.errors import FormulaError, SpecError, did_you_mean, rejected
 from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 
+_DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
+
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
@@ -204,6 +206,12 @@ def _value(option: str) -> tuple[str, dict[str, object]]:
     return name, {"value": numbers[0]}
 
 
+def _as_range(text: str) -> str:
+    """Return the range that a text with another separator was meant to be, or an example."""
+    match = re.fullmatch(rf"[\[(]?\s*({_DIGITS})\s*(?:-|,|;|\.\.+|\bto\b|\s)\s*({_DIGITS})\s*[\])]?", text)
+    return f"{match[1]}:{match[2]}" if match else "0:100"
+
+
 def _range(option: str) -> tuple[str, dict[str, object]]:
     if option.strip() and "=" not in option:
         return option.strip(), {}
@@ -212,7 +220,8 @@ def _range(option: str) -> tuple[str, dict[str, object]]:
         raise SpecError(f"--search {option}: expected a range LOW:HIGH; to keep it constant: --set {option}")
     if len(parts) == 1 or "" in (part.strip() for part in parts[:2]):
         raise SpecError(
-            f"--search {option}: expected NAME=LOW:HIGH, with a colon, for example --search {name}=0:100"
+            f"--search {option}: expected NAME=LOW:HIGH, with a colon, for example --search "
+            f"{name}={_as_range(parts[0])}"
         )
     if len(parts) > 4:
         raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")

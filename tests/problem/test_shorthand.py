@@ -74,6 +74,7 @@ def test_values_that_mean_nothing_are_named(value: object) -> None:
     ("options", "message"),
     [
         ({"ranges": ["u=0:1:3", "v", "u"]}, "--search u: given twice"),
+        ({"ranges": ["u=-5..5"]}, "for example --search u=-5:5"),
         ({"values": ["p=1", "p=2"]}, "--set p: given twice"),
         ({"values": ["p=1"], "ranges": ["p=0:1"]}, "p: --set keeps it constant, --search varies it"),
     ],
