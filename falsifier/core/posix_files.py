@@ -25,7 +25,7 @@ def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
     Raises:
         OSError: if it is larger than files of this process may be, or there is no room.
     """
-    if can_seal():
+    if sys.platform == "linux" and can_seal():
         file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
     else:
         with tempfile.TemporaryFile() as named:
@@ -35,7 +35,7 @@ def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
     except OSError as error:
         error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
         raise
-    if can_seal():
+    if sys.platform == "linux" and can_seal():
         growth = 0 if may_grow else fcntl.F_SEAL_GROW
         fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | growth | fcntl.F_SEAL_SEAL)
     return file
@@ -58,7 +58,7 @@ def lock_file(path: Path) -> int | None:
 
 def can_seal() -> bool:
     """Whether no process can shorten what ``sealed_file`` opens, so that it is safe to map."""
-    return sys.platform == "linux" and hasattr(os, "memfd_create")
+    return hasattr(os, "memfd_create")
 
 
 def homes() -> tuple[Path, ...]:
