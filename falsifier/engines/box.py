@@ -8,14 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.layout import Array, fixed_layout, learnable
+from falsifier.engines.layout import Array, fixed_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
 Vector = Array
-
-# What engines calculate with stands in layout; those beyond this file find all of it here.
-__all__ = ["Array", "BoxEngine", "Proposal", "Vector", "learnable"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
-from falsifier.engines.box import Array
+from falsifier.engines.layout import Array
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate

@@ -227,7 +227,8 @@ def _range(option: str) -> tuple[str, dict[str, object]]:
         raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
     limits = [_number(part) for part in parts[:2]]
     if None in limits:
-        raise SpecError(f"{option}: {parts[limits.index(None)]!r} is not a number")
+        wrong = parts[limits.index(None)]
+        raise SpecError(f"--search {option}: {wrong!r} is not a number; expected NAME=LOW:HIGH")
     section: dict[str, object] = {"range": limits}
     if len(parts) > 2:
         if not parts[2].isdigit():

@@ -15,10 +15,9 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.box import Array
 from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete_event
 from falsifier.engines.coverage.programs import Programs
-from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 

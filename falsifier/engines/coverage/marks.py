@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.engines.box import learnable
+from falsifier.engines.layout import learnable
 from falsifier.problem.problem import Problem
 from falsifier.stl.formula import Predicate
 

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Array, Layout
 
 # Discrete inputs with more values than this are drawn like real ones.
 _MAX_LEVELS = 32

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from falsifier.engines.box import Array, learnable
+from falsifier.engines.layout import Array, learnable
 
 # Limits of length scales in the unit box: far beyond them rounding makes the covariance indefinite.
 _SHORTEST, _LONGEST = 1e-3, 1e3

@@ -12,8 +12,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout, TimeGrid
+from falsifier.engines.layout import Array, Layout, TimeGrid
 from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.stl import Verdict

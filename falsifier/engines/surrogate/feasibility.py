@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout, TimeGrid
+from falsifier.engines.layout import Array, Layout, TimeGrid
 
 # Log odds of a failure before anything is known, and the strength of that belief and of small weights.
 _PRIOR, _RIDGE = -1.0, 0.1

@@ -7,8 +7,7 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.engines.box import Array, learnable
-from falsifier.engines.layout import Layout, TimeGrid
+from falsifier.engines.layout import Array, Layout, TimeGrid, learnable
 from falsifier.engines.surrogate.dynamics import Trace
 from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 from falsifier.evaluation.evaluate import Evaluation
@@ -96,12 +95,9 @@ class History:
 
     @property
     def continuous(self) -> list[str]:
-        """The outputs that are not discrete and have varied."""
-        return [
-            name
-            for j, name in enumerate(self.outputs)
-            if name not in self._discrete and any(np.ptp(s.trace.states[:, j]) > 0 for s in self.samples)
-        ]
+        """The outputs that are not discrete and varied in the latest sample."""
+        varied = np.ptp(self.samples[-1].trace.states, axis=0) > 0
+        return [n for n, v in zip(self.outputs, varied, strict=True) if v and n not in self._discrete]
 
     def scaled_cost(self) -> PredictedCost:
         """Return the cost of predictions, scaled by the spread of all samples."""

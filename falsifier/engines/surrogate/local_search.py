@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from falsifier.engines.box import Array, BoxEngine, Proposal, Vector
-from falsifier.engines.layout import Layout
+from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.layout import Array, Layout
 from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import changed, held_from, paced

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Array, Layout
 from falsifier.engines.surrogate.history import Sample
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points

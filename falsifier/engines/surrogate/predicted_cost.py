@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.box import Array, learnable
-from falsifier.engines.layout import TimeGrid
+from falsifier.engines.layout import Array, TimeGrid, learnable
 from falsifier.stl import Monitor, Verdict
 from falsifier.stl.expression import Name, Number
 from falsifier.stl.formula import (

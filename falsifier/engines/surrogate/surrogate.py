@@ -8,9 +8,9 @@ from itertools import zip_longest
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.box import Array, BoxEngine
+from falsifier.engines.box import BoxEngine
 from falsifier.engines.coverage import Explorer
-from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecast, Forecaster

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout
+from falsifier.engines.layout import Array, Layout
 
 # Share of children that are crossed over with another parent.
 _CROSSED = 0.25

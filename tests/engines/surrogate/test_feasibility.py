@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from falsifier.engines import box
+from falsifier.engines.layout import Array as Points
 from falsifier.engines.layout import TimeGrid, planning_layout
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.surrogate import Surrogate
@@ -19,7 +19,7 @@ def diverges(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return lag(times, inputs, parameters)
 
 
-def learned(points: box.Array, failed: Sequence[bool]) -> tuple[Feasibility, box.Array]:
+def learned(points: Points, failed: Sequence[bool]) -> tuple[Feasibility, Points]:
     problem = lag_problem(points=1)
     grid = TimeGrid.over(10.0, 10.0, cells=10, shortest=0.1)
     layout = planning_layout(problem.space, grid)

@@ -5,8 +5,7 @@ import pytest
 
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import ParameterRange, SearchSpace
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem

@@ -1,7 +1,6 @@
 import numpy as np
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import TimeGrid, planning_layout
+from falsifier.engines.layout import Array, TimeGrid, planning_layout
 from falsifier.engines.surrogate import Settings
 from falsifier.engines.surrogate.planning import is_seen, plan
 from falsifier.testing import FREE, lag_problem

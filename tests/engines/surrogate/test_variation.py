@@ -1,7 +1,6 @@
 import numpy as np
 
-from falsifier.engines.box import Array
-from falsifier.engines.layout import Layout, TimeGrid, planning_layout
+from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.surrogate.variation import (
     held_from,
     mutations,
