@@ -207,33 +207,6 @@ def children(pid: int) -> list[int]:
         return []
 
 
-def kill_dask(random: Random, place: Path, kind: str) -> str:
-    """Kill workers of a Dask cluster at random moments of a campaign, up to three times."""
-    import dask.config
-    from distributed import LocalCluster
-
-    local = LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None)
-    # On a busy machine workers take longer to restart than the 15 s after which the cluster gives them up.
-    with dask.config.set({"distributed.deploy.lost-worker-timeout": "10 minutes"}), local as cluster:
-        address = f"dask:{cluster.scheduler_address}"
-        process = subprocess.Popen(
-            [*COMMAND, *SEARCHES[kind], "--out", str(place), "--executor", address],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for _ in range(random.randint(1, 3)):
-            time.sleep(random.uniform(0.5, 6.0))
-            worker = random.choice(list(cluster.workers.values()))
-            with suppress(ProcessLookupError, AttributeError, TypeError):
-                os.kill(worker.pid, signal.SIGKILL)
-        _, said = process.communicate(timeout=PATIENCE)
-    if "Traceback" in said or "defect of falsifier" in said:
-        raise RuntimeError(said)
-    must_equal(resumed(place, kind), wanted(kind), "after kills of workers")
-    return SAME
-
-
 def damage(random: Random, place: Path, kind: str) -> str:
     """Damage any file of a record; resume; if that is refused, `tools repair` and resume."""
     shutil.copytree(unhurt(kind), place)
@@ -361,7 +334,6 @@ CLASSES: dict[str, tuple[Trial, str, int]] = {
     "run with a counterexample, killed 1 to 5 times": (kill, "found", 1),
     "run without one, killed 1 to 5 times": (kill, "stands", 1),
     "campaign on 1 or 2 processes, killed 1 to 5 times": (kill, "campaign", 1),
-    "campaign on a Dask cluster, 1 to 3 workers killed": (kill_dask, "campaign", 1),
     "damage to a run with a counterexample": (damage, "found", 15),
     "damage to a run without one": (damage, "stands", 15),
     "damage to a run that a language model leads": (damage, "led", 15),

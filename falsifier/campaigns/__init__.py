@@ -1,4 +1,4 @@
-"""Campaigns: runs of requirements x methods x seeds, resumable, on this machine or on a cluster.
+"""Campaigns: runs of requirements x methods x seeds, resumable.
 
 ::
 

@@ -10,7 +10,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from hashlib import sha256
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -65,12 +64,6 @@ def read_campaign(directory: Path) -> CampaignRecord:
         JournalError: if there is none, or it is invalid.
     """
     return read_sealed(directory / CAMPAIGN, CampaignRecord, what="campaign")
-
-
-def campaign_mark(directory: Path) -> str:
-    """Hash that shows a worker whether it sees the same directory; empty if there is no campaign."""
-    path = directory / CAMPAIGN
-    return sha256(path.read_bytes()).hexdigest() if path.exists() else ""
 
 
 def run_directory(directory: Path, name: str) -> Path:

@@ -77,8 +77,6 @@ class CampaignRequest(BaseModel):
     Attributes:
         runs: all runs.
         limits: what all runs together may spend; None: no limit in addition to the runs' own.
-        calls: maximum number of concurrent runs that use a language model, over all workers. A run asks one
-            question at a time, so this also limits the concurrent requests to the provider.
         suite: name of the suite that the runs come from, or None.
     """
 
@@ -86,7 +84,6 @@ class CampaignRequest(BaseModel):
 
     runs: tuple[RunRequest, ...] = Field(min_length=1)
     limits: Budget | None = None
-    calls: int = Field(default=8, ge=1)
     suite: str | None = None
 
     def named(self) -> dict[str, RunRequest]:

@@ -8,7 +8,6 @@ from time import perf_counter
 from falsifier.campaigns.directory import (
     CampaignRecord,
     campaign_lock,
-    campaign_mark,
     is_campaign,
     read_campaign,
     run_directory,
@@ -16,16 +15,16 @@ from falsifier.campaigns.directory import (
 )
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
-from falsifier.campaigns.schedule import Schedule
-from falsifier.campaigns.worker import Done, RunTask, unpack
+from falsifier.campaigns.schedule import RunTask, Schedule
+from falsifier.core.arguments import whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import JournalError, SpecError
-from falsifier.evaluation.workers import Workers, open_workers
+from falsifier.evaluation.workers import open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import STOP, holds_run, open_journal
-from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, read, write
+from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, write
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import read_summary
 from falsifier.search.budget import Budget
@@ -56,7 +55,6 @@ def run_campaign(
     directory: Path,
     *,
     jobs: int = 1,
-    executor: str | None = None,
     listeners: Iterable[Listener] = (),
 ) -> CampaignEnd:
     """Start a campaign.
@@ -65,16 +63,16 @@ def run_campaign(
         request: what to run and what it may spend.
         directory: directory of the campaign.
         jobs: number of processes on this machine; each carries out one run at a time.
-        executor: ``dask:tcp://HOST:PORT`` to use a cluster instead.
         listeners: called several times per second with the progress.
 
     Raises:
         JournalError: if the directory is in use or already contains a campaign.
-        SpecError: if a problem, an engine or the executor is not valid.
+        SpecError: if a problem, an engine or the number of jobs is not valid.
         ChatError: for an unknown provider or a missing key.
-        ModelError: if an FMU cannot be used, or the cluster cannot be reached.
+        ModelError: if an FMU cannot be used.
     """
-    problems = check_request(request, executor=executor)
+    jobs = whole("jobs", jobs, least=1)
+    problems = check_request(request)
     with campaign_lock(directory):
         if is_campaign(directory):
             raise JournalError(
@@ -83,15 +81,13 @@ def run_campaign(
             )
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
-        with open_workers(jobs, executor) as workers:
-            return _work(directory, record, problems, workers, tuple(listeners))
+        return _work(directory, record, jobs, tuple(listeners))
 
 
 def resume_campaign(
     directory: Path,
     *,
     jobs: int = 1,
-    executor: str | None = None,
     limits: Budget | None = None,
     listeners: Iterable[Listener] = (),
 ) -> CampaignEnd:
@@ -100,7 +96,6 @@ def resume_campaign(
     Args:
         directory: directory of the campaign.
         jobs: see run_campaign.
-        executor: see run_campaign.
         limits: what all runs together may spend; None: the limits given at the start.
         listeners: see run_campaign.
 
@@ -109,6 +104,7 @@ def resume_campaign(
         SpecError: see run_campaign.
         ModelError: see run_campaign.
     """
+    jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
         problems = _load(record.runs.values())
@@ -117,50 +113,36 @@ def resume_campaign(
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
             )
-        with open_workers(jobs, executor) as workers:
-            return _work(directory, record, problems, workers, tuple(listeners))
+        return _work(directory, record, jobs, tuple(listeners))
 
 
-def _work(
-    directory: Path,
-    record: CampaignRecord,
-    problems: Mapping[ProblemSource, Problem],
-    workers: Workers,
-    listeners: tuple[Listener, ...],
-) -> CampaignEnd:
+def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[Listener, ...]) -> CampaignEnd:
     stop = directory / STOP
     stop.unlink(missing_ok=True)
     watch = _Watch(directory, record.request.limits, listeners)
     runs = watch.follower.look().runs
-    unfinished = [run.name for run in runs if not run.finished]
     for run in runs:  # if the process was killed just after a run ended, the counterexample's file is missing
         if run.status == "falsified":
             keep_recorded(run_directory(directory, run.name))
-    mark = campaign_mark(directory)
-    tasks = []
-    for name in unfinished:
-        request = record.runs[name]
-        problem = problems[request.problems[0]]
-        place = run_directory(directory, name)
-        recorded = read(place).contexts if holds_run(place) else {}  # of context files, as the run was told
-        told = told_problems(request, [problem], recorded)
-        described = describe(request, told, method_of(request).label)
-        tasks.append(RunTask(name, request, problem, described, directory.absolute(), mark))
+    tasks = [
+        RunTask(run.name, record.runs[run.name], directory.absolute(), record.hashes)
+        for run in runs
+        if not run.finished
+    ]
 
-    def report(task: RunTask, done: Done) -> None:
+    def report(task: RunTask, failure: str) -> None:
         place = run_directory(directory, task.name)
-        if done.packed is not None:
-            unpack(done.packed, place)
-        elif done.status == "failed":
-            _record_failure(place, task, done.reason)
+        if failure:
+            _record_failure(place, task.request, failure)
         keep_recorded(place)
 
-    schedule = Schedule(tasks, workers, calls=record.request.calls)
-    try:
-        schedule.run(report, watch.tick)
-    except KeyboardInterrupt:
-        watch.stop("stopped by the user")
-        schedule.run(report, lambda: False)
+    with open_workers(jobs) as workers:
+        schedule = Schedule(tasks, workers)
+        try:
+            schedule.run(report, watch.tick)
+        except KeyboardInterrupt:
+            watch.stop("stopped by the user")
+            schedule.run(report, lambda: False)
     progress = watch.follower.look()
     for listener in listeners:
         listener(progress)
@@ -205,10 +187,8 @@ class _Watch:
         self._stop.write_text(f"{reason}\n", encoding="utf-8")
 
 
-def check_request(request: CampaignRequest, *, executor: str | None) -> dict[ProblemSource, Problem]:
+def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
     """Check names and keys, load all problems and read their context files before anything is written.
-
-    Keys are checked only for runs on this machine: the workers of a cluster have their own environment.
 
     Returns:
         The problems, without what context files say.
@@ -218,17 +198,16 @@ def check_request(request: CampaignRequest, *, executor: str | None) -> dict[Pro
         ChatError: for an unknown provider, an option that it does not have, or a missing key.
         ModelError: if an FMU cannot be used.
     """
+    from falsifier.llm.connect import preflight
+    from falsifier.llm.model_file import is_model_file, served
+
     runs = tuple(request.named().values())
     for run in runs:
         check_names(run)
-    if executor is None:
-        from falsifier.llm.connect import preflight
-        from falsifier.llm.model_file import is_model_file, served
-
-        for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
-            preflight(llm.name, api_base=llm.api_base, options=llm.options)
-            if is_model_file(llm.name):
-                served(llm.name)  # by this process, so that those that it starts share the server
+    for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
+        preflight(llm.name, api_base=llm.api_base, options=llm.options)
+        if is_model_file(llm.name):
+            served(llm.name)  # by this process, so that those that it starts share the server
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})
@@ -257,12 +236,13 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
     return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
 
 
-def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
+def _record_failure(directory: Path, request: RunRequest, reason: str) -> None:
     """Record in a run's journal why it failed, if its worker could not do so."""
     summary = read_summary(directory)
     if summary.status not in ("waiting", "running"):
         return
-    with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
+    with open_journal(directory, keep=request.keep, patience=_PATIENCE) as journal:
         if not holds_run(directory):
-            write(directory, task.manifest)
+            problem = load_source(request.problems[0])
+            write(directory, describe(request, [problem], method_of(request).label))
         journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent))

@@ -1,134 +1,112 @@
-"""Keeps an executor busy with runs, even if its workers die."""
+"""Carries out the runs of a campaign in processes of this machine, some of which may die."""
 
-import logging
 from collections import deque
-from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
-from time import monotonic
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from dataclasses import dataclass
+from pathlib import Path
 
-from falsifier.campaigns.worker import Done, Missing, RunTask, fmu_file, run_task
+from falsifier.campaigns.directory import run_directory
 from falsifier.errors import FalsifierError
 from falsifier.evaluation.workers import Workers
-
-_LOG = logging.getLogger(__name__)
+from falsifier.problem.loading import load_sources
+from falsifier.record.journal import STOP
+from falsifier.record.manifest import check_unchanged, file_hashes
+from falsifier.record.run import StopFile, carry_out
+from falsifier.search.request import RunRequest
 
 # Maximum time in s between two ticks while runs are in progress.
 _TICK = 0.25
-# Time in s without any worker after which that is reported: a cluster needs a moment to replace one.
-_ALONE_SECONDS = 20.0
+# Time in s to wait for a run's lock: the workers of a killed campaign take a moment to end.
+_PATIENCE = 10.0
 
-Report = Callable[[RunTask, Done], None]
+
+@dataclass(frozen=True, slots=True)
+class RunTask:
+    """One run to carry out.
+
+    Attributes:
+        name: name of the run.
+        request: what to run.
+        campaign: directory of the campaign.
+        hashes: SHA-256 of the campaign's files when it was started, by path.
+    """
+
+    name: str
+    request: RunRequest
+    campaign: Path
+    hashes: dict[str, str]
+
+
+Report = Callable[[RunTask, str], None]
 Tick = Callable[[], bool]
 
 
-class Schedule:
-    """Assigns runs to workers and finds out which run killed a worker.
+def run_task(task: RunTask) -> None:
+    """Carry out one run, or resume it; what comes of it stands in its journal.
 
-    If a worker process dies, the whole pool is lost, so every run in progress is a suspect. Suspects are
-    repeated one at a time; a run that kills its worker while running alone has failed.
+    Raises:
+        JournalError: if an FMU or spec differs from when the campaign was started.
+    """
+    problems = load_sources(task.request.problems)
+    check_unchanged(task.campaign, task.hashes, file_hashes(problems[0]))
+    carry_out(
+        task.request,
+        problems,
+        run_directory(task.campaign, task.name),
+        listeners=[StopFile(task.campaign / STOP)],
+        resume=True,
+        patience=_PATIENCE,
+    )
+
+
+class Schedule:
+    """Gives runs to workers, one at a time to each.
+
+    A run whose process dies is tried once more, after the others: where memory is short, the system may have
+    killed the process for what another one used.
 
     Args:
         tasks: runs to carry out.
-        workers: the pool.
-        calls: maximum number of concurrent runs that use a language model.
+        workers: pools of one process each.
     """
 
-    def __init__(self, tasks: Iterable[RunTask], workers: Workers, *, calls: int) -> None:
-        self._workers = workers
-        self._calls = calls
+    def __init__(self, tasks: Iterable[RunTask], workers: Sequence[Workers]) -> None:
         self._waiting = deque(tasks)
-        self._suspects: deque[RunTask] = deque()
-        self._running: dict[Future[Done | Missing], RunTask] = {}
-        self._served = monotonic()
-        self._is_reported = False
+        self._idle = list(workers)
+        self._running: dict[Future[None], tuple[RunTask, Workers]] = {}
+        self._lost: set[str] = set()
 
     def run(self, report: Report, tick: Tick) -> None:
         """Carry out all runs.
 
         Args:
-            report: called with each run that has ended.
+            report: called with each run that has ended, and why it failed if its journal does not tell.
             tick: called several times per second; once it returns False, no more runs are started and those
-                in progress are awaited, as long as there are workers.
+                in progress are awaited.
         """
         proceed = tick()
-        while self._running or (proceed and (self._waiting or self._suspects)):
-            is_served = self._check_served()
-            if not (proceed or is_served):
-                self._workers.shutdown(wait=False, cancel_futures=True)
-                self._running.clear()
-                return
-            if proceed:
-                self._submit()
+        while self._running or (proceed and self._waiting):
+            while proceed and self._waiting and self._idle:
+                task, worker = self._waiting.popleft(), self._idle.pop()
+                self._running[worker.submit(run_task, task)] = task, worker
             finished, _ = wait(self._running, timeout=_TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 self._settle(future, report)
             proceed = tick() and proceed
 
-    def _check_served(self) -> bool:
-        """Return whether there are workers; report once if there have been none for long.
-
-        Dask gives up workers that take long to restart.
-        """
-        is_served = self._workers.slots() > 0
-        if is_served:
-            self._served, self._is_reported = monotonic(), False
-        elif not self._is_reported and monotonic() - self._served >= _ALONE_SECONDS:
-            self._is_reported = True
-            _LOG.warning(
-                "the cluster has no workers; the campaign goes on as soon as one joins. Ctrl-C stops it, and "
-                "falsifier resume goes on later"
-            )
-        return is_served
-
-    def _submit(self) -> None:
-        if self._suspects:  # alone, so that a dead worker identifies its run
-            if not self._running:
-                self._start(self._suspects.popleft())
-            return
-        while self._waiting and len(self._running) < self._workers.slots():
-            task = self._next()
-            if task is None:
-                return
-            self._start(task)
-
-    def _next(self) -> RunTask | None:
-        """First waiting run that the limit on runs with a language model allows."""
-        asking = sum(task.request.llm is not None for task in self._running.values())
-        for task in self._waiting:
-            if task.request.llm is None or asking < self._calls:
-                self._waiting.remove(task)
-                return task
-        return None
-
-    def _start(self, task: RunTask, files: dict[str, bytes] | None = None) -> None:
-        self._running[self._workers.submit(run_task, task, files or {})] = task
-
-    def _settle(self, future: Future[Done | Missing], report: Report) -> None:
-        task = self._running.pop(future, None)
-        if task is None:  # already handled when the pool was restarted
-            return
-        try:
-            outcome = future.result()
-        except (BrokenExecutor, CancelledError) as error:
-            self._recover(task, str(error), report)
-        except FalsifierError as error:
-            report(task, Done("failed", str(error)))
-        except Exception as error:
-            report(task, Done("failed", f"{type(error).__name__}: {error}"))
-        else:
-            if isinstance(outcome, Missing):
-                path = fmu_file(task.problem, outcome.digest)
-                self._start(task, {outcome.digest: path.read_bytes()})
-            else:
-                report(task, outcome)
-
-    def _recover(self, task: RunTask, reason: str, report: Report) -> None:
-        """Restart the pool after a worker died; report the run if it was alone, otherwise suspect all."""
-        alone = not self._running
-        others = list(self._running.values())
-        self._running.clear()
-        self._workers.restart()
-        if alone:
-            report(task, Done("failed", f"its worker process died: {reason}"))
-        else:
-            self._suspects.extend([task, *others])
+    def _settle(self, future: Future[None], report: Report) -> None:
+        task, worker = self._running.pop(future)
+        self._idle.append(worker)
+        match future.exception():
+            case None:
+                report(task, "")
+            case BrokenExecutor() if task.name not in self._lost:
+                self._lost.add(task.name)
+                self._waiting.append(task)
+            case BrokenExecutor() as error:
+                report(task, f"its worker process died: {error}")
+            case FalsifierError() as error:
+                report(task, str(error))
+            case error:
+                report(task, f"{type(error).__name__}: {error}")

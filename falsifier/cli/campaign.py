@@ -38,7 +38,6 @@ from falsifier.cli.options import (
     budget_option,
     directory_argument,
     engine_option,
-    executor_option,
     jobs_option,
     json_option,
     limit_options,
@@ -105,7 +104,6 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 @limit_options(note=" per run")
 @total_option
 @jobs_option("runs")
-@executor_option
 @click.option(
     "--table", type=click.Choice(list(TABLES)), default="main", show_default=True, help="Table to print."
 )
@@ -126,7 +124,6 @@ def bench(
     seed: int,
     totals: Budget | None,
     jobs: int,
-    executor: str | None,
     table: str,
     out: Path | None,
     yes: bool,
@@ -167,7 +164,7 @@ def bench(
         limits=totals,
         suite=suite_name,
     )
-    check_request(request, executor=executor)
+    check_request(request)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
     for method in methods:
@@ -176,7 +173,7 @@ def bench(
         warn(f"{name}: {method.parameterization} parameterization{allowed}")
     _agree(request, yes=yes)
     with campaign_display(quiet=quiet) as show:
-        outcome = run_campaign(request, directory, jobs=jobs, executor=executor, listeners=[show])
+        outcome = run_campaign(request, directory, jobs=jobs, listeners=[show])
     finish(directory, outcome, table=table, as_json=as_json)
 
 
@@ -223,12 +220,10 @@ def _serve(directory: Path, *, allow_stop: bool) -> None:
         asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop))
 
 
-def resume_campaign(
-    directory: Path, *, jobs: int, executor: str | None, limits: Budget | None, quiet: bool, as_json: bool
-) -> None:
+def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:
     """Continue a campaign, for ``falsifier resume``."""
     with campaign_display(quiet=quiet) as show:
-        outcome = _resume(directory, jobs=jobs, executor=executor, limits=limits, listeners=[show])
+        outcome = _resume(directory, jobs=jobs, limits=limits, listeners=[show])
     finish(directory, outcome, table="main", as_json=as_json)
 
 

@@ -15,7 +15,7 @@ OPTION_GROUPS = {
         *("--stl", "--template", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
         *("--output-interval", "--time-limit", "--allow", "--deny"),
     ),
-    "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs", "--executor"),
+    "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs"),
     "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),
     "Language model": (
         *("--llm", "--variant", "--context", "--anonymous", "--fallback", "--api-base", "--llm-option"),

@@ -358,14 +358,6 @@ def jobs_option(what: str) -> Decorator:
     )
 
 
-executor_option = click.option(
-    "--executor",
-    metavar="dask:tcp://HOST:PORT",
-    help="Run on a Dask cluster instead of this machine. Workers without access to DIR notice --total "
-    "only between runs.",
-)
-
-
 def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
     return option(
         "--inputs",

@@ -14,7 +14,6 @@ from falsifier.cli.options import (
     budget_option,
     directory_argument,
     engine_option,
-    executor_option,
     inputs_option,
     jobs_option,
     json_option,
@@ -144,7 +143,6 @@ def run(
 @command()
 @directory_argument
 @jobs_option("runs")
-@executor_option
 @budget_option(None, note=", including those already done")
 @total_option
 @quiet_option
@@ -153,7 +151,6 @@ def resume(
     *,
     directory: Path,
     jobs: int,
-    executor: str | None,
     budget: int | None,
     totals: "Budget | None",
     quiet: bool,
@@ -162,7 +159,7 @@ def resume(
     """Continue the run or campaign in DIRECTORY; no recorded simulation or question is repeated.
 
     A run keeps its limits; only --budget replaces the limit on simulations, even if the run has ended.
-    --jobs, --executor and --total apply to campaigns only. Totals of simulations, tokens and cost include
+    --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost include
     what was spent before.
     """
     from falsifier.campaigns.directory import is_campaign, run_directories
@@ -174,14 +171,13 @@ def resume(
         refuse(
             "the runs of a campaign keep their limit; --total simulations=N limits all of them", budget=budget
         )
-        resume_campaign(directory, jobs=jobs, executor=executor, limits=totals, quiet=quiet, as_json=as_json)
+        resume_campaign(directory, jobs=jobs, limits=totals, quiet=quiet, as_json=as_json)
         return
     places = run_directories(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
         "--budget",
         jobs=jobs > 1,
-        executor=executor,
         total=totals,
     )
     results: list[Result] = []

@@ -1,1 +1,1 @@
-"""Evaluation of candidates, in this process, in others or on a cluster; confirmation of violations."""
+"""Evaluation of candidates, in this process or in others; confirmation of violations."""

@@ -1,18 +1,16 @@
-"""Executors for evaluations: this process, local processes or a Dask cluster."""
+"""Executors for evaluations: this process, its threads or other processes."""
 
 import logging
 import sys
-from collections.abc import Awaitable, Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
-from falsifier.core.secrets import holds_credentials
-from falsifier.errors import ModelError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
@@ -25,8 +23,6 @@ _End = Any
 
 # Logger of the package that simulates FMUs; workers get the parent's level for it.
 _FMU_LOGGER = "falsifier.fmu"
-# Maximum time in s to wait for a cluster's scheduler.
-_CONNECT_TIMEOUT = 20
 # Filter in the format of python -W: warnings whose message starts with this word.
 _TRACKER_FILTER = "ignore:resource_tracker"
 
@@ -36,11 +32,10 @@ class Workers(Executor):
 
     Args:
         make: makes an executor.
-        slots: returns the number of tasks that can currently run at the same time.
     """
 
-    def __init__(self, make: Callable[[], Executor], slots: Callable[[], int]) -> None:
-        self._make, self.slots = make, slots
+    def __init__(self, make: Callable[[], Executor]) -> None:
+        self._make = make
         self._executor = make()
         self._futures: set[Future[Any]] = set()
 
@@ -48,17 +43,13 @@ class Workers(Executor):
         """Whether a task is being carried out; what waits for a process is cancelled."""
         return any(not (future.cancel() or future.done()) for future in list(self._futures))
 
-    def restart(self) -> None:
-        """Replace the present executor; its unfinished tasks are lost."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
-        self._executor = self._make()
-
     def submit(self, function: Callable[..., T], /, *args: Any, **options: Any) -> "Future[T]":
         """Start a task."""
         try:
             future = self._executor.submit(function, *args, **options)
         except BrokenExecutor:
-            self.restart()
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._executor = self._make()
             future = self._executor.submit(function, *args, **options)
         self._futures.add(future)
         future.add_done_callback(self._futures.discard)
@@ -103,7 +94,7 @@ def _processes(jobs: int) -> Iterator[Executor]:
     from multiprocessing import Pipe
 
     ending, end = Pipe(duplex=False)
-    executor = Workers(lambda: _process_pool(jobs, ending), lambda: jobs)
+    executor = Workers(lambda: _process_pool(jobs, ending))
     try:
         yield executor
     finally:
@@ -115,33 +106,13 @@ def _processes(jobs: int) -> Iterator[Executor]:
 
 
 @contextmanager
-def open_workers(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
-    """Open local worker processes, or connect to those of a cluster.
-
-    Args:
-        jobs: number of local processes; not used with a cluster.
-        cluster: ``dask:tcp://HOST:PORT``, the address of a Dask scheduler.
-
-    Raises:
-        SpecError: if the cluster is not a Dask address, or Dask is not installed.
-        ModelError: if the scheduler cannot be reached.
-    """
-    if cluster is not None:
-        with connected(cluster) as executor:
-
-            def again() -> Executor:
-                executor.check()
-                return executor
-
-            yield Workers(again, executor.slots)
-        return
-    if jobs < 1:
-        raise SpecError(f"jobs must be at least 1, got {jobs}")
-    workers = Workers(lambda: _process_pool(jobs), lambda: jobs)
-    try:
+def open_workers(jobs: int) -> Iterator[list[Workers]]:
+    """Open so many worker processes, each of which dies alone."""
+    with ExitStack() as stack:
+        workers = [Workers(lambda: _process_pool(1)) for _ in range(jobs)]
+        for worker in workers:
+            stack.callback(worker.shutdown, cancel_futures=True)
         yield workers
-    finally:
-        workers.shutdown(cancel_futures=True)
 
 
 def start(
@@ -218,109 +189,3 @@ def _prepare_worker(log_level: int, ending: _End) -> None:
         os._exit(1)
 
     Thread(target=follow, daemon=True).start()
-
-
-class ClusterExecutor(Executor):
-    """Runs functions on the workers of a cluster.
-
-    Args:
-        client: the cluster's client, a ``distributed.Client``.
-        cluster: the address that the user gave.
-    """
-
-    def __init__(self, client: Any, cluster: str) -> None:
-        self._client, self._cluster = client, cluster
-        self._asked: dict[Future[Any], Any] = {}
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Call a function on one of the workers; if a worker dies, the cluster tries others.
-
-        Raises:
-            ModelError: if the scheduler has gone.
-        """
-        self.check()
-        # The same call again is another call: what it does may depend on more than its arguments.
-        asked = self._client.submit(fn, *args, pure=False, **kwargs)
-        promised: Future[Any] = Future()
-        promised.set_running_or_notify_cancel()
-        self._asked[promised] = asked
-        promised.add_done_callback(lambda done: self._asked.pop(done, None))
-        self._client.loop.add_callback(_settle, asked, promised)
-        return promised
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 -- as in Executor
-        """Give up the tasks that have not ended; with ``wait``, wait for them instead."""
-        unfinished = dict(self._asked)
-        if wait and not cancel_futures:
-            for promised in unfinished:
-                promised.exception()
-        elif self._client.status == "running":
-            self._client.cancel(list(unfinished.values()))
-
-    def slots(self) -> int:
-        """Return the number of workers that the cluster has at present, as far as is known.
-
-        Raises:
-            ModelError: if the scheduler has gone.
-        """
-        self.check()
-        return len(self._client.scheduler_info(n_workers=-1).get("workers", ()))
-
-    def check(self) -> None:
-        """Check that there still is a connection to the scheduler; while it is made again, there is.
-
-        Raises:
-            ModelError: if it could not be made again.
-        """
-        if self._client.status in ("closing", "closed"):
-            raise ModelError(
-                f"--executor {self._cluster}: the Dask scheduler there has gone; what the runs have recorded "
-                "is kept, and falsifier resume goes on from there"
-            )
-
-
-@contextmanager
-def connected(cluster: str) -> Iterator[ClusterExecutor]:
-    """Connect to a cluster.
-
-    Args:
-        cluster: ``dask:tcp://HOST:PORT``, the address of a Dask scheduler.
-
-    Raises:
-        SpecError: if this is not such an address, or Dask is not installed.
-        ModelError: if the scheduler cannot be reached.
-    """
-    if holds_credentials(cluster):
-        raise SpecError(
-            "--executor: expected dask:tcp://HOST:PORT without a user name and a password, which Dask does "
-            "not take; certificates are stated in Dask's own configuration"
-        )
-    kind, _, address = cluster.partition(":")
-    if kind != "dask" or not address:
-        raise SpecError(f"--executor {cluster}: expected dask:tcp://HOST:PORT")
-    try:
-        from distributed import Client
-    except ImportError:
-        raise SpecError(
-            f"--executor {cluster}: Dask is not installed; install it with pip install 'falsifier[cluster]'"
-        ) from None
-    try:
-        client = Client(address, timeout=_CONNECT_TIMEOUT)
-    except (OSError, ValueError) as error:
-        raise ModelError(f"--executor {cluster}: cannot reach a Dask scheduler there: {error}") from None
-    with client:
-        yield ClusterExecutor(client, cluster)
-
-
-async def _settle(asked: Awaitable[Any], promised: "Future[Any]") -> None:
-    """Wait for a task of the cluster and hand over how it ended, whatever that is."""
-    import asyncio
-
-    try:
-        result = await asked
-    except (asyncio.CancelledError, CancelledError):
-        promised.set_exception(BrokenExecutor("the cluster has given up the task"))
-    except BaseException as error:
-        promised.set_exception(error)
-    else:
-        promised.set_result(result)

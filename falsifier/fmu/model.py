@@ -192,18 +192,3 @@ def fmus_sha256(digests: Iterable[str]) -> str | None:
     if len(distinct) < 2:
         return distinct[0] if distinct else None
     return sha256("".join(distinct).encode()).hexdigest()
-
-
-def with_local_files(model: Model, paths: Mapping[str, Path]) -> Model:
-    """Return a model whose FMUs are read from other paths.
-
-    Args:
-        model: one FMU, a system, or neither.
-        paths: path of each FMU by the SHA-256 of its content; the others stay where they are.
-    """
-    if isinstance(model, FmuModel):
-        return replace(model, path=paths.get(model.sha256, model.path))
-    if isinstance(model, System):
-        parts = {n: replace(p, fmu=paths.get(p.sha256, p.fmu)) for n, p in model.parts.items()}
-        return replace(model, components=parts)
-    return model

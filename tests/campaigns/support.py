@@ -41,9 +41,8 @@ def work_in_threads(patch: pytest.MonkeyPatch) -> None:
     """Give campaigns workers without the time that processes take to start."""
 
     @contextmanager
-    def pool(jobs: int, cluster: str | None = None) -> Iterator[Workers]:
-        with Workers(lambda: ThreadPoolExecutor(jobs), lambda: jobs) as workers:
-            yield workers
+    def pool(jobs: int) -> Iterator[list[Workers]]:
+        yield [Workers(lambda: ThreadPoolExecutor(1)) for _ in range(jobs)]
 
     patch.setattr("falsifier.campaigns.runner.open_workers", pool)
 

@@ -103,7 +103,7 @@ def test_another_worker_error_is_a_failed_run_in_its_journal(
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no memory")
 
-    monkeypatch.setattr("falsifier.campaigns.worker.carry_out", broken)
+    monkeypatch.setattr("falsifier.campaigns.schedule.carry_out", broken)
     directory = tmp_path / "c"
     run_campaign(request("easy", seeds=1), directory)
     monkeypatch.undo()

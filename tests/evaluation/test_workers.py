@@ -1,78 +1,24 @@
-"""Workers: a local Dask cluster of two, and processes of this machine."""
+"""Workers: threads and processes of this machine."""
 
 import logging
-import os
-import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 from threading import Barrier
 from time import sleep
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from falsifier.campaigns import run_campaign
-from falsifier.errors import ModelError, SimulationError, SpecError
+from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.workers import ClusterExecutor, Workers, local_executor, open_workers, start
+from falsifier.evaluation.workers import Workers, local_executor, start
 from falsifier.testing import lag_problem
-from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.fmu import support
 from tests.fmu.fixtures import isolated, ramp, run, runners
 from tests.patience import HANG, wait_until
-from tests.problems import BEGUN, HOLD, RELEASE
-
-if TYPE_CHECKING:
-    from distributed import LocalCluster
-
-WANTED = request("held_hard", "held_impossible", engines=("uniform", "corners"), seeds=1)
-HELD_AFTER = 30  # of some 60 simulations
-
-
-@pytest.fixture
-def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator["LocalCluster"]:
-    """A cluster whose simulations are held after some of them."""
-    from distributed import LocalCluster
-
-    monkeypatch.setenv(HOLD, f"{HELD_AFTER} {tmp_path}")
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as found:
-        monkeypatch.delenv(HOLD)
-        yield found
-
-
-def test_a_cluster_gives_the_same_results_as_this_machine_even_if_a_worker_is_killed(
-    cluster: "LocalCluster", tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun = tmp_path / BEGUN
-    with ThreadPoolExecutor(1) as aside:
-        address = f"dask:{cluster.scheduler_address}"
-        campaign = aside.submit(run_campaign, WANTED, tmp_path / "cluster", executor=address)
-        wait_until(lambda: campaign.done() or (begun.exists() and begun.stat().st_size > HELD_AFTER))
-        assert not campaign.done()
-        os.kill(cluster.workers[0].pid, signal.SIGKILL)
-        (tmp_path / RELEASE).touch()
-        assert not campaign.result().reason
-    work_in_threads(monkeypatch)
-    run_campaign(WANTED, tmp_path / "here")
-    assert outcomes(tmp_path / "cluster") == outcomes(tmp_path / "here")
-
-
-def test_other_executors_are_refused() -> None:
-    with pytest.raises(SpecError, match="expected dask:tcp://HOST:PORT"), open_workers(1, "ray:auto"):
-        pass
-
-
-def test_a_scheduler_that_does_not_answer_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("falsifier.evaluation.workers._CONNECT_TIMEOUT", 0.5)
-    with (
-        pytest.raises(ModelError, match="cannot reach a Dask scheduler"),
-        open_workers(1, "dask:tcp://127.0.0.1:9"),
-    ):
-        pass
 
 
 def level() -> int:
@@ -159,7 +105,7 @@ def test_processes_that_died_are_replaced() -> None:
         made.append(Mortal())
         return made[-1]
 
-    executor = Workers(make, lambda: 1)
+    executor = Workers(make)
     assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
     assert len(made) == 3
     executor.shutdown()
@@ -190,16 +136,3 @@ def test_only_what_ends_a_process_of_its_own_has_crashed(monkeypatch: pytest.Mon
     assert [each.status for each in evaluations] == ["ok", "crashed", "ok"]
     assert evaluations[0].verdict == evaluate(problem, harmless).verdict
     assert evaluations[1].reason == "the worker process died: a process was terminated abruptly"
-
-
-def test_a_scheduler_that_has_gone_is_named() -> None:
-    info: dict[str, Any] = {"workers": {"0": {}, "1": {}}}
-    client = SimpleNamespace(status="running", scheduler_info=lambda n_workers: info)
-    executor = ClusterExecutor(client, "dask:tcp://here:1")
-    assert executor.slots() == 2
-    info.clear()
-    assert executor.slots() == 0, "while the connection is made again"
-    client.status = "closed"
-    for use in (executor.slots, lambda: executor.submit(abs, -1)):
-        with pytest.raises(ModelError, match=r"dask:tcp://here:1: .* has gone; .*falsifier resume"):
-            use()

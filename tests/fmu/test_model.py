@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ModelError
-from falsifier.fmu import Coupling, FmuModel, System, fmu_files, fmus_sha256, with_local_files
-from falsifier.testing import lag_problem
+from falsifier.fmu import Coupling, FmuModel, System, fmus_sha256
 from tests.fmu import fixtures
 from tests.fmu.fixtures import isolated, run
 from tests.fmu.small_systems import loop, system
@@ -60,19 +59,3 @@ def test_interfaces_that_are_not_there_name_the_one_that_is() -> None:
 def test_one_hash_for_all_files_does_not_depend_on_their_order() -> None:
     assert fmus_sha256([]) is None and fmus_sha256(["a"]) == "a" == fmus_sha256(["a", "a"])
     assert fmus_sha256(["a", "b"]) == fmus_sha256(["b", "a"]) != fmus_sha256(["a", "c"])
-
-
-def test_models_are_read_from_the_copies_of_another_machine(tmp_path: Path) -> None:
-    model = loop()
-    copies = {}
-    for found, digest in fmu_files(model).items():
-        copies[digest] = tmp_path / digest / found.name
-        copies[digest].parent.mkdir()
-        copies[digest].write_bytes(found.read_bytes())
-    moved = with_local_files(model, copies)
-    assert isinstance(moved, System) and moved.key == model.key
-    assert set(fmu_files(moved)) == set(copies.values())
-    lag = with_local_files(isolated("Plant_2"), copies)
-    assert isinstance(lag, FmuModel) and lag.path in copies.values()
-    function = lag_problem().model
-    assert with_local_files(function, copies) is function

@@ -1,21 +1,18 @@
-"""A system of FMUs is searched, recorded, resumed, replayed and sent to workers as one FMU is."""
+"""A system of FMUs is searched, recorded, resumed and replayed as one FMU is."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from falsifier import Problem, System, confirm, evaluate, falsify, load_problem, resume
-from falsifier.campaigns.worker import Missing, _with_local_fmus
 from falsifier.cli import cli
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample
 from falsifier.counterexamples.store import load, problem_of, replay
 from falsifier.errors import JournalError, SpecError
-from falsifier.fmu import fmu_files
 from tests.command import falsifier
 from tests.fmu.fixtures import path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, write
@@ -104,25 +101,6 @@ def test_what_only_the_coupling_violates_is_fragile() -> None:
     confirmation = confirm(problem, found)
     assert confirmation.outcome == "fragile"
     assert "half the communication step (0.05 s)" in confirmation.reason
-
-
-def test_workers_get_the_files_that_they_miss(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("FALSIFIER_STORE", str(tmp_path / "store"))
-    folder = tmp_path / "there"
-    folder.mkdir()
-    for name in ("Plant_2", "Gain_2"):
-        (folder / f"{name}.fmu").write_bytes(path(name).read_bytes())
-    system = System({"plant": folder / "Plant_2.fmu", "pi": folder / "Gain_2.fmu"}, {"plant.u": "pi.y"})
-    problem = Problem.from_fmu(system, "G[0,1] (plant.y <= 5)", stop_time=1.0)
-    contents = {digest: file.read_bytes() for file, digest in fmu_files(system).items()}
-    for file in fmu_files(system):
-        file.unlink()
-    for digest, content in contents.items():
-        assert _with_local_fmus(problem, {}) == Missing(digest)
-        local = _with_local_fmus(problem, {digest: content})
-    assert isinstance(local, Problem)
-    candidate = Candidate({"pi.r": Signal((0.0,), (1.0,))}, {}, "test")
-    assert evaluate(replace(local), candidate).robustness is not None
 
 
 def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
