@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import checked_picture, in_existing_folder
+from falsifier.cli.files import in_existing_folder
 from falsifier.cli.options import PATH, json_option, out_option, policy_changes, policy_options
 from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
@@ -24,7 +24,7 @@ from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.spec import read_spec
-from falsifier.views.model_text import NO_INTERFACE, info_text, model_json
+from falsifier.views.model_text import NO_INTERFACE, diagram_text, info_text, model_json
 
 if TYPE_CHECKING:
     from falsifier.fmu import System
@@ -49,9 +49,8 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
     "--diagram",
     "drawn",
     is_flag=True,
-    help="Draw the components and connections of a system: as text, or with --out as a picture.",
+    help="Show the components of a system in the order in which they step, and what feeds what.",
 )
-@out_option("Picture to write with --diagram; its extension determines the format (.svg, .png, .pdf).")
 @policy_options
 @json_option
 def info(
@@ -61,7 +60,6 @@ def info(
     checked: bool,
     names: bool,
     drawn: bool,
-    out: Path | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -78,13 +76,11 @@ def info(
         return
     refuse("applies to Simulink files only", names=names)
     source, changes = _named(fmu), policy_changes(options)
-    if not drawn:
-        refuse("names the picture of --diagram; add --diagram", out=out)
-    else:
+    if drawn:
         refuse("leave it out: --diagram shows connections only", json=as_json, check=checked, all=everything)
         if isinstance(source, Path):
-            raise SpecError(f"{fmu} is a single FMU, which has no connections; --diagram draws systems")
-        _draw_diagram(source, out)
+            raise SpecError(f"{fmu} is a single FMU, which has no connections; --diagram shows systems")
+        say(diagram_text(source))
         return
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
@@ -92,19 +88,6 @@ def info(
     say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
     if checked and not as_json:
         _print_convergence(source, found, *rights)
-
-
-def _draw_diagram(system: "System", out: Path | None) -> None:
-    from falsifier.views.model_text import diagram, diagram_text
-
-    found = diagram(system)
-    if out is None:
-        say(diagram_text(found))
-        return
-    from falsifier.views.plotting import plot_diagram, save_figure
-
-    save_figure(plot_diagram(found), checked_picture(out))
-    say(f"picture: {out}")
 
 
 def _simulink(file: Path, *, names: bool, as_json: bool) -> str:

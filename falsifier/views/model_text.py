@@ -3,14 +3,14 @@
 The tables are plain text: a table library needs minutes for the 100,000 variables of large models.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import counted
 from falsifier.fmu import System
-from falsifier.fmu.systems import SYSTEM, Link, Network, Place, late_links
+from falsifier.fmu.systems import SYSTEM, Link, Place, late_links
 from falsifier.views.text import aligned
 
 if TYPE_CHECKING:
@@ -105,134 +105,60 @@ def simulink_text(diagram: "Diagram") -> str:
 
 
 # Maximum number of inputs, and of outputs, that are shown of a component.
-MOST_PORTS = 40
+_MOST_PORTS = 40
 
 
-@dataclass(frozen=True, slots=True)
-class Wire:
-    """A connection: names of both ends in the system, what is done to the value, whether it is late."""
-
-    source: str
-    target: str
-    conversion: str
-    is_late: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Port:
-    """An input or output of a component: its name there and in the system, and its unit."""
-
-    name: str
-    title: str
-    unit: str
-
-    @property
-    def label(self) -> str:
-        """Name and unit."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
-
-@dataclass(frozen=True, slots=True)
-class Box:
-    """A component: its name, what it is, its ports, and how many of them are not shown."""
-
-    name: str
-    kind: str
-    inputs: tuple[Port, ...]
-    outputs: tuple[Port, ...]
-    left_out: int
-
-
-@dataclass(frozen=True, slots=True)
-class SystemDiagram:
-    """A system as boxes and wires.
-
-    Attributes:
-        name: name of the system.
-        boxes: components in the order in which they step.
-        wires: connections.
-        loops: first position in this order, and the one after the last, of components that iterate together.
-        outer: names of the inputs of the system as a whole.
-        method: how values are exchanged.
-    """
-
-    name: str
-    boxes: tuple[Box, ...]
-    wires: tuple[Wire, ...]
-    loops: tuple[tuple[int, int], ...]
-    outer: tuple[str, ...]
-    method: str
-
-
-def diagram(system: System) -> SystemDiagram:
-    """Return the components and connections of a system."""
-    network = system.network
-    late = set(late_links(network.links, network.order, network.loops))
+def diagram_text(system: System) -> str:
+    """Return what feeds what in a system: components in the order in which they step, with their ports."""
+    network, order = system.network, system.network.order
+    late = set(late_links(network.links, order, network.loops))
     if network.coupling.method == "jacobi":
-        late = {n for n in network.links if n.source.member != SYSTEM}
-    outer = tuple(name for name, place in network.places.items() if place.member == SYSTEM)
-    wires = tuple(
-        Wire(network.title(n.source), network.title(n.target), _conversion(n), n in late)
-        for n in network.links
-    )
-    connected = {end for wire in wires for end in (wire.source, wire.target)}
-    boxes = tuple(_box(network, member, connected) for member in network.order)
-    return SystemDiagram(system.name, boxes, wires, network.loops, outer, network.coupling.method)
+        late = {link for link in network.links if link.source.member != SYSTEM}
+    ends: dict[Place, list[str]] = {}
+    for link in network.links:
+        fed_by = f"{network.title(link.source)}{_conversion(link)}{'  (late)' if link in late else ''}"
+        ends[link.target] = [fed_by]
+        ends.setdefault(link.source, []).append(network.title(link.target))
+    count = counted(len(order), "component") + (", in the order in which they step" if len(order) > 1 else "")
+    lines = [f"{system.name}: {count} ({network.coupling.method})"]
+    for first, last in network.loops:
+        names = ", ".join(network.members[k].name for k in order[first:last])
+        lines.append(f"{names}: repeated until the outputs agree")
+    outer = [(name, place) for name, place in network.places.items() if place.member == SYSTEM]
+    lines += [f"   input of the system: {name} -> {_joined(ends, place)}" for name, place in outer]
+    for number, position in enumerate(order, start=1):
+        member = network.members[position]
+        step = "" if member.step is None else f", every {member.step:.6g} s"
+        lines += ["", f"{number:2} {member.name}  ({member.path.name}, {member.interface}{step})"]
+        lines += _port_lines(member.description.info, position, ends)
+    if late:
+        lines += ["", "(late): the value of the previous communication point"]
+    return "\n".join(lines)
+
+
+def _port_lines(info: ModelInfo, position: int, ends: Mapping[Place, Sequence[str]]) -> Iterator[str]:
+    """Yield a line for each input and output of a component; of many, those that are connected."""
+    ports: list[tuple[str, str, str]] = []
+    left_out = 0
+    for arrow, variables in (("<-", info.inputs), ("->", info.outputs)):
+        found = [v for v in variables if not v.alias_of]
+        if len(found) > _MOST_PORTS:
+            found.sort(key=lambda v: Place(position, v.name) not in ends)
+        left_out += len(found[_MOST_PORTS:])
+        for v in found[:_MOST_PORTS]:
+            label = f"{v.name} [{v.unit}]" if v.unit else v.name
+            ports.append((label, arrow, _joined(ends, Place(position, v.name))))
+    width = max((len(label) for label, _, _ in ports), default=0)
+    yield from (f"     {label:{width}}  {arrow}  {other}" for label, arrow, other in ports)
+    if left_out:
+        yield f"     ... and {left_out} more that are not connected"
+
+
+def _joined(ends: Mapping[Place, Sequence[str]], place: Place) -> str:
+    return ", ".join(ends.get(place, ["not connected"]))
 
 
 def _conversion(link: Link) -> str:
     factor = "" if link.factor == 1.0 else f" * {link.factor:.6g}"
     offset = "" if link.offset == 0.0 else f" {link.offset:+.6g}"
     return f"{factor}{offset}{' (extrapolated)' if link.is_linear else ''}"
-
-
-def _box(network: Network, position: int, connected: set[str]) -> Box:
-    member = network.members[position]
-    info = member.description.info
-    step = "" if member.step is None else f", every {member.step:.6g} s"
-
-    def ports(variables: tuple[Variable, ...]) -> list[Port]:
-        found = [
-            Port(v.name, network.title(Place(position, v.name)), v.unit) for v in variables if not v.alias_of
-        ]
-        # If some are left out, then those that are not connected.
-        return sorted(found, key=lambda p: p.title not in connected) if len(found) > MOST_PORTS else found
-
-    inputs, outputs = ports(info.inputs), ports(info.outputs)
-    return Box(
-        member.name,
-        f"{member.path.name}, {member.interface}{step}",
-        tuple(inputs[:MOST_PORTS]),
-        tuple(outputs[:MOST_PORTS]),
-        max(len(inputs) - MOST_PORTS, 0) + max(len(outputs) - MOST_PORTS, 0),
-    )
-
-
-def loop_texts(found: SystemDiagram) -> Iterator[str]:
-    """Yield which components repeat their steps together."""
-    for first, last in found.loops:
-        yield f"{', '.join(box.name for box in found.boxes[first:last])}: repeated until the outputs agree"
-
-
-def diagram_text(found: SystemDiagram) -> str:
-    """Return a system as text for the terminal: components in the order of stepping, with their ports."""
-    number = len(found.boxes)
-    count = f"{number} component" + ("s, in the order in which they step" if number > 1 else "")
-    lines = [f"{found.name}: {count} ({found.method})", *loop_texts(found)]
-    sources, targets = dict[str, str](), dict[str, str]()
-    for wire in found.wires:
-        sources[wire.target] = f"{wire.source}{wire.conversion}{'  (late)' if wire.is_late else ''}"
-        before = f"{targets[wire.source]}, " if wire.source in targets else ""
-        targets[wire.source] = f"{before}{wire.target}"
-    none = "not connected"
-    lines += [f"   input of the system: {name} -> {targets.get(name, none)}" for name in found.outer]
-    for k, box in enumerate(found.boxes, start=1):
-        lines += ["", f"{k:2} {box.name}  ({box.kind})"]
-        width = max((len(port.label) for port in (*box.inputs, *box.outputs)), default=0)
-        lines += [f"     {p.label:{width}}  <-  {sources.get(p.title, none)}" for p in box.inputs]
-        lines += [f"     {p.label:{width}}  ->  {targets.get(p.title, none)}" for p in box.outputs]
-        if box.left_out:
-            lines.append(f"     ... and {box.left_out} more that are not connected")
-    if any(wire.is_late for wire in found.wires):
-        lines += ["", "(late): the value of the previous communication point"]
-    return "\n".join(lines)

@@ -1,6 +1,6 @@
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import Connection, Coupling, Frame, System, read_info
-from falsifier.views.model_text import diagram, diagram_text, info_text, model_json
+from falsifier.views.model_text import diagram_text, info_text, model_json
 from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, component, system
 
@@ -24,7 +24,7 @@ def test_the_text_says_order_ports_units_connections_and_what_is_late() -> None:
     links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5, offset=-1.0, extrapolation="linear")}
     model = system({"pi": component("Gain_2", 0.2), "plant": "Plant_2"}, links)
     assert (
-        diagram_text(diagram(model))
+        diagram_text(model)
         == """\
 system: 2 components, in the order in which they step (gauss-seidel)
 
@@ -49,14 +49,14 @@ def test_with_jacobi_all_connections_are_late_except_for_inputs_of_the_whole() -
         frame=whole,
         coupling=Coupling("jacobi"),
     )
-    text = diagram_text(diagram(model))
+    text = diagram_text(model)
     assert "input of the system: s -> a.u" in text and "u [m]  <-  s\n" in text
     assert "u [m]  <-  a.y  (late)" in text
 
 
 def test_iterated_loops_are_named_and_one_component_has_no_order() -> None:
     model = system({"plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
-    text = diagram_text(diagram(model))
+    text = diagram_text(model)
     assert "plant, pi: repeated until the outputs agree" in text and "late" not in text
-    single = diagram_text(diagram(system({"a": "Plant_2"}, {})))
+    single = diagram_text(system({"a": "Plant_2"}, {}))
     assert single.startswith("system: 1 component (gauss-seidel)")

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from falsifier.views.plotting.analyses import plot_coverage, plot_robustness_map
 from falsifier.views.plotting.axes import png, save_figure, svg
-from falsifier.views.plotting.diagram import plot_diagram
 from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_iteration_times, plot_rates
 from falsifier.views.plotting.simulation import (
     plot,
@@ -25,7 +24,6 @@ __all__ = [
     "plot",
     "plot_comparison",
     "plot_coverage",
-    "plot_diagram",
     "plot_evaluation",
     "plot_history",
     "plot_iteration_times",
