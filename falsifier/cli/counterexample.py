@@ -159,7 +159,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
 )
 @policy_options
 def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) -> None:
-    """Write a counterexample for FMPy, fmusim, OpenModelica, Simulink and pytest.
+    """Write a counterexample for FMPy, fmusim, OpenModelica and Simulink, or store it for pytest.
 
     RUN is a run directory or a counterexample file.
     """

@@ -11,7 +11,6 @@
     replay.py                   simulates the FMU with FMPy only; writes outputs.csv, prints where it broke
     replay.mos                  the same in OpenModelica, from the Modelica model
     inputs.mat                  input signals and start values for Simulink
-    test_NAME.py                a pytest test that fails as long as the counterexample violates
 """
 
 import shutil
@@ -19,12 +18,7 @@ from pathlib import Path
 
 from falsifier.core.files import file_name
 from falsifier.counterexamples.export.components import write_components, write_package
-from falsifier.counterexamples.export.scripts import (
-    identifier,
-    openmodelica_script,
-    pytest_file,
-    replay_script,
-)
+from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
 from falsifier.counterexamples.export.tables import (
     file_columns,
     input_table,
@@ -48,7 +42,7 @@ def export_counterexample(
     """Write a counterexample for other tools; return the files.
 
     Files that do not apply are omitted: input.csv if the model has no inputs, the simulation scripts if the
-    model is not an FMU, the test if the problem cannot be loaded from a file.
+    model is not an FMU.
 
     Args:
         problem: the problem whose requirement is violated.
@@ -77,7 +71,6 @@ def export_counterexample(
     scripts = {
         "replay.py": replay_script(problem, evaluation, columns),
         "replay.mos": openmodelica_script(problem, start),
-        f"test_{identifier(problem.name)}.py": pytest_file(stored),
     }
     for name, text in scripts.items():
         if text is not None:

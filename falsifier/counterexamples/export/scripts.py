@@ -1,11 +1,9 @@
 """The text of scripts that simulate a counterexample in other tools."""
 
-import re
 import shlex
 from collections.abc import Iterable, Mapping
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
-from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
@@ -14,7 +12,6 @@ from falsifier.stl.margins import signed
 
 # Rows that replay.py prints before and after the one at which what broke was farthest off.
 _SHOWN_ROWS = 3
-_LONGEST_IDENTIFIER = 80
 _FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 _REPLAY_ABOUT = """\
@@ -99,22 +96,6 @@ simulate({model}, startTime=0, stopTime={stop_time!r}, numberOfIntervals={interv
 getErrorString();
 """
 
-_PYTEST = """\
-{about}
-
-from pathlib import Path
-
-from falsifier.counterexamples.store import load, problem_of, replay
-
-FILE = Path(__file__).with_name("counterexample.json")
-
-
-def test_{name}_is_no_longer_violated() -> None:
-    stored = load(FILE)
-    replayed = replay(stored, problem_of(stored))
-    assert replayed.status != "violates", replayed.text
-"""
-
 
 def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str | None:
     """Python script that needs only FMPy; None if the model is not an FMU.
@@ -184,24 +165,6 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         intervals=problem.experiment.samples - 1,
         flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
-
-
-def pytest_file(stored: StoredCounterexample) -> str | None:
-    """Test of the counterexample file next to it; None if its problem cannot be loaded from a file."""
-    if stored.problem is None:
-        return None
-    requirement = one_line(stored.requirement)
-    about = f"Fails as long as the counterexample in this folder violates {requirement}."
-    return _PYTEST.format(about=python_docstring(about), name=identifier(stored.requirement).lower())
-
-
-def identifier(name: str) -> str:
-    """Return a name as part of a Python identifier, and of the name of a Python file.
-
-    >>> identifier("car x-1")
-    'car_x_1'
-    """
-    return re.sub(r"\W", "_", name, flags=re.ASCII)[:_LONGEST_IDENTIFIER]
 
 
 def _has_inputs(problem: Problem) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from falsifier.views.plotting.analyses import plot_coverage, plot_robustness_map
 from falsifier.views.plotting.axes import png, save_figure, svg
-from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_iteration_times, plot_rates
+from falsifier.views.plotting.runs import plot_comparison, plot_history, plot_rates
 from falsifier.views.plotting.simulation import (
     plot,
     plot_evaluation,
@@ -26,7 +26,6 @@ __all__ = [
     "plot_coverage",
     "plot_evaluation",
     "plot_history",
-    "plot_iteration_times",
     "plot_panels",
     "plot_rates",
     "plot_requirement",

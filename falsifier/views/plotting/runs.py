@@ -1,13 +1,12 @@
 """Figures of runs and campaigns."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.campaigns import Method
-from falsifier.campaigns.analysis import Run, Statistics, group, statistics
+from falsifier.campaigns.analysis import Run, group, statistics
 from falsifier.core.words import counted
 from falsifier.views.plotting.axes import (
     EACH,
@@ -76,64 +75,17 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     return figure_of(ax)
 
 
-def plot_comparison(
-    runs: Iterable[Run], ax: "Axes | None" = None, *, apart: Collection[str] = ()
-) -> "Figure":
+def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     """Plot the mean number of simulations until falsification with standard deviation, one bar per method.
 
     Args:
         runs: runs of a campaign.
         ax: where to draw; None: a new figure.
-        apart: requirements that need many more simulations than the others: they get a panel of their own
-            with a logarithmic axis. Only in a new figure.
-
-    Raises:
-        ValueError: if requirements are to be drawn apart on given axes.
     """
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
-    few = [name for name in requirements if name not in apart]
-    many = [name for name in requirements if name in apart]
-    if not (few and many):
-        ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
-        _bars(ax, cells, requirements)
-        if many:
-            ax.set_yscale("log")
-        ax.legend()
-        return figure_of(ax)
-    if ax is not None:
-        raise ValueError("two panels need a new figure: omit ax, or apart")
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(max(7.0, 1.2 * len(requirements) + 1.0), 4.0), layout="constrained")
-    left, right = figure.subplots(1, 2, width_ratios=[len(few), len(many)])
-    _bars(left, cells, few)
-    _bars(right, cells, many)
-    right.set(yscale="log", ylabel="")
-    left.legend()
-    return figure
-
-
-def plot_iteration_times(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
-    """Plot the mean wall-clock time per simulation, the engine included, one bar per method."""
-    totals: dict[str, list[float]] = {}
-    for run in runs:
-        if run.spent.simulations:
-            totals.setdefault(run.method.label, []).append(run.spent.seconds / run.spent.simulations)
-    ax = ax if ax is not None else own_axes(max(5.0, 1.4 * len(totals)))
-    bars = ax.bar(
-        list(map(caption, totals)), [float(np.mean(each)) for each in totals.values()], color=OUTPUT
-    )
-    ax.bar_label(bars, fmt="%.3g", fontsize=8, padding=2)
-    ax.set(ylabel="seconds per simulation (mean)")
-    return figure_of(ax)
-
-
-_Cells = Mapping[tuple[str, Method], Statistics]
-
-
-def _bars(ax: "Axes", cells: _Cells, requirements: Sequence[str]) -> None:
     methods = list(dict.fromkeys(method for _, method in cells))
+    ax = ax if ax is not None else own_axes(max(6.0, 1.2 * len(requirements)))
     width = 0.8 / max(len(methods), 1)
     for i, method in enumerate(methods):
         found = [cells.get((requirement, method)) for requirement in requirements]
@@ -145,6 +97,8 @@ def _bars(ax: "Axes", cells: _Cells, requirements: Sequence[str]) -> None:
         ax.bar_label(bars, [f"{s.falsified}/{s.runs}" if s else "" for s in found], fontsize=7, padding=2)
     ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
+    ax.legend()
+    return figure_of(ax)
 
 
 def falsification_curve(runs: Iterable[Run]) -> Curve:

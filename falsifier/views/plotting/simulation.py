@@ -115,9 +115,7 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
             group = panel.component
             ax.set_title(caption(group), loc="left", fontsize=9, weight="bold")
         if verdict is not None:
-            if panel.critical == verdict.moment and _is_hidden(ax, verdict):
-                _plot_inset(ax, panel, verdict, _enlarged(panel, verdict))
-            ax.axvline(verdict.moment, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
+            _mark_moment(ax, panel, verdict)
     axes[-1].set_xlabel("time [s]")
     if title:
         figure.suptitle(title, fontsize=10)
@@ -180,10 +178,12 @@ def _labels(problem: Problem) -> dict[str, dict[int, str]]:
     return found | {r.name: labels_of(r.kind, r.items) for r in ranges if r.kind != "real"}
 
 
-def _is_hidden(ax: "Axes", verdict: Verdict) -> bool:
-    """Whether the margin is too small to be seen at the scale of a panel."""
+def _mark_moment(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
+    """Mark the time to look at; enlarge a margin that is too small to be seen at the scale of the panel."""
     low, high = ax.get_ylim()
-    return 0 < _margin(verdict) < _HIDDEN * (high - low)
+    if panel.critical == verdict.moment and 0 < _margin(verdict) < _HIDDEN * (high - low):
+        _plot_inset(ax, panel, verdict)
+    ax.axvline(verdict.moment, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
 
 
 def _margin(verdict: Verdict) -> float:
@@ -193,16 +193,13 @@ def _margin(verdict: Verdict) -> float:
     return abs(verdict.robustness)
 
 
-def plot_requirement(
-    problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None, *, inset: float | None = None
-) -> "Figure":
+def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
     """Plot the quantity that broke, or else decided the verdict, with its bound, its window and that time.
 
     Args:
         problem: the problem with the requirement.
         evaluation: an evaluation with its trajectory.
         ax: where to draw; None: a new figure.
-        inset: length in s of the time around the marked one that a second, enlarged plot inside shows.
 
     Raises:
         ValueError: if the evaluation has no trajectory.
@@ -211,9 +208,7 @@ def plot_requirement(
     ax = ax if ax is not None else own_axes(8, 3)
     decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
     plot_panel(ax, decisive, _decided_colour(verdict))
-    if inset is not None:
-        _plot_inset(ax, decisive, verdict, inset)
-    ax.axvline(verdict.moment, color=_decided_colour(verdict), linewidth=0.8, linestyle=":")
+    _mark_moment(ax, decisive, verdict)
     ax.set_xlabel("time [s]")
     ax.set_title("\n".join(wrapped(line, _TITLE_WIDTH) for line in _decided(verdict)), fontsize=10)
     return figure_of(ax)
@@ -229,9 +224,9 @@ def _enlarged(panel: Panel, verdict: Verdict) -> float:
         length /= 2
 
 
-def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict, length: float) -> None:
+def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     """Draw the panel again, enlarged around the marked time, in the emptiest corner."""
-    critical = verdict.moment
+    critical, length = verdict.moment, _enlarged(panel, verdict)
     inside = ax.inset_axes(min(_CORNERS, key=lambda corner: _covered(ax, panel, corner)))
     plot_panel(inside, panel, _decided_colour(verdict))
     for text in inside.texts:

@@ -9,7 +9,6 @@ from falsifier.counterexamples.store import to_store
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
 
 AT_INPUTS = {
     "held": Candidate(
@@ -39,8 +38,6 @@ def confirmed(problem: Problem, evaluation: Evaluation) -> Confirmation:
     )
 
 
-def exported(problem: Problem, evaluation: Evaluation, target: str, directory: Path) -> list[Path]:
-    stored = to_store(confirmed(problem, evaluation)).model_copy(
-        update={"problem": ProblemSource(target=target)}
-    )
+def exported(problem: Problem, evaluation: Evaluation, directory: Path) -> list[Path]:
+    stored = to_store(confirmed(problem, evaluation))
     return export_counterexample(problem, stored, evaluation, directory)

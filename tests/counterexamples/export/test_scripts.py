@@ -1,7 +1,6 @@
 import ast
 import csv
 import json
-import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,17 +12,14 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
-from falsifier.counterexamples.export import export_counterexample
-from falsifier.counterexamples.export.scripts import openmodelica_script, pytest_file, replay_script
-from falsifier.counterexamples.store import FILE_NAME, load, to_store
+from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
+from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
-from tests.command import ROOT
-from tests.counterexamples.export.support import AT_INPUTS, confirmed, exported
+from tests.counterexamples.export.support import AT_INPUTS, exported
 from tests.fmu.fixtures import path as fmu_path
 
 
@@ -31,7 +27,7 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
     problem = load_problem("AT1")
     evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["held"]))
     assert evaluation.trajectory is not None
-    exported(problem, evaluation, "AT1", tmp_path)
+    exported(problem, evaluation, tmp_path)
     done = subprocess.run(
         [sys.executable, "-W", "error", str(tmp_path / "replay.py")],
         capture_output=True,
@@ -79,7 +75,7 @@ def replayed(
     evaluation = evaluate(problem, candidate)
     problem.model.close()
     assert evaluation.trajectory is not None, evaluation.reason
-    exported(problem, evaluation, "not used", directory)
+    exported(problem, evaluation, directory)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", ["replay.py"])
         run_path(str(directory / "replay.py"))
@@ -172,26 +168,6 @@ def imported(script: Path) -> set[str]:
     return {module.partition(".")[0] for module in modules}
 
 
-def test_the_pytest_file_fails_while_the_counterexample_violates(tmp_path: Path) -> None:
-    problem = load_problem("AT1")
-    evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["constant"]))
-    assert evaluation.violated
-    files = exported(problem, evaluation, "AT1", tmp_path)
-    assert {f.name for f in files} == {p.name for p in tmp_path.iterdir()}
-    assert "test_AT1.py" in {f.name for f in files}
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tmp_path)],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        cwd=tmp_path,
-        check=False,
-    )
-    assert done.returncode == 1
-    assert "AT1: still violated: speed <= 120 was violated from " in done.stdout
-    assert load(tmp_path / FILE_NAME).robustness == evaluation.robustness
-
-
 def test_the_openmodelica_script_has_the_experiment_the_inputs_and_the_start_values() -> None:
     script = openmodelica_script(load_problem("AT1"), {"finalDrive": 3.25})
     assert script is not None
@@ -217,19 +193,9 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
     assert ")[::5]" in script
 
 
-def test_a_requirements_name_becomes_a_python_name() -> None:
-    problem = lag_problem(name="R-1 <a>")
-    stored = to_store(confirmed(problem, evaluate(problem, problem.space.decode([1.0] * 4))))
-    script = pytest_file(stored.model_copy(update={"problem": ProblemSource(target="AT1")}))
-    assert script is not None
-    (function,) = (n for n in ast.parse(script).body if isinstance(n, ast.FunctionDef))
-    assert function.name.startswith("test_r_1__a_")
-
-
 def test_what_does_not_apply_is_left_out(tmp_path: Path) -> None:
     problem = lag_problem()
     evaluation = evaluate(problem, problem.space.decode([1.0] * 4))
-    stored = to_store(confirmed(problem, evaluation))
-    files = export_counterexample(problem, stored, evaluation, tmp_path)
+    files = exported(problem, evaluation, tmp_path)
     tables = {"input.csv", "inputs.mat", "start_values.json", "start_values.ssv"}
     assert {f.name for f in files} == {FILE_NAME, *tables}

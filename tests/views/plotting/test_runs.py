@@ -1,13 +1,12 @@
 from pathlib import Path
 
 import numpy as np
-import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from falsifier.campaigns.analysis import load
 from falsifier.record.journal import read_journal, recorded_evaluations
-from falsifier.views.plotting import plot_comparison, plot_history, plot_iteration_times, plot_rates
+from falsifier.views.plotting import plot_comparison, plot_history, plot_rates
 from falsifier.views.plotting.runs import falsification_curve, improvements, thinned
 from tests.views.plotting.support import xs, ys
 
@@ -39,28 +38,6 @@ def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) 
     assert [bar.get_height() for bar in bars] == [1.5, 0.0, 1.5, 0.0]
     assert [text.get_text() for text in ax.texts] == ["2/2", "0/2", "2/2", "0/2"]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["HARD", "NEVER"]
-
-
-def test_requirements_apart_have_a_panel_with_a_logarithmic_axis(campaign: Path) -> None:
-    runs = load(campaign)
-    left, right = plot_comparison(runs, apart=["HARD"]).axes
-    assert [tick.get_text() for tick in right.get_xticklabels()] == ["HARD"]
-    assert [tick.get_text() for tick in left.get_xticklabels()] == ["NEVER"]
-    assert (left.get_yscale(), right.get_yscale()) == ("linear", "log")
-    bars = [bar for bar in right.patches if isinstance(bar, Rectangle)]
-    assert [bar.get_height() for bar in bars] == [1.5, 1.5]
-    with pytest.raises(ValueError, match="a new figure"):
-        plot_comparison(runs, Figure().subplots(), apart=["HARD"])
-
-
-def test_iteration_times_are_wall_clock_time_per_simulation(campaign: Path) -> None:
-    runs = load(campaign)
-    ax = plot_iteration_times(runs).axes[0]
-    bars = [bar for bar in ax.patches if isinstance(bar, Rectangle)]
-    uniform = [r.spent.seconds / r.spent.simulations for r in runs if r.method.engine == "uniform"]
-    assert len(bars) == 2
-    assert bars[0].get_height() == pytest.approx(np.mean(uniform))
-    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["uniform", "corners"]
 
 
 def test_curves(campaign: Path) -> None:

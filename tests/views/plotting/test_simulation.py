@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,24 +20,16 @@ from tests.problems import conditional, hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
 
 
-def test_a_requirement_is_drawn_on_given_axes_and_enlarged_around_its_critical_time() -> None:
+def test_a_requirement_is_drawn_on_given_axes() -> None:
     evaluation, ax = simulated(), Figure().subplots()
     assert evaluation.verdict is not None
-    assert plot_requirement(hard(), evaluation, ax, inset=2.0) is ax.get_figure()
+    assert plot_requirement(hard(), evaluation, ax) is ax.get_figure()
     dots = [line for line in ax.get_lines() if line.get_marker() == "o"]
     assert [xs(dot).tolist() for dot in dots] == [[evaluation.verdict.critical_time]]
     assert evaluation.verdict.breach is not None
     first, decided = ax.get_title().splitlines()
     assert first == evaluation.verdict.breach.text
     assert f"decided by x <= 0.6 at {evaluation.verdict.critical_time:.5g} s" in decided
-    (inside,) = ax.child_axes
-    low, high = inside.get_xlim()
-    assert (low + high) / 2 == pytest.approx(evaluation.verdict.critical_time)
-    assert high - low == pytest.approx(2.0)
-    assert len(inside.get_lines()) == 3, "the curve, its bound, and the dot at the critical time"
-    bottom, top = inside.get_ylim()
-    assert bottom < ys(inside.get_lines()[-1])[0] < top
-    assert top - bottom < ax.get_ylim()[1] - ax.get_ylim()[0]
 
 
 def test_an_evaluation_has_a_panel_for_what_is_compared_and_for_each_input() -> None:
@@ -90,15 +83,19 @@ def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
     assert "nearest to a violation" in keys and "violated" not in keys
 
 
-def test_a_margin_that_the_scale_hides_is_enlarged() -> None:
+@pytest.mark.parametrize("draw", [plot_evaluation, plot_requirement])
+def test_a_margin_that_the_scale_hides_is_enlarged(draw: Callable[[Problem, Evaluation], Figure]) -> None:
     hidden = lag_problem("G[0,10] (x <= 0.99998)")
-    figure = plot_evaluation(hidden, evaluate(hidden, hidden.space.decode([1.0] * 4)))
-    (inside,) = figure.axes[0].child_axes
+    evaluation = evaluate(hidden, hidden.space.decode([1.0] * 4))
+    assert evaluation.verdict is not None
+    (inside,) = draw(hidden, evaluation).axes[0].child_axes
     low, high = inside.get_ylim()
     assert high - low < 0.2
+    assert np.mean(inside.get_xlim()) == pytest.approx(evaluation.verdict.moment)
+    assert len(inside.get_lines()) == 3, "the curve, its bound, and the dot at the critical time"
+    assert low < ys(inside.get_lines()[-1])[0] < high
     seen = lag_problem("G[0,10] (x <= 0.5)")
-    figure = plot_evaluation(seen, evaluate(seen, seen.space.decode([1.0] * 4)))
-    assert not figure.axes[0].child_axes
+    assert not draw(seen, evaluate(seen, seen.space.decode([1.0] * 4))).axes[0].child_axes
 
 
 def test_signals_that_are_not_real_are_drawn_in_steps_with_their_names() -> None:
