@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -120,7 +121,7 @@ def formalize(
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, restated in words, distinguished from the others by an example and judged on one simulation.
-    Without --llm, templates that fit an English sentence are shown, and nothing is written.
+    Without --llm, the template that fits a simple English sentence is shown, and nothing is written.
     """
     from falsifier.problem.writing import subject_of, with_requirement
     from falsifier.views.analyses_text import formalized_json, formalized_text
@@ -151,26 +152,25 @@ def formalize(
 
 
 def _advise(target: str, sentence: str, *, as_json: bool) -> None:
-    """Print the templates that fit a sentence.
+    """Print the template that fits a sentence.
 
     Raises:
         SpecError: if none does.
     """
-    from falsifier.problem.template_advice import ENGLISH_ONLY, advised_templates, hint
+    from falsifier.problem.template_advice import advised_template
     from falsifier.problem.unit_check import defined_units
     from falsifier.problem.writing import subject_of
-    from falsifier.views.analyses_text import advice_json, advice_text
 
     problem = subject_of(target).problem
-    advice = advised_templates(sentence, problem.info, defined_units(problem.model))
-    if advice or as_json:
-        say(as_shown(advice_text(sentence, advice), advice_json(sentence, advice), as_json=as_json))
-    if not advice:
-        note = hint(sentence)
+    advice = advised_template(sentence, problem.info, defined_units(problem.model))
+    if advice is None:
         raise SpecError(
-            f"no template fits all words and numbers of this sentence; {ENGLISH_ONLY}"
-            + (f"\nnote: {note}" if note else "")
+            "no template fits all words and numbers of this sentence; without --llm NAME only simple English "
+            "sentences are understood: docs/requirements.md lists them, and all templates"
         )
+    lines = [f"{advice.template}: {advice.summary}", *(f"  {line}" for line in advice.section.splitlines())]
+    lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
+    say(as_shown("\n".join(lines), asdict(advice), as_json=as_json))
 
 
 def _may_ask() -> bool:

@@ -18,7 +18,6 @@ from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import objects_in, schema_of_list, schema_of_object
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.numbers import number
-from falsifier.problem.template_advice import WHAT_CANNOT_BE_SAID
 from falsifier.problem.templates import TEMPLATES
 
 MOST_READINGS = 3
@@ -53,6 +52,12 @@ The formula is checked on both examples, so choose values clearly on one side of
 If no formula over these signals can say it (a rate without a signal that is the rate, "after each step" of
 any size, an average, earlier values), do not write one that says something else: leave readings empty, and
 say in "cannot" why, and which signal or level would be needed. Otherwise "cannot" is ""."""
+
+_WHAT_CANNOT_BE_SAID = (
+    "Formulas compare values of the same sample. A rate needs a signal that is the rate, or the template "
+    'ramp_limit with over and range; "after each step" needs a level that the step crosses, such as '
+    'after = "target > 50"; averages and earlier values need a signal of the model.'
+)
 
 
 def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment) -> tuple[Message, ...]:
@@ -192,7 +197,7 @@ def read_readings(text: str) -> list[ReadingReply]:
     if not reply.readings and reply.cannot.strip():
         said = one_line(reply.cannot.strip()[:_LONGEST_MEANING])
         raise SpecError(
-            f"no formula was written, because the language model says: {said}\n{WHAT_CANNOT_BE_SAID}"
+            f"no formula was written, because the language model says: {said}\n{_WHAT_CANNOT_BE_SAID}"
         )
     if not reply.readings:
         raise RejectedReplyError('it has neither "readings" nor a reason in "cannot"')

@@ -12,7 +12,6 @@ from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
-from falsifier.problem.template_advice import Advice, hint
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, aligned, llm_use
 
@@ -219,25 +218,6 @@ def formalized_json(found: Formalized) -> dict[str, Any]:
         ],
         "rejected": list(found.rejected),
         "spent": {"calls": found.spent.calls, "tokens": found.spent.tokens, "cost": found.spent.cost},
-    }
-
-
-def advice_text(sentence: str, advice: list[Advice]) -> str:
-    """Return which templates fit a sentence, how to write them, and what formulas cannot say."""
-    hints = [f"note: {said}"] if (said := hint(sentence)) else []
-    lines = []
-    for one in advice:
-        lines += [f"{one.template}: {one.summary}", *(f"  {line}" for line in one.section.splitlines())]
-    lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
-    return "\n".join([*lines, *hints])
-
-
-def advice_json(sentence: str, advice: list[Advice]) -> dict[str, Any]:
-    """Return the same as a JSON object."""
-    return {
-        "sentence": sentence.strip(),
-        "templates": [asdict(one) for one in advice],
-        "note": hint(sentence),
     }
 
 

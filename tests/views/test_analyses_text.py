@@ -7,10 +7,8 @@ from falsifier.analyses.coverage import coverage_of
 from falsifier.analyses.formalize import formalize
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.replay import ScriptedChat
-from falsifier.problem.template_advice import Advice
 from falsifier.record.manifest import InputRecord
 from falsifier.views.analyses_text import (
-    advice_text,
     coverage_json,
     coverage_text,
     formalized_json,
@@ -70,12 +68,6 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
     assert [r["formula"] for r in content["readings"]] == [r["formula"] for r in READINGS]
     assert content["differences"][0]["only_first"]["speed"][0][0] == 0.0
     assert json.loads(json.dumps(content)) == content
-
-
-def test_advice_is_told_as_a_section() -> None:
-    advice = [Advice("rise", "it rises", '[requirements.NAME]\ntemplate = "rise"')]
-    assert advice_text("80 in 2 s", advice).startswith("rise: it rises\n  [requirements.NAME]\n")
-    assert "note: Formulas compare values" in advice_text("after each step", advice)
 
 
 def test_each_signal_has_its_name_and_range() -> None:
