@@ -9,15 +9,8 @@ from pathlib import PurePosixPath
 from falsifier.context.simulink import Diagram, names_text, structure_text
 from falsifier.context.simulink.comparisons import diagram_thresholds
 from falsifier.context.simulink.diagram import upstream
-from falsifier.context.sources import (
-    Source,
-    comparisons,
-    constants_of,
-    read_source,
-    roots_of,
-    without_annotations,
-)
-from falsifier.context.thresholds import Threshold
+from falsifier.context.sources import Source, constants_of, read_source, without_annotations
+from falsifier.context.thresholds import Threshold, thresholds
 from falsifier.core.words import counted
 
 _C = (".c", ".h", ".cpp", ".hpp")
@@ -74,7 +67,6 @@ def of_source(
     source: Source,
     library: Sequence[Source],
     seeds: Collection[str],
-    signals: Collection[str],
     *,
     is_named: bool = True,
 ) -> Readable:
@@ -82,24 +74,22 @@ def of_source(
 
     Args:
         source: the source.
-        library: all sources that were named: constants and structures of one may be declared in another.
+        library: all sources that were named: constants of one may be declared in another.
         seeds: the requirement's signals.
-        signals: all signals of the model.
         is_named: whether the user named this file; other sources are told only if they set one of ``seeds``.
     """
     short = ("size only", counted(source.text.count("\n") + 1, "line"))
-    if not is_named and roots_of(seeds).isdisjoint(source.names_set):
+    if not is_named and {name.rpartition(".")[2] for name in seeds}.isdisjoint(source.others):
         return Readable((short,))
-    alike = [each for each in library if each.is_modelica == source.is_modelica]
-    constants = constants_of(source, alike, signals)
-    limits = tuple(comparisons(source, constants))
+    constants = constants_of(source, library)
+    is_dotted = source.is_modelica
+    limits = tuple(thresholds(source.text, constants, source.shown, is_dotted=is_dotted, has_lines=True))
     compared = [f"{t.text}  [{t.place}]" for t in limits]
     stated = [f"{name} = {constants[name]}" for name in source.constants if constants.get(name)]
     whole = without_annotations(source.text) if source.is_modelica else source.text
     forms = (
         ("whole", whole.strip()),
         ("parameters and comparisons", "\n".join([*stated, *compared])),
-        ("comparisons", "\n".join(compared)),
         ("lines with the requirement's signals", "\n".join(_naming(source.text, "\n", seeds))),
         short,
     )

@@ -4,17 +4,14 @@ import codecs
 import re
 from collections.abc import Collection, Iterator
 from pathlib import Path, PurePosixPath
-from xml.etree.ElementTree import Element
 
 from falsifier.core.secrets import line_of_held_secret, line_of_secret
 from falsifier.errors import SpecError
-from falsifier.fmu.description import UNREADABLE, open_archive, read_xml
+from falsifier.fmu.description import UNREADABLE, open_archive
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
 _RESOURCES = (".txt", ".md", ".json")
 _SOURCES = (".c", ".h", ".mo")
-_TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
-_DESCRIPTION = "modelDescription.xml"
 # Sources of the FMI itself and of exporters' solvers say nothing about the model.
 _STANDARD = ("fmi2", "fmi3", "fmiplatform", "fmimodel", "sundials", "cvode")
 _MAX_BYTES = 4 << 20
@@ -35,8 +32,6 @@ _CONTROL = re.compile(r"[\x01-\x08\x0e-\x19\x1c-\x1f]")
 
 def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
     """Return the names and contents of the files in an FMU that may say something about the model.
-
-    Terminals and annotations are given as text, by the name of the file that has them.
 
     Raises:
         ModelError: if the FMU is not a zip archive, or a dangerous one.
@@ -60,44 +55,16 @@ def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
                 raise SpecError(
                     f"{fmu}: {entry.filename} is damaged ({error}); copy or export the FMU again"
                 ) from None
-            if entry.filename in (_TERMINALS, _DESCRIPTION):
-                root = read_xml(content, f"{fmu}: {entry.filename}", SpecError)
-                content = "\n".join(_lines(root)).encode()
             if content.strip():
                 yield entry.filename, content
 
 
 def _may_tell(name: PurePosixPath) -> bool:
-    if name.as_posix() in (_TERMINALS, _DESCRIPTION):
-        return True
     folder, suffix = name.parts[0], name.suffix.lower()
     if folder == "sources":
         return suffix in _SOURCES and not name.name.lower().startswith(_STANDARD)
     return (folder == "documentation" and suffix in _DOCUMENTS) or (
         folder == "resources" and suffix in _RESOURCES
-    )
-
-
-def _lines(root: Element) -> Iterator[str]:
-    """Return the terminals or annotations of a file, with the variables that annotations belong to."""
-    yield from map(_outline, root.iter("Terminal"))
-    owners = (("", root), *((f"{v.get('name')}: ", v) for v in root.findall("ModelVariables/*")))
-    for prefix, owner in owners:
-        for place in ("VendorAnnotations/Tool", "Annotations/Tool", "Annotations/Annotation"):
-            yield from (f"{prefix}{_outline(found)}" for found in owner.findall(place))
-
-
-def _outline(element: Element) -> str:
-    """Return an element and all within it in one line."""
-    return "; ".join(
-        " ".join(
-            [
-                each.tag.rpartition("}")[2],
-                *(f"{name}={value}" for name, value in each.attrib.items()),
-                *(each.text or "").split(),
-            ]
-        )
-        for each in element.iter()
     )
 
 

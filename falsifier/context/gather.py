@@ -12,6 +12,7 @@ from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text,
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
+from falsifier.context.sources import Source
 from falsifier.context.thresholds import Threshold
 from falsifier.context.values import SIMULINK, Compared, Context, Crossing, Excerpt
 from falsifier.core.words import counted
@@ -35,14 +36,14 @@ class _File:
         path: as it was named.
         name: as it is told. Only the name of a file: folders often have names of people and customers.
         sha256: of its content.
-        content: its text, or diagram.
+        content: its text, or what a diagram or source says.
         is_named: whether the user named it; it lies inside an FMU otherwise.
     """
 
     path: str
     name: str
     sha256: str
-    content: str | Diagram
+    content: str | Diagram | Source
     is_named: bool
 
 
@@ -88,17 +89,16 @@ def gather(
                 continue
             if sentry is not None:
                 sentry.look(text, name, name, NAME_THEM)
-            found.append(_File(name, name, sha256(content).hexdigest(), text, is_named=False))
-    sources = {f.path: source_of(f.content, f.name) for f in found if isinstance(f.content, str)}
-    library = [source for source in sources.values() if source is not None]
+            read = source_of(text, name) or text
+            found.append(_File(name, name, sha256(content).hexdigest(), read, is_named=False))
+    library = [file.content for file in found if isinstance(file.content, Source)]
 
     def readable_of(file: _File) -> Readable:
         if isinstance(file.content, Diagram):
             return of_diagram(file.content, seeds)
-        source = sources[file.path]
-        if source is None:
-            return of_text(file.content, file.name, signals)
-        return of_source(source, library, seeds, signals, is_named=file.is_named)
+        if isinstance(file.content, Source):
+            return of_source(file.content, library, seeds, is_named=file.is_named)
+        return of_text(file.content, file.name, signals)
 
     contents = [(file, readable_of(file)) for file in found]
     # Of the files inside an FMU, those with one form say nothing about the signals.
@@ -108,9 +108,9 @@ def gather(
     if sentry is None:
         return Context(crossings=crossings)
     told = _compared(contents, signals)
-    sizes = accumulate(map(_size, told))
+    sizes = accumulate(len(each.text) for each in told)
     compared = tuple(each for each, size in zip(told, sizes, strict=True) if size <= _MAX_COMPARED)
-    chosen = _fitting(contents, MAX_TOTAL - sum(_size(each) for each in compared))
+    chosen = _fitting(contents, MAX_TOTAL - sum(len(each.text) for each in compared))
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
         # Encodings may have hidden a secret before, and escapes of JSON still do.
@@ -147,12 +147,8 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
             sentry.look(packed.decode("utf-8", "replace"), f"{name}: {part}", name, _LEAVE_OUT)
     elif sentry is not None:
         sentry.look(text, name, name, _LEAVE_OUT)
-    read = read_diagram(path) if is_diagram else text
+    read = read_diagram(path) if is_diagram else source_of(text, path.name) or text
     return _File(name, path.name, sha256(content).hexdigest(), read, is_named=True)
-
-
-def _size(compared: Compared) -> int:
-    return len(compared.text) + len(compared.place)
 
 
 def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
@@ -213,6 +209,6 @@ def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:
         met = ends.keys() & {name.strip("'") for name in threshold.names}
         names = tuple(sorted(name for end in met for name in ends[end]))
         if names or threshold.place:  # a mode that sets no signal says nothing
-            limits.append(Compared(names, threshold.text, threshold.place))
+            limits.append(Compared(names, threshold.text))
     limits.sort(key=lambda each: not each.signals)
     return limits[:_MAX_COMPARISONS]

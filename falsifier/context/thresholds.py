@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import chain, pairwise
 from math import isinf
 from typing import NamedTuple
@@ -15,7 +16,6 @@ _DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
 _NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
 _MAX_LENGTH = 160
-_SHOWN_VALUES = 12
 OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 # Every alternative either takes what it has looked at or gives up after a limited number of characters, so
 # that time grows with the length of a text.
@@ -58,7 +58,7 @@ class Threshold:
         names: variables in it that are not constants.
         text: the comparison as written, with the values of named constants: ``u > limit (limit = 9.5)``.
         levels: if one variable is compared with nothing but a number or constant, that number: two numbers
-            of a constant that has two values. Of a table, its breakpoints.
+            of a constant that has two values.
         place: file and line, or block.
     """
 
@@ -100,48 +100,6 @@ def thresholds(
                 yield found
 
 
-def at_breakpoints(signal: str, values: Sequence[str], place: str) -> Threshold:
-    """Return what the breakpoints of a table say of the signal that leads to it."""
-    told = ", ".join(values[:_SHOWN_VALUES]) + (
-        f", ... ({len(values)})" if len(values) > _SHOWN_VALUES else ""
-    )
-    text = f"{signal} leads to a table with the breakpoints {told}"
-    return Threshold(frozenset([signal]), text, _numbers(values), place)
-
-
-def within(found: Threshold, names: Mapping[str, str]) -> Threshold:
-    """Return a comparison as it is seen from outside its function, class or chart.
-
-    Args:
-        found: the comparison.
-        names: what variables in it stand for outside; empty text for those that are only known inside.
-    """
-    inner = {name: names[name] for name in found.names if name in names}
-    outer = {name for name in inner.values() if name.isidentifier()}
-    stands = {name: text for name, text in inner.items() if text}
-    said = ", ".join(f"{name} = {text}" for name, text in stands.items())
-    return replace(
-        found,
-        names=(found.names - inner.keys()) | outer,
-        text=f"{found.text} ({said})" if said else found.text,
-    )
-
-
-def number_in(text: str) -> float | None:
-    """Return the number that a text is; None if it is not just a number, or too large for one."""
-    found = _NUMBER.match(text.strip().strip("()"))
-    if found is None:
-        return None
-    sign, hexadecimal, decimal = found.groups()
-    try:
-        number = float(decimal) if decimal else float.fromhex(hexadecimal)
-    except OverflowError:
-        return None
-    if isinf(number):
-        return None
-    return -number if sign == "-" else number
-
-
 def _compared(tokens: Sequence[Token]) -> Iterator[tuple[int, int, int]]:
     """Return where the sign of each comparison is, where its left side begins and its right side ends.
 
@@ -180,20 +138,26 @@ def _threshold(
     named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
     stated_values = [value for stated in named.values() for value in stated.split(" or ")]
     variables = frozenset(paths.keys() - known.keys())
-    if not variables or not _numbers([*(t.text for t in tokens if t.kind == "number"), *stated_values]):
+    if not variables or not [*_numbers([*(t.text for t in tokens if t.kind == "number"), *stated_values])]:
         return None
     levels: tuple[float, ...] = ()
     for side, other in (sides, sides[::-1]):
         if variables == {path for path, _ in _variables(side, is_dotted=is_dotted)} and _is_name(side):
             constant = "".join(token.text for token in other)
-            levels = _numbers(stated_values if _is_name(other) else [constant])
+            levels = tuple(_numbers(stated_values if _is_name(other) else [constant]))
     said = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
     return Threshold(variables, f"{shown}{said}", levels, place)
 
 
-def _numbers(texts: Iterable[str]) -> tuple[float, ...]:
-    """Return those of some texts that are numbers."""
-    return tuple(number for text in texts if (number := number_in(text)) is not None)
+def _numbers(texts: Iterable[str]) -> Iterator[float]:
+    """Return those of some texts that are nothing but a number, and none that is too large for one."""
+    for text in texts:
+        if found := _NUMBER.match(text.strip().strip("()")):
+            sign, hexadecimal, decimal = found.groups()
+            with suppress(OverflowError):
+                number = float(decimal) if decimal else float.fromhex(hexadecimal)
+                if not isinf(number):
+                    yield -number if sign == "-" else number
 
 
 def _is_name(side: Sequence[Token]) -> bool:
@@ -215,9 +179,9 @@ def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[st
             path = f"{path}{token.text}" if after.text == "." else ""
 
 
-def tokens_of(text: str, at: int = 0) -> Iterator[Token]:
-    """Return the tokens of a text in any of the languages, from a place on, without blanks and comments."""
-    for found in _TOKEN.finditer(text, at):
+def tokens_of(text: str) -> Iterator[Token]:
+    """Return the tokens of a text in any of the languages, without blanks and comments."""
+    for found in _TOKEN.finditer(text):
         if found.lastgroup not in ("blank", "comment"):
             yield Token(found.lastgroup or "", found[0], found.start(), found.end())
 

@@ -36,12 +36,10 @@ class Compared:
     Attributes:
         signals: the model's signals in it, by their names there; empty if it is about other variables.
         text: the comparison, with the values of named constants.
-        place: file and line, or block.
     """
 
     signals: tuple[str, ...]
     text: str
-    place: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,15 +57,13 @@ def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
     seeds = problem.requirement.formula.signals
     found = gather(
         named.files,
-        fmu_files(problem.model) if named.fmu else {},
+        fmu_files(problem.model) if named.fmu else (),
         seeds=tuple(seeds),
         signals=tuple(dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))),
         checked=named.checked,
         ranges={r.name: (r.low, r.high) for r in searched},
         is_told=is_told,
     )
-    if not is_told:
-        return replace(problem, context=Context(crossings=found.crossings))
     for note in found.notes:
         _say_once(note)
     return replace(problem, context=found)

@@ -84,15 +84,3 @@ def test_names_within_a_subsystem_or_chart_are_those_of_what_leads_there() -> No
     diagram = Diagram("m", BlockSystem(blocks, wires), charts=(chart,))
     found = [(t.text, set(t.names)) for t in diagram_thresholds(diagram)]
     assert found == [("speed >= 3", {"speed"}), ("d > 4 (d = speed)", {"speed"}), ("u > 5", set())]
-
-
-def test_breakpoints_of_tables_are_levels_of_what_leads_there() -> None:
-    blocks = (
-        Block("Inport", "u", number=1),
-        Block("Lookup_n-D", "map", (("BreakpointsForDimension1", "[0 2.5, 1e1]"), ("Table", "[1 2 3]"))),
-        Block("Lookup_n-D", "unknown", (("BreakpointsForDimension1", "bp"),)),
-    )
-    wires = (Wire(End("u", "1"), (End("map", "1"), End("unknown", "1"))),)
-    (found,) = diagram_thresholds(Diagram("m", BlockSystem(blocks, wires)))
-    assert found.text == "u leads to a table with the breakpoints 0, 2.5, 1e1"
-    assert found.levels == (0.0, 2.5, 10.0)

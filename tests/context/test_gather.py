@@ -155,7 +155,7 @@ def test_folders_of_the_machine_are_recorded_and_not_told(tmp_path: Path) -> Non
     assert [e.name for e in context.excerpts] == ["a.mo", "b.mo", "limphome.slx"]
     assert context.excerpts[0].path == str(source)
     assert not [e for e in context.excerpts if str(tmp_path) in e.text + e.form]
-    assert not [c for c in context.comparisons if str(tmp_path) in c.text + c.place]
+    assert not [c for c in context.comparisons if str(tmp_path) in c.text]
 
 
 def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
     path.write_text(f"{text}}}\n")
     (tmp_path / "b.md").write_text("The power matters. " * 600)
     context = read(path, tmp_path / "b.md")
-    size = sum(len(c.text) + len(c.place) for c in context.comparisons)
+    size = sum(len(c.text) for c in context.comparisons)
     assert 5_000 < size <= 6_000
     assert size + sum(len(e.text) + len(e.name) + len(e.form) for e in context.excerpts) <= MAX_TOTAL
 

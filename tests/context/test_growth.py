@@ -47,10 +47,6 @@ TEXTS = {
     "classes": "model A Real y; ",
     "calls": "y = f(u); f(y);\n",
     "modifiers": "model M Real y(a = ",
-    "structures": "struct A { struct B {",
-    "filled structures": "A a = { ",
-    "connections": "connect(a, Gain ",
-    "blocks": "Limiter a(u = ",
 }
 
 

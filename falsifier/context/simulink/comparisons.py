@@ -2,25 +2,20 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
 
 from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram
-from falsifier.context.thresholds import Threshold, at_breakpoints, thresholds, within
+from falsifier.context.thresholds import Threshold, thresholds
 
 # Of an If block, u1 is what leads to its first port, not a signal of that name.
 _PORT = re.compile(r"\bu(\d+)\b")
 _NUMBER = re.compile(r"[-+]?(\d++\.?\d*+|\.\d++)([eE][-+]?\d++)?$")
-# Tables by type: the parameter that has the breakpoints of each input.
-_TABLES: Mapping[str, Mapping[str, str]] = {
-    "Lookup": {"1": "InputValues"},
-    "Lookup2D": {"1": "RowIndex", "2": "ColumnIndex"},
-    "Lookup_n-D": {str(i): f"BreakpointsForDimension{i}" for i in range(1, 6)},
-}
 # A constant may state its type: single(5), int8(3).
 _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
 
 
 def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = None) -> Iterator[Threshold]:
-    """Return the comparisons with constants, and the breakpoints of tables.
+    """Return the comparisons with constants.
 
     Args:
         diagram: the model.
@@ -47,8 +42,6 @@ def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = No
             shown = f"{diagram.name}/{'/'.join(place)}"
             for text in _compared(block, inputs):
                 yield from thresholds(text, {}, shown)
-            for signal, values in _breakpoints(block, inputs):
-                yield at_breakpoints(signal, values, shown)
     for chart in diagram.charts:
         place = tuple(chart.name.split("/"))
         if only is None or place in only:
@@ -62,16 +55,12 @@ def _chart_thresholds(chart: Chart, fed: Mapping[str, str], shown: str) -> Itera
     inputs = {d.name for d in chart.data if d.scope == "input"}
     outside = own | {name: text for name, text in fed.items() if name in inputs and text != name}
     for text in (*(t.label for t in chart.transitions), *(s.actions for s in chart.states), chart.script):
-        for threshold in thresholds(text, constants, shown):
-            yield within(threshold, outside)
-
-
-def _breakpoints(block: Block, inputs: Mapping[str, str]) -> Iterator[tuple[str, list[str]]]:
-    """Return what leads to each input of a table, with its breakpoints if they are numbers."""
-    for port, name in _TABLES.get(block.type, {}).items():
-        values = block.parameter(name).strip("[] ").replace(",", " ").split()
-        if port in inputs and values and all(_NUMBER.match(value) for value in values):
-            yield inputs[port], values
+        for found in thresholds(text, constants, shown):
+            inner = found.names & outside.keys()
+            names = {outside[name] for name in inner if outside[name].isidentifier()}
+            told = ", ".join(f"{name} = {outside[name]}" for name in sorted(inner) if outside[name])
+            shown_with = f"{found.text} ({told})" if told else found.text
+            yield replace(found, names=(found.names - inner) | names, text=shown_with)
 
 
 def _sources(system: BlockSystem, fed: Mapping[str, str]) -> Mapping[str, Mapping[str, str]]:

@@ -86,6 +86,15 @@ class BlockSystem:
         found = [b for b in self.blocks if b.type == kind and not b.is_off]
         return tuple(b.name for b in sorted(found, key=lambda b: b.number))
 
+    def leading(self) -> Mapping[str, Mapping[str, tuple[End, str]]]:
+        """Return what leads to each port of each block: where its line begins, and the line's name."""
+        found: dict[str, dict[str, tuple[End, str]]] = {}
+        for wire in self.wires:
+            if wire.source is not None:
+                for target in wire.targets:
+                    found.setdefault(target.block, {})[target.port] = (wire.source, wire.name)
+        return found
+
     def walk(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], "BlockSystem"]]:
         """Return this system and all within it with their paths, outer ones first."""
         yield path, self
@@ -228,10 +237,8 @@ def _sources(diagram: Diagram) -> Mapping[BlockPath, list[BlockPath]]:
                 found.append(path)
             if block.system is not None and not block.is_off:
                 found += [(*place, name) for name in block.system.ports("Outport")]
-        for wire in system.wires:
-            if wire.source is not None:
-                for target in wire.targets:
-                    sources.setdefault((*path, target.block), []).append((*path, wire.source.block))
+        for name, ends in system.leading().items():
+            sources.setdefault((*path, name), []).extend((*path, end.block) for end, _ in ends.values())
     for chart in diagram.charts:
         for data in chart.data:
             if data.scope == "data_store_memory":

@@ -5,9 +5,6 @@ from collections.abc import Collection, Iterator, Mapping
 from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram, End
 from falsifier.core.words import counted
 
-# What leads to each port of each block: its source and the signal's name.
-_Leading = Mapping[str, Mapping[str, tuple[End, str]]]
-
 
 def names_text(diagram: Diagram) -> str:
     """Return the names of a diagram: inports, outports, blocks by system, signals, states."""
@@ -54,12 +51,12 @@ def _names(path: BlockPath, system: BlockSystem) -> Iterator[str]:
 
 
 def _structure(path: BlockPath, system: BlockSystem, only: Collection[BlockPath] | None) -> Iterator[str]:
-    leading = _leading(system)
+    leading = system.leading()
     told = [b for b in system.blocks if only is None or (*path, b.name) in only]
     if path:
         yield f"Subsystem {'/'.join(path)}"
     for block in sorted(told, key=_ports_first):
-        yield f"- {_block(block)}{_from(block, leading)}"
+        yield f"- {_block(block)}{_from(leading.get(block.name, {}))}"
     left_out = len(system.blocks) - len(told)
     if left_out:
         yield f"  ({counted(left_out, 'block')} left out: no influence on the requirement)"
@@ -78,22 +75,10 @@ def _block(block: Block) -> str:
     return f"{block.name}: {kind}{number}{f' ({stated})' if stated else ''}{reference}{off}"
 
 
-def _leading(system: BlockSystem) -> _Leading:
-    found: dict[str, dict[str, tuple[End, str]]] = {}
-    for wire in system.wires:
-        if wire.source is not None:
-            for target in wire.targets:
-                found.setdefault(target.block, {})[target.port] = (wire.source, wire.name)
-    return found
-
-
-def _from(block: Block, leading: _Leading) -> str:
-    found = [(port, source, name) for port, (source, name) in leading.get(block.name, {}).items()]
-    if not found:
-        return ""
+def _from(leading: Mapping[str, tuple[End, str]]) -> str:
     # Ports in order; named ones, such as enable, last.
-    found.sort(key=lambda each: (not each[0].isdigit(), each[0].rjust(4)))
-    return f" <- {', '.join(_source(*each) for each in found)}"
+    ports = sorted(leading, key=lambda port: (not port.isdigit(), port.rjust(4)))
+    return f" <- {', '.join(_source(port, *leading[port]) for port in ports)}" if ports else ""
 
 
 def _source(port: str, source: End, name: str) -> str:

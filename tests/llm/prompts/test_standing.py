@@ -179,7 +179,7 @@ class TestAdvice:
 
 def test_only_mp6_tells_context() -> None:
     excerpt = Excerpt("/home/me/a.md", "a.md", "0" * 64, "whole", "THE TEXT")
-    compared = (Compared(("x",), "x > 3", "a:1"), Compared(("u",), "u < 1", "a:2"), Compared((), "z < 2", ""))
+    compared = (Compared(("x",), "x > 3"), Compared(("u",), "u < 1"), Compared((), "z < 2"))
     view = replace(View.of(lag_problem()), context=Context((excerpt,), compared))
     texts = {name: standing(view, name) for name in VARIANTS}
     assert [name for name, text in texts.items() if "THE TEXT" in text] == ["MP6"]
