@@ -13,7 +13,8 @@ from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
 from falsifier.problem.template_arguments import Template, TemplateError
 from falsifier.problem.templates import RampLimit
 from falsifier.stl import Formula, Monitor, parse
-from falsifier.stl.formula import renamed
+from falsifier.stl.expression import Name
+from falsifier.stl.formula import replaced
 
 STL_OPTION, TEMPLATE_OPTION = "--stl", "--template"
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
@@ -78,9 +79,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             raise SpecError(_unknown(name, info))
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]
-    formula = renamed(
-        formula, {v.name: v.alias_of for v in variables if v.alias_of and v.causality == "input"}
-    )
+    aliases = [v for v in variables if v.alias_of and v.causality == "input"]
+    formula = replaced(formula, {Name(v.name): Name(v.alias_of) for v in aliases})
     try:
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:

@@ -295,15 +295,15 @@ def _prefixed(operand: Formula) -> str:
     return embraced(operand, PREFIX)
 
 
-def renamed(node: T, names: Mapping[str, str]) -> T:
-    """Return the same formula or expression with other names; names that are not listed stay."""
-    found: Any = node
-    if isinstance(node, Name):
-        found = Name(names.get(node.name, node.name))
-    elif isinstance(node, tuple):
-        found = tuple(renamed(part, names) for part in node)
+def replaced(node: T, parts: Mapping[Any, Any]) -> T:
+    """Return the same formula or expression with other formulas or expressions in place of these."""
+    found: Any = parts.get(node, node)
+    if found is not node:
+        return cast(T, found)
+    if isinstance(node, tuple):
+        found = tuple(replaced(part, parts) for part in node)
     elif is_dataclass(node) and not isinstance(node, type):
-        found = type(node)(*(renamed(getattr(node, f.name), names) for f in fields(node)))
+        found = type(node)(*(replaced(getattr(node, f.name), parts) for f in fields(node)))
     return cast(T, found)
 
 

@@ -91,17 +91,17 @@ def test_it_calls_twice_and_then_answers() -> None:
 def test_neutral_names_hold_in_calls_and_answers() -> None:
     def script(request: ChatRequest) -> Line:
         if not request.tools:
-            levels = (0.25, 0.625) if len(chat.requests) == 1 else (0.5 + 0.02 * len(chat.requests),)
+            levels = (25.0, 62.5) if len(chat.requests) == 1 else (50.0 + 2 * len(chat.requests),)
             return candidates(*levels, name="u1")
         told = answers(request)
-        return call(0.875, name="u1") if not told else candidates(0.9375, name="u1")
+        return call(87.5, name="u1") if not told else candidates(93.75, name="u1")
 
     chat = ScriptedChat(script)
     engine = hybrid(chat, anonymous=True)
     judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
     asked = drive(engine, judge, rounds=14)
     sent = [r for r in chat.requests if r.tools]
-    assert "by y1 <= 0.730769231" in answers(sent[1])[0]
+    assert "by y1 <= 73.0769231" in answers(sent[1])[0]
     everything = "\n".join(m.content for r in sent for m in r.messages) + str([r.tools for r in sent])
     # An x between numbers counts repeated values.
     assert not re.search(r"\bu\b|(?<!\d )\bx\b|\blag\b|drive|position", everything)

@@ -27,7 +27,7 @@ from falsifier.stl.formula import (
     Implies,
     Predicate,
     Until,
-    renamed,
+    replaced,
     without_constants,
 )
 from tests.stl.direct import Direct
@@ -47,8 +47,9 @@ def test_compared_expressions_are_signals_of_their_own() -> None:
 
 def test_only_listed_names_change() -> None:
     formula = parse("G[0,2] (a + b <= 3 and F (abs(a) > c))")
-    assert renamed(formula, {"a": "x", "d": "y"}) == parse("G[0,2] (x + b <= 3 and F (abs(x) > c))")
-    assert renamed(parse("a until b > 0"), {"a": "b", "b": "a"}) == parse("b until a > 0"), "exchanged"
+    a, b, x, d, y = map(Name, "abxdy")
+    assert replaced(formula, {a: x, d: y}) == parse("G[0,2] (x + b <= 3 and F (abs(x) > c))")
+    assert replaced(parse("a until b > 0"), {a: b, b: a}) == parse("b until a > 0"), "exchanged"
 
 
 X, Y = Name("x"), Name("wheel speed")

@@ -87,8 +87,7 @@ def published_standing(view: View, variant: Variant, *, count: int = 1, reply: R
 
 def _outputs(view: View) -> str:
     names = ", ".join(
-        f"{n} (0 is false, 1 is true)" if view.kind(n) == "boolean" and view.tells_kinds else n
-        for n in view.formula_outputs
+        f"{n} (0 is false, 1 is true)" if view.kind(n) == "boolean" else n for n in view.formula_outputs
     )
     return f"Output signals: {names or 'none; the requirement refers to inputs only.'}"
 
@@ -169,13 +168,13 @@ def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Ite
     """Lines on one judged sample: its robustness, what was compared when, and what decided."""
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
-    yield f"robustness {verdict.robustness:.{_DECIMALS + view.more_decimals}f}"
+    yield f"robustness {verdict.robustness:.{_DECIMALS}f}"
     told = {} if trajectory is None else _told_columns(view, trajectory)
     if variant.has("values") and trajectory is not None:
         times = {time for r in view.space.inputs for time in view.space.fixed_times(r)}
         for text, column in told.items():
             values = (
-                f"{_output(view, column[trajectory.index(t)])} at {_clock(view, t)}"
+                f"{_output(column[trajectory.index(t)])} at {_clock(view, t)}"
                 for t in sorted(times or {0.0, view.space.stop_time})
             )
             yield f"{text}: {', '.join(values)}"
@@ -184,7 +183,7 @@ def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Ite
         if trajectory is not None:
             at = trajectory.index(verdict.critical_time)
             there = {text: float(column[at]) for text, column in told.items()}
-        values = (f"{name} = {_output(view, value)}" for name, value in there.items())
+        values = (f"{name} = {_output(value)}" for name, value in there.items())
         time = f"{verdict.critical_time:.{_clock_decimals(view.requirement.formula)}f} s"
         yield f"the robustness was decided at t = {time}{' with ' if there else ''}{', '.join(values)}"
 
@@ -214,7 +213,7 @@ def _clock_decimals(formula: Formula) -> int:
     return min(found, _MOST_CLOCK_DECIMALS) or 1
 
 
-def _output(view: View, value: float) -> str:
-    fewest, most = _FEWEST_OF_OUTPUT + view.more_decimals, _MOST_OF_OUTPUT + view.more_decimals
-    texts = (f"{value:.{decimals}f}" for decimals in range(fewest, most + 1))
-    return next((text for text in texts if float(text)), f"{value:.{most if value else fewest}f}")
+def _output(value: float) -> str:
+    texts = (f"{value:.{decimals}f}" for decimals in range(_FEWEST_OF_OUTPUT, _MOST_OF_OUTPUT + 1))
+    last = _MOST_OF_OUTPUT if value else _FEWEST_OF_OUTPUT
+    return next((text for text in texts if float(text)), f"{value:.{last}f}")

@@ -131,6 +131,7 @@ class Questions:
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
+        self._only_jumps = all(r.kind != "real" for r in view.space.inputs)
         self._climb = Climb(_counting(view), "sample")
 
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
@@ -250,15 +251,14 @@ class Questions:
     def _advice_on_first(self) -> str:
         if not self.view.space.inputs:
             return _FIRST["parameters"]
-        return _FIRST["jumping" if all(map(self.view.only_jumps, self.view.space.inputs)) else "inputs"]
+        return _FIRST["jumping" if self._only_jumps else "inputs"]
 
     def _advice_on_samples(self) -> Iterator[str]:
         what = self.view.chosen
         yield _ON_OUTPUTS.format(one=what[:-1])
         if not self._is_flat():
             yield _ON_TIME.format(what=what)
-        only_jump = all(map(self.view.only_jumps, self.view.space.inputs))
-        yield _ON_STRATEGY.format(such="" if only_jump else _SUCH)
+        yield _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
 
     def _standings(self) -> Iterator[str]:
         """Which samples are the best, or got furthest; where robustness says little, what is missing."""
@@ -379,7 +379,7 @@ def _counting(view: View) -> dict[str, dict[int, str]]:
     return {
         name: {number: item for item, number in view.info[name].literals.items()}
         for name in view.experiment.outputs
-        if view.tells_kinds and view.kind(name) in ("integer", "enumeration") and name in view.info
+        if view.kind(name) in ("integer", "enumeration") and name in view.info
     }
 
 

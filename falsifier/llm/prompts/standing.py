@@ -200,8 +200,8 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
         return
     yield "Recorded signals:"
     for name in recorded:
-        kind = view.kind(name) if view.tells_kinds else "real"
-        values = ", ".join(view.items(name)) or ("" if kind == "real" else kind)
+        kind = view.kind(name)
+        values = ", ".join(view.items(name)) or (kind if kind in ("integer", "boolean") else "")
         text = f"- {name}{_bracketed(view.unit(name))}{values and f', {values}'}"
         text += _described(view.description(name))
         if name in start:
@@ -239,7 +239,7 @@ def _choice(view: View) -> Iterator[str]:
         nominal = "" if p.nominal is None else f", nominally {number(p.nominal)}"
         what = f"- parameter {p.name}{_bracketed(p.unit)}{_described(p.description)}"
         once = "one value for the whole simulation"
-        yield f"{what}; {_values(view, p)}{nominal}; {once}{_in_files(view, p.name)}"
+        yield f"{what}; {_values(p)}{nominal}; {once}{_in_files(view, p.name)}"
 
 
 def _horizon(view: View) -> str:
@@ -248,7 +248,7 @@ def _horizon(view: View) -> str:
 
 
 def _input(view: View, r: InputRange) -> str:
-    parts = [f"- input signal {r.name}{_bracketed(r.unit)}{_described(r.description)}", _values(view, r)]
+    parts = [f"- input signal {r.name}{_bracketed(r.unit)}{_described(r.description)}", _values(r)]
     if r.control_points == 1:
         parts.append("one value for the whole time")
     else:
@@ -264,11 +264,11 @@ def _freedom(view: View) -> Iterator[str]:
     groups: dict[tuple[Freedom, bool], list[str]] = {}
     for r in view.space.inputs:
         if r.free is not None:
-            groups.setdefault((r.free, view.only_jumps(r)), []).append(r.name)
-    for (free, only_jumps), names in groups.items():
+            groups.setdefault((r.free, r.kind != "real"), []).append(r.name)
+    for (free, is_discrete), names in groups.items():
         what = (
             "number and times"
-            if only_jumps
+            if is_discrete
             else "number, times and interpolation (pchip, linear or constant)"
         )
         whose = "" if len(view.space.inputs) == 1 else f" of {listed(names)}"
@@ -289,11 +289,9 @@ def _control_times(view: View, r: InputRange) -> str:
     return f"at t = {', '.join(times)} s"
 
 
-def _values(view: View, ranged: InputRange | ParameterRange) -> str:
+def _values(ranged: InputRange | ParameterRange) -> str:
     """The values that may be chosen."""
     items = [f"{n} = {name}" for name, n in ranged.items if ranged.low <= n <= ranged.high]
-    if ranged.name in view.levels:
-        items = [number(level) for level in view.levels[ranged.name]]
     if items:
         return f"one of the numbers {', '.join(items)}"
     if ranged.kind == "boolean":
@@ -329,7 +327,7 @@ def _advice(view: View) -> Iterator[str]:
     if any(isinstance(part, Implies) for part in formula.walk()):
         yield _IMPLICATION
     free = [r for r in view.space.inputs if r.free]
-    jumping = [r.name for r in free if view.only_jumps(r)]
+    jumping = [r.name for r in free if r.kind != "real"]
     if len(jumping) < len(free):
         yield _SHAPES
     if jumping:
@@ -345,7 +343,7 @@ def _example_and_notes(view: View, count: int) -> Iterator[str]:
         one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
     if space.parameters:
         one["parameters"] = [
-            {"name": p.name, "value": _spread(view, p, 1, k)[0]} for k, p in enumerate(space.parameters)
+            {"name": p.name, "value": _spread(p, 1, k)[0]} for k, p in enumerate(space.parameters)
         ]
     yield json.dumps({"lessons": _LESSONS, **(one if count == 1 else {"candidates": [one]})})
     if len(space.names) > 1:
@@ -371,7 +369,7 @@ def _order(view: View) -> str:
 
 def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
     if not free:
-        return {"name": r.name, "values": _spread(view, r, r.control_points, position)}
+        return {"name": r.name, "values": _spread(r, r.control_points, position)}
     times: list[float] = []
     interpolation: str = r.interpolation
     count = r.control_points
@@ -381,15 +379,12 @@ def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[st
         if position == 0 and fits and r.free.min_interval <= view.space.stop_time / 5:
             times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
             interpolation, count = "constant", len(times)
-    values = _spread(view, r, count, position)
+    values = _spread(r, count, position)
     return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
 
 
-def _spread(view: View, ranged: InputRange | ParameterRange, count: int, first: int) -> list[float]:
-    """Values that a reply may contain and that differ from each other; a type that is not told has levels."""
-    width, levels = ranged.high - ranged.low, view.levels.get(ranged.name)
+def _spread(ranged: InputRange | ParameterRange, count: int, first: int) -> list[float]:
+    """Values that a reply may contain and that differ from each other."""
     places = (_PLACES[(first + k) % len(_PLACES)] for k in range(count))
-    values = [float(f"{ranged.low + place * width:.4g}") for place in places]
-    if levels:
-        return [min(levels, key=lambda level: abs(level - value)) for value in values]
-    return [nearest_value(ranged, value) for value in values]
+    values = (ranged.low + place * (ranged.high - ranged.low) for place in places)
+    return [nearest_value(ranged, float(f"{value:.4g}")) for value in values]

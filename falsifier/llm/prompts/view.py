@@ -10,7 +10,7 @@ from typing import Literal
 
 from falsifier.context.values import Context
 from falsifier.core.model import Experiment, Kind, ModelInfo
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
@@ -27,10 +27,6 @@ class View:
         requirement: the requirement to violate.
         space: search space.
         experiment: stop time and output grid.
-        levels: values that something searched can take, by name, if they are levels without a type.
-        tells_kinds: whether types of signals are told.
-        more_decimals: decimals that the published variants tell in addition to theirs, which are those of
-            signals in the hundreds.
         context: what the files say that the user named.
     """
 
@@ -38,9 +34,6 @@ class View:
     requirement: Requirement
     space: SearchSpace
     experiment: Experiment
-    levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    tells_kinds: bool = True
-    more_decimals: int = 0
     context: Context = field(default_factory=Context)
 
     @classmethod
@@ -76,10 +69,6 @@ class View:
         literals = self.info[name].literals if name in self.info else {}
         item = next((item for item, number in literals.items() if number == value), "")
         return f"{text} ({item})" if item else text
-
-    def only_jumps(self, r: InputRange) -> bool:
-        """Whether an input can only jump from value to value."""
-        return r.kind != "real" or r.name in self.levels
 
     @property
     def chosen(self) -> str:
