@@ -10,8 +10,7 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
-from falsifier.problem.template_arguments import Template, TemplateError
-from falsifier.problem.templates import RampLimit
+from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
 from falsifier.stl.formula import replaced
@@ -94,7 +93,7 @@ def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> li
     """Return the formulas of requirements, for the times in them; templates that do not fit have none."""
     found = []
     for section in sections:
-        with suppress(TemplateError):
+        with suppress(SpecError):
             found.append(section.expanded(section.stop_time or stop_time))
     return found
 
@@ -109,27 +108,13 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
         key: the section's key in its spec; empty if it was given by an option.
 
     Raises:
-        SpecError: naming the argument of a template that names an unknown signal or does not fit, or what is
-            wrong with the formula.
+        SpecError: naming what is wrong with the formula, or with the arguments of a template.
     """
-    is_template = isinstance(section, Template)
-    option = None if key else TEMPLATE_OPTION if is_template else STL_OPTION
+    kind = "template" if isinstance(section, Template) else "formula"
+    option = None if key else {"template": TEMPLATE_OPTION, "formula": STL_OPTION}[kind]
     with in_section(option, key):
-        for argument, name in section.signals():
-            if name in info:
-                continue
-            message = _unknown(name, info)
-            if isinstance(section, RampLimit) and argument == "rate" and section.rate is None:
-                message = (
-                    f"the model has no {name}: state rate, the signal that is this rate of change; or over, "
-                    "a time in s, and range, [low, high]"
-                )
-            raise SpecError(message, key=argument)
-        try:
-            text = section.expanded(experiment.stop_time, experiment.output_interval)
-        except TemplateError as error:
-            raise SpecError(str(error), key=error.key) from None
-    with in_section(option, key and f"{key}.{'template' if is_template else 'formula'}"):
+        text = section.expanded(experiment.stop_time, experiment.output_interval)
+    with in_section(option, key and f"{key}.{kind}"):
         return parse_requirement(text, info, experiment)
 
 
@@ -140,4 +125,6 @@ def _unknown(name: str, info: ModelInfo) -> str:
     near = did_you_mean(name, (v.name for v in info.variables))
     if listing.startswith("known") and not near.startswith("known"):
         listing = f"{near.split('?')[0]}? K{listing[1:]}"
+    if name.startswith("der("):
+        listing += "; without a signal that is the rate, use the template ramp_limit with over and range"
     return f"unknown signal {name!r}; {listing}"

@@ -227,10 +227,6 @@ class RequirementSection(ModelChanges):
         del stop_time, step
         return self.formula
 
-    def signals(self) -> tuple[tuple[str, str], ...]:
-        """Return nothing: the formula is checked as a whole."""
-        return ()
-
 
 class ProfileSection(ModelChanges):
     """An alternative parameterization of the spec's problems."""

@@ -16,13 +16,13 @@ one, true at the next; a condition that is true at time 0 does not become true t
 The first line of a template's docstring is what lists and prompts say of it.
 """
 
-from collections.abc import Iterator, Mapping
-from functools import reduce
+from collections.abc import Mapping
 from itertools import combinations, pairwise
 from typing import Literal
 
 from pydantic import Field, model_validator
 
+from falsifier.errors import FormulaError
 from falsifier.problem.sections import Range, Seconds
 from falsifier.problem.template_arguments import (
     Clock,
@@ -32,19 +32,14 @@ from falsifier.problem.template_arguments import (
     Margin,
     Moment,
     Template,
-    TemplateError,
     Term,
     near,
-    scaled,
     share_of,
     size_of,
-    term,
     tidy,
-    window_of,
+    window,
 )
-from falsifier.stl import Formula, parse
-from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Number
-from falsifier.stl.formula import Always, And, Comparison, Eventually, Implies, Not, Or, Predicate, Until
+from falsifier.stl import parse
 
 # Maximum number of levels at which ramp_limit compares a signal with itself some time later.
 _MOST_LEVELS = 30
@@ -69,18 +64,10 @@ class Settles(Template):
         None, description="How long it stays there in s; default after a time: to the end of the simulation."
     )
 
-    def _formula(self, clock: Clock) -> Formula:
+    def _formula(self, clock: Clock) -> str:
         inside = near(self.signal, self.reference, self.within)
-        if isinstance(self.after, str) and self.stays is None:
-            raise TemplateError(
-                "stays", "this key is missing: after a condition, say how long it stays there"
-            )
-
-        def settled(start: float, end: float) -> Formula:
-            return Always(inside, window_of(start + self.time, end))
-
         lasts = None if self.stays is None else self.time + self.stays
-        return self._after(self.after, clock, settled, lasts=lasts, begins=self.time)
+        return self._from(self.after, clock, "G", inside, lasts=lasts, key="stays", begins=self.time)
 
 
 class Overshoot(Template):
@@ -96,19 +83,11 @@ class Overshoot(Template):
         None, description="How long it applies in s; default after a time: to the end of the simulation."
     )
 
-    def _formula(self, clock: Clock) -> Formula:
-        if isinstance(self.after, str) and self.duration is None:
-            raise TemplateError(
-                "duration", "this key is missing: after a condition, say for how long it applies"
-            )
-        signal, reference = term(self.signal), term(self.reference)
-        sides = (signal, reference) if self.direction == "up" else (reference, signal)
-        bounded = Predicate("<=", Arithmetic("-", *sides), size_of(self.at_most, reference, "at_most"))
-
-        def kept(start: float, end: float) -> Formula:
-            return Always(bounded, window_of(start, end))
-
-        return self._after(self.after, clock, kept, lasts=self.duration)
+    def _formula(self, clock: Clock) -> str:
+        sides = (self.signal, self.reference)
+        more, less = sides if self.direction == "up" else sides[::-1]
+        bounded = f"{more} - ({less}) <= {size_of(self.at_most, self.reference)}"
+        return self._from(self.after, clock, "G", bounded, lasts=self.duration, key="duration")
 
 
 class Rise(Template):
@@ -135,15 +114,16 @@ class Rise(Template):
             )
         return self
 
-    def _formula(self, clock: Clock) -> Formula:
-        operator: Comparison = ">=" if self.direction == "up" else "<="
-        level = scaled(share_of(self.reaches) or 0.0, term(self.reference))
-        reached = Predicate(operator, term(self.signal), level)
-
-        def risen(start: float, end: float) -> Formula:
-            return Eventually(reached, window_of(start, end))
-
-        return self._after(self.after, clock, risen, lasts=self.time)
+    def _formula(self, clock: Clock) -> str:
+        share, reference = share_of(self.reaches) or 0.0, self.reference
+        if isinstance(reference, float):
+            level = f"{tidy(share * reference)}"
+        else:
+            level = reference if share == 1 else f"{share} * ({reference})"
+        operator = ">=" if self.direction == "up" else "<="
+        return self._from(
+            self.after, clock, "F", f"{self.signal} {operator} {level}", lasts=self.time, key="time"
+        )
 
 
 class Response(Template):
@@ -158,15 +138,12 @@ class Response(Template):
         "true", description="true: at each time when the condition holds; rising: only when it becomes true."
     )
 
-    def _formula(self, clock: Clock) -> Formula:
-        when, then = parse(self.when), parse(self.then)
-        if self.stays:
-            then = Always(then, window_of(0.0, self.stays))
-        answer = Eventually(then, window_of(0.0, self.time))
-        reach = self.time + self.stays
+    def _formula(self, clock: Clock) -> str:
+        then = f"G{window(0.0, self.stays)} ({self.then})" if self.stays else self.then
+        answer = f"F{window(0.0, self.time)} ({then})"
         if self.on == "true":
-            return Always(Implies(when, answer), self._span(clock, reach))
-        return self._each_time(clock, when, answer, reach)
+            return self._throughout(f"({self.when}) -> {answer}", clock)
+        return self._each_time(self.when, answer, clock)
 
 
 class StaysWithin(Template):
@@ -189,17 +166,12 @@ class StaysWithin(Template):
             raise ValueError(f"low is {self.low:g}, more than high, {self.high:g}: exchange them")
         return self
 
-    def _formula(self, clock: Clock) -> Formula:
-        window = self._span(clock)
+    def _formula(self, clock: Clock) -> str:
         if self.reference is not None and self.within is not None:
-            return Always(near(self.signal, self.reference, self.within), window)
-        signal = term(self.signal)
-        parts: list[Formula] = []
-        if self.low is not None:
-            parts.append(Predicate("<=", term(self.low), signal))
-        if self.high is not None:
-            parts.append(Predicate("<=", signal, term(self.high)))
-        return Always(reduce(And, parts), window)
+            return self._throughout(near(self.signal, self.reference, self.within), clock)
+        low = "" if self.low is None else f"{self.low} <= "
+        high = "" if self.high is None else f" <= {self.high}"
+        return self._throughout(f"{low}{self.signal}{high}", clock)
 
 
 class NeverTogether(Template):
@@ -208,9 +180,9 @@ class NeverTogether(Template):
     template: Literal["never_together"]
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions.")
 
-    def _formula(self, clock: Clock) -> Formula:
-        pairs: list[Formula] = [Not(And(a, b)) for a, b in combinations(map(parse, self.conditions), 2)]
-        return Always(reduce(And, pairs), self._span(clock))
+    def _formula(self, clock: Clock) -> str:
+        pairs = (f"not (({a}) and ({b}))" for a, b in combinations(self.conditions, 2))
+        return self._throughout(" and ".join(pairs), clock)
 
 
 class Dwell(Template):
@@ -229,15 +201,13 @@ class Dwell(Template):
             raise ValueError("at_least is more than at_most")
         return self
 
-    def _formula(self, clock: Clock) -> Formula:
-        condition = parse(self.condition)
-        parts: list[Formula] = []
+    def _formula(self, clock: Clock) -> str:
+        parts = []
         if self.at_least is not None:
-            parts.append(Always(condition, window_of(0.0, self.at_least)))
+            parts.append(f"G{window(0.0, self.at_least)} ({self.condition})")
         if self.at_most is not None:
-            parts.append(Eventually(Not(condition), window_of(0.0, self.at_most)))
-        reach = max(self.at_least or 0.0, self.at_most or 0.0)
-        return self._each_time(clock, condition, reduce(And, parts), reach)
+            parts.append(f"F{window(0.0, self.at_most)} (not ({self.condition}))")
+        return self._each_time(self.condition, " and ".join(parts), clock)
 
 
 class RampLimit(Template):
@@ -265,36 +235,27 @@ class RampLimit(Template):
     def _one_way(self) -> "RampLimit":
         if (self.over is None) != (self.range is None) or (self.over is not None and self.rate is not None):
             raise ValueError("expected rate alone, or over and range together")
-        if self.over is None and self.rate is None and not isinstance(term(self.signal), Name):
-            raise ValueError("an expression has no der(...): give rate, or over and range")
+        if self.over is None and self.rate is None:
+            try:
+                parse(f"der({self.signal}) <= 0")
+            except FormulaError:
+                raise ValueError("an expression has no der(...): give rate, or over and range") from None
         return self
 
-    def signals(self) -> Iterator[tuple[str, str]]:
-        """Yield the argument and the name of each signal, also of the default rate."""
-        yield from super().signals()
-        if self.over is None and self.rate is None:
-            yield from (("rate", name) for name in self._rate().signals)
-
-    def _rate(self) -> Expression:
-        if self.rate is not None:
-            return term(self.rate)
-        return Name(f"der({term(self.signal).signals[0]})")
-
-    def _formula(self, clock: Clock) -> Formula:
+    def _formula(self, clock: Clock) -> str:
         if self.over is None or self.range is None:
-            slow = Predicate("<=", Call("abs", (self._rate(),)), Number(self.limit))
-            return Always(slow, self._span(clock))
-        change, signal = self.limit * self.over, term(self.signal)
+            rate = f"der({self.signal})" if self.rate is None else self.rate
+            return self._throughout(f"abs({rate}) <= {self.limit}", clock)
+        change, x = self.limit * self.over, self.signal
         low, high = self.range
-        sides: tuple[tuple[Comparison, float], ...] = (("<=", change), (">=", -change))
-        parts: list[Formula] = []
+        over = window(0.0, self.over)
+        parts = []
         for k in range(self.levels):
             level = low + (high - low) * (k + 0.5) / self.levels
-            for operator, shift in sides:
-                here = Predicate(operator, signal, Number(tidy(level)))
-                later = Predicate(operator, signal, Number(tidy(level + shift)))
-                parts.append(Implies(here, Always(later, window_of(0.0, self.over))))
-        return Always(_balanced(parts), self._span(clock, self.over))
+            for operator, shift in (("<=", change), (">=", -change)):
+                later = f"G{over} ({x} {operator} {tidy(level + shift)})"
+                parts.append(f"({x} {operator} {tidy(level)} -> {later})")
+        return self._throughout(" and ".join(parts), clock)
 
 
 class Order(Template):
@@ -303,14 +264,14 @@ class Order(Template):
     template: Literal["order"]
     conditions: tuple[Condition, ...] = Field(min_length=2, description="Two or more conditions, in order.")
 
-    def _formula(self, clock: Clock) -> Formula:
-        window = self._span(clock)
-        rest = window_of(0.0, window.end - window.start)
-        parts: list[Formula] = []
-        for first, later in pairwise(map(parse, self.conditions)):
-            parts.append(Or(Always(Not(later), rest), Until(Or(Not(later), first), first, rest)))
-        every = reduce(And, parts)
-        return every if window.start == 0 else Always(every, window_of(window.start, window.start))
+    def _formula(self, clock: Clock) -> str:
+        start, end = self._span(" and ".join(f"({c})" for c in self.conditions), clock)
+        rest = window(0.0, end - start)
+        every = " and ".join(
+            f"(G{rest} (not ({later})) or (not ({later}) or ({first})) U{rest} ({first}))"
+            for first, later in pairwise(self.conditions)
+        )
+        return every if start == 0 else f"G{window(start, start)} ({every})"
 
 
 TEMPLATES: Mapping[str, type[Template]] = {
@@ -324,11 +285,3 @@ TEMPLATES: Mapping[str, type[Template]] = {
     "ramp_limit": RampLimit,
     "order": Order,
 }
-
-
-def _balanced(parts: list[Formula]) -> Formula:
-    """Return the conjunction of many parts without many levels."""
-    if len(parts) == 1:
-        return parts[0]
-    half = len(parts) // 2
-    return And(_balanced(parts[:half]), _balanced(parts[half:]))

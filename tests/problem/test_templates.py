@@ -7,7 +7,6 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.shorthand import template_arguments
 from falsifier.problem.spec import AnyRequirement, parse_spec
-from falsifier.problem.template_arguments import TemplateError
 from falsifier.problem.templates import TEMPLATES
 from falsifier.stl import Monitor, parse
 
@@ -116,26 +115,25 @@ def test_levels_never_call_a_slow_signal_fast(rate: float, *, violated: bool) ->
 
 
 @pytest.mark.parametrize(
-    ("template", "key", "message"),
+    ("template", "message"),
     [
-        ("settles signal=x reference=y within=1 time=1 after=a", "stays", "how long"),
-        ("overshoot signal=x reference=y at_most=1 after=a", "duration", "how long"),
-        ("settles signal=x reference=0 within=2% time=1", "within", "give a number"),
-        ("settles signal=x reference=1 within=1 time=11", "time", "at 10 s: shorten"),
-        ("settles signal=x reference=1 within=1 time=3 after=8", "after", "up to 11 s"),
-        ("overshoot signal=x reference=1 at_most=99 after=11", "after", "up to 11 s"),
-        ("order conditions=['a','b'] during=[2,60]", "during", "60 s.* end the window at 10 s"),
-        ("order conditions=['a','F[0,11] b']", "conditions", "up to 11 s, .*: shorten the times"),
-        ("rise signal=x reference=1 time=1 during=[0,1]", "during", "only if after"),
-        ("response when=a then=x time=2 during=[0,9]", "during", "window at 8 s"),
-        ("dwell condition=a at_least=20", "at_least", "up to 20.* s, .* 10 s: shorten"),
-        ("stays_within signal=x low=0 during=[3,1]", "during", "start <= end"),
+        ("settles signal=x reference=y within=1 time=1 after=a", "^stays: .* how long"),
+        ("overshoot signal=x reference=y at_most=1 after=a", "^duration: .* how long"),
+        ("settles signal=x reference=0 within=2% time=1", "2% of the reference 0 .* give a number"),
+        ("settles signal=x reference=1 within=1 time=11", "at 10 s: shorten"),
+        ("settles signal=x reference=1 within=1 time=3 after=8", "up to 11 s"),
+        ("overshoot signal=x reference=1 at_most=99 after=11", "up to 11 s"),
+        ("order conditions=['a','b'] during=[2,60]", "^during: .* 60 s.* end it at 10 s"),
+        ("order conditions=['a','F[0,11] b']", "up to 11 s, .*: shorten the times"),
+        ("rise signal=x reference=1 time=1 during=[0,1]", "^during: .* only if after"),
+        ("response when=a then=x time=2 during=[0,9]", "^during: .* end it at 8 s"),
+        ("dwell condition=a at_least=20", "up to 20.* s, .* 10 s: shorten"),
+        ("stays_within signal=x low=0 during=[3,1]", "^during: .*start <= end"),
     ],
 )
-def test_what_does_not_fit_the_simulation_names_the_argument(template: str, key: str, message: str) -> None:
-    with pytest.raises(TemplateError, match=message) as raised:
+def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: str) -> None:
+    with pytest.raises(SpecError, match=message):
         section(template).expanded(STOP, STEP)
-    assert raised.value.key == key
 
 
 @pytest.mark.parametrize(
@@ -161,14 +159,6 @@ def test_wrong_arguments_are_errors_of_the_file(template: str, message: str) -> 
     with pytest.raises(SpecError, match=message) as raised:
         section(template)
     assert str(raised.value).startswith("my.toml: requirements.R")
-
-
-def test_signals_are_named_with_their_arguments() -> None:
-    made = section("settles signal='x - y' reference=r within=1 time=1 after='a > b' stays=1")
-    assert list(made.signals()) == [
-        ("signal", "x"), ("signal", "y"), ("reference", "r"), ("after", "a"), ("after", "b")
-    ]  # fmt: skip
-    assert list(section("ramp_limit signal=x limit=1").signals()) == [("signal", "x"), ("rate", "der(x)")]
 
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
