@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -58,8 +58,6 @@ class RangeCoverage:
         parts: number of simulations with a value in each part of the range, shape (p,).
         times: the same by slice of the simulated time, shape (SLICES, p); None for a parameter.
         paces: number of simulations by the input's fastest change, as PACES; empty for a parameter.
-        rate: fastest continuous change in units per s; None for a parameter, or if all changes were steps.
-        apart: shortest time in s between two changes of value; None if there were not two.
     """
 
     searched: InputRecord
@@ -68,8 +66,6 @@ class RangeCoverage:
     parts: Counts
     times: Counts | None
     paces: Mapping[str, int]
-    rate: float | None
-    apart: float | None
 
     @property
     def tried(self) -> int:
@@ -240,8 +236,14 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
         if trajectory is not None:
             seen.reach(trajectory)
     stop_time = described.stop_time
-    ranges = [_of_input(r, [c.signals[r.name] for c in candidates], stop_time) for r in described.inputs]
-    ranges += [_of_parameter(p, [c.parameters[p.name] for c in candidates]) for p in described.parameters]
+    times = np.linspace(0.0, stop_time, _SAMPLES)
+    ranges = []
+    for r in described.inputs:
+        signals = [c.signals[r.name] for c in candidates]
+        paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
+        ranges.append(_of_range(r, [s.sample(times) for s in signals], {p: paces[p] for p in PACES}))
+    for p in described.parameters:
+        ranges.append(_of_range(p, [[c.parameters[p.name]] for c in candidates], {}))
     pairs = [_together(*one, *other) for one, other in combinations(ranges, 2)]
     return Coverage(
         simulations=len(candidates),
@@ -258,34 +260,24 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     )
 
 
-def _of_input(r: InputRecord, signals: Sequence[Signal], stop_time: float) -> tuple[RangeCoverage, Counts]:
-    """Return what was tried of an input, and the part of each sample, shape (simulations, _SAMPLES)."""
-    times = np.linspace(0.0, stop_time, _SAMPLES)
-    values = np.array([s.sample(times) for s in signals]).reshape(len(signals), _SAMPLES)
-    found, cells = _of_values(r, values)
-    slices = np.arange(_SAMPLES) * SLICES // _SAMPLES
-    rates = [fastest_rate(s, stop_time) for s in signals]
-    paces = Counter(pace_of(s, rate, r, stop_time) for s, rate in zip(signals, rates, strict=True))
-    input_ = replace(
-        found,
-        times=np.stack([_had(cells[:, slices == k], len(found.parts)) for k in range(SLICES)]),
-        paces={pace: paces[pace] for pace in PACES},
-        rate=max((rate for rate in rates if rate is not None), default=None),
-        apart=min((s.shortest_dwell for s in signals if s.shortest_dwell is not None), default=None),
-    )
-    return input_, cells
+def _of_range(
+    r: InputRecord, tried: Sequence[ArrayLike], paces: Mapping[str, int]
+) -> tuple[RangeCoverage, Counts]:
+    """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
-
-def _of_parameter(r: InputRecord, values: Sequence[float]) -> tuple[RangeCoverage, Counts]:
-    """Return what was tried of a parameter, and the part of each value, shape (simulations, 1)."""
-    return _of_values(r, np.array(values).reshape(len(values), 1))
-
-
-def _of_values(r: InputRecord, values: Array) -> tuple[RangeCoverage, Counts]:
-    cells = cells_of(r, values)
+    Args:
+        r: its range.
+        tried: the values of each simulation, shape (n,); n is _SAMPLES for an input, 1 for a parameter.
+        paces: number of simulations by the input's fastest change.
+    """
+    values = np.array(tried, np.float64).reshape(len(tried), _SAMPLES if paces else 1)
+    cells, count = cells_of(r, values), len(edges_of(r))
     low, high = (float(values.min()), float(values.max())) if values.size else (None, None)
-    parts = _had(cells, len(edges_of(r)))
-    return RangeCoverage(r, low, high, parts, times=None, paces={}, rate=None, apart=None), cells
+    times = None
+    if paces:
+        of_slice = np.arange(_SAMPLES) * SLICES // _SAMPLES
+        times = np.stack([_had(cells[:, of_slice == k], count) for k in range(SLICES)])
+    return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells
 
 
 def _had(cells: Counts, count: int) -> Counts:
@@ -378,26 +370,19 @@ def allowed_labels(r: InputRecord) -> dict[int, str]:
     return {n: str(n) for n in _allowed(r)}
 
 
-def fastest_rate(signal: Signal, stop_time: float) -> float | None:
-    """Return the fastest continuous change in units per s; None if the value only changes in steps.
+def pace_of(signal: Signal, r: InputRecord, stop_time: float) -> str:
+    """Return which of PACES an input had at its fastest.
 
     A signal that is sampled and held counts as what is sampled: its period is the model's, not the search's.
     """
+    if signal.switches == 0:
+        return "constant"
     if len(signal.times) == 1 or signal.interpolation == "constant":
-        return None
+        return "steps"
     pieces = signal.held(None).pieces(stop_time)[:-1]
     at = np.diff(signal.times)[:, np.newaxis] * _PER_PIECE
     slopes = pieces[:, 2:3] + 2 * pieces[:, 3:4] * at + 3 * pieces[:, 4:5] * at**2
-    return float(np.abs(slopes).max(initial=0.0))
-
-
-def pace_of(signal: Signal, rate: float | None, r: InputRecord, stop_time: float) -> str:
-    """Return which of PACES an input had at its fastest."""
-    if signal.switches == 0:
-        return "constant"
-    if rate is None:
-        return "steps"
-    duration = (r.high - r.low) / rate
+    duration = (r.high - r.low) / float(np.abs(slopes).max(initial=0.0))
     if duration >= SLOW * stop_time:
         return "slow"
     return "fast" if duration <= FAST * stop_time else "medium"

@@ -79,8 +79,6 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
                 "parts": r.parts.tolist(),
                 "gaps": [list(gap) for gap in r.gaps],
                 "changes": dict(r.paces),
-                "fastest": r.rate,
-                "shortest_between_changes": r.apart,
             }
             for r in found.ranges
         ],
@@ -112,20 +110,14 @@ def _indented(rows: Iterable[Sequence[str]]) -> list[str]:
 
 def _range_row(r: RangeCoverage) -> tuple[str, ...]:
     tried = "nothing" if r.low is None else f"{r.low:.6g} to {r.high:.6g}"
+    changes = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces.get(pace))
     return (
         _named(r.searched.name, r.searched.unit),
         f"{r.searched.low:.6g} to {r.searched.high:.6g}",
         tried,
         f"{r.tried} of {len(r.parts)}",
-        _changes(r) if r.paces else "parameter",
+        changes if r.paces else "parameter",
     )
-
-
-def _changes(r: RangeCoverage) -> str:
-    kinds = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces[pace])
-    fastest = [f"{r.rate:.4g} per s at most"] if r.rate else []
-    fastest += [f"{r.apart:.4g} s apart at least"] if r.apart is not None else []
-    return "; ".join([kinds, *fastest])
 
 
 def _legend(found: Coverage) -> Iterator[str]:
