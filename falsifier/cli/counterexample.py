@@ -28,7 +28,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_lines, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.regression import Database
-from falsifier.counterexamples.store import EXPLANATION
+from falsifier.counterexamples.store import EXPLANATION, beside
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface
@@ -172,7 +172,7 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
         if store is not None:
             say(str(Database(store).save(problem, case.stored)))
         if store is None or out is not None:
-            directory = out or case.beside("export")
+            directory = out or beside(case.file, "export")
             for path in export_counterexample(problem, case.stored, evaluation, directory):
                 say(str(path))
 
@@ -190,9 +190,11 @@ def _shrink(
     from falsifier.counterexamples.shrink import shrink
 
     # A link is followed, not replaced.
-    file = case.beside("shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
+    file = (
+        beside(case.file, "shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
+    )
     begins = b'"time"' if case.is_miss else b'{\n  "format"'
-    check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.place)
+    check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.file)
     with _loaded(case, rights) as problem:
         shrunk = shrink(
             problem,
@@ -213,7 +215,7 @@ def _shrink(
             files = write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
             if found.trajectory is not None:  # for reports, which simulate nothing
                 found.trajectory.save(file.with_suffix(".npz"))
-        case.beside(EXPLANATION).unlink(missing_ok=True)  # it was about another input
+        beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
     content = {
         "violated": found.violated,
         "outcome": confirmation and confirmation.outcome,
@@ -274,9 +276,9 @@ def _explain(
         evaluation = case.simulated(problem)
         explanation = explain(problem, evaluation)
         if case.is_miss:
-            picture = draw_evaluation(problem, evaluation, case.beside("nearest-miss.png"))
+            picture = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
     with suppress(OSError):  # it is printed anyway
-        write_whole(case.beside(EXPLANATION), f"{explanation.text}\n")
+        write_whole(beside(case.file, EXPLANATION), f"{explanation.text}\n")
     words = narrate(explanation, chat) if chat else None
     content = {
         "violated": explanation.violated,
@@ -305,7 +307,7 @@ def _map(
         raise click.UsageError(
             f"--budget {budget}: a map needs at least {_LEAST_MAP_BUDGET} simulations; {_MAP_BUDGET} is usual"
         )
-    picture = case.beside("robustness-map.png") if out is None else checked_picture(out)
+    picture = beside(case.file, "robustness-map.png") if out is None else checked_picture(out)
     points = isqrt(budget * _MAP_POINTS // _MAP_BUDGET)
     samples = budget - points * points
     with _loaded(case, rights) as problem:
@@ -328,7 +330,7 @@ def _about(case: Case, problem: Problem, named: Path) -> list[str]:
     """Say what a text is about if that is not what was named."""
     if case.is_miss:
         return [one_line(case.text)]
-    if case.place == named or not case.is_shrunk:
+    if case.file == named or not case.is_shrunk:
         return []
     lines = candidate_lines(case.candidate, problem.space)
     return [f"This is about {case.place}, the shrunk counterexample:", *(f"  {line}" for line in lines)]

@@ -5,24 +5,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import file_name
 from falsifier.core.fitting import Fitted, fit
 from falsifier.core.words import counted
 from falsifier.counterexamples.store import (
     StoredCounterexample,
-    beside,
     counterexample_file,
     file_of,
     keep_recorded,
-    limited,
     load,
-    problem_of,
     shrunk_file,
 )
 from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
+from falsifier.fmu import FmuModel, System, resolved
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -37,28 +34,22 @@ class Case:
     """A counterexample, or the simulation of a run with the smallest robustness that is no violation.
 
     Attributes:
-        place: the counterexample's file; of a nearest miss, the run directory.
-        requirement: name of the requirement.
-        source: how to load the problem; None if it was made in Python.
+        file: the counterexample's file; of a nearest miss, that which its run would have.
         candidate: what was simulated.
-        robustness: its robustness, as recorded.
-        stored: content of the counterexample's file; None for a nearest miss.
-        suffix: what names of files beside it end in, if the run searched several requirements.
-        simulations: number of simulations of the run that were judged; 0 for a counterexample.
+        source: how to load the problem; None if it was made in Python.
         allow: what the FMU was allowed then; None if that is not recorded.
         deny: what it was denied then.
+        stored: content of the counterexample's file; None for a nearest miss.
+        text: what a nearest miss is, in words, before anything is said about it; empty for a counterexample.
     """
 
-    place: Path
-    requirement: str
-    source: ProblemSource | None
+    file: Path
     candidate: Candidate
-    robustness: float
+    source: ProblemSource | None
+    allow: tuple[str, ...] | None
+    deny: tuple[str, ...]
     stored: StoredCounterexample | None = None
-    suffix: str = ""
-    simulations: int = 0
-    allow: tuple[str, ...] | None = None
-    deny: tuple[str, ...] = ()
+    text: str = ""
 
     @property
     def is_miss(self) -> bool:
@@ -68,32 +59,23 @@ class Case:
     @property
     def is_shrunk(self) -> bool:
         """Whether it is what a counterexample was shrunk to."""
-        return not self.is_miss and self.place.stem.startswith("shrunk")
+        return not self.is_miss and self.file.stem.startswith("shrunk")
 
     @property
-    def text(self) -> str:
-        """What a nearest miss is, in words, before anything is said about it."""
-        return (
-            f"{self.requirement} was not falsified in {counted(self.simulations, 'simulation')}; this is "
-            f"about the nearest miss, with robustness {signed(self.robustness)} "
-            f"({margin_words(self.robustness)})."
-        )
-
-    def beside(self, name: str) -> Path:
-        """Return a path in its folder, with the requirement in it if the run searched several."""
-        if not self.is_miss:
-            return beside(self.place, name)
-        file = Path(name)
-        return self.place / f"{file.stem}{self.suffix}{file.suffix}"
+    def place(self) -> Path:
+        """The counterexample's file; of a nearest miss, the run directory."""
+        return self.file.parent if self.is_miss else self.file
 
     def problem(
         self, *, allow: Iterable[str] = (), deny: Iterable[str] = ()
     ) -> tuple[Problem, tuple[str, ...]]:
         """Load the problem; its FMU gets no more rights than it had then, and those that are given here.
 
+        Whoever is handed a counterexample may not read what a spec has come to allow since.
+
         Args:
-            allow: what the user allows now.
-            deny: what the user denies now.
+            allow: what the user allows now; paths begin in the current folder.
+            deny: what the user denies now, beside what was denied then.
 
         Returns:
             The problem, and the rights that the spec gives now but did not give then, which are withheld.
@@ -101,14 +83,21 @@ class Case:
         Raises:
             SpecError: if it was made in Python, or can no longer be loaded.
         """
-        if self.source is None and self.stored is not None:
-            problem_of(self.stored)  # which says what to do
         if self.source is None:
             raise SpecError(
-                f"{self.place}: the problem of this run was made in Python: call simulate() and "
-                "explain() there"
+                f"{self.place}: the problem was made in Python: run the script or test that found this, or "
+                "call simulate() and explain() there"
             )
-        return limited(load_source(self.source), self.allow, (*self.deny, *deny), granted=allow)
+        problem = load_source(self.source)
+        model = problem.model
+        if not isinstance(model, FmuModel | System):
+            return problem, ()
+        given = resolved(allow, Path())
+        kept = tuple(word for word in model.allow if self.allow is None or word in self.allow)
+        withheld = tuple(word for word in model.allow if word not in (*kept, *given))
+        allowed = tuple(dict.fromkeys((*kept, *given)))
+        denied = tuple(dict.fromkeys((*model.deny, *self.deny, *deny)))
+        return replace(problem, model=replace(model, allow=allowed, deny=denied)), withheld
 
     def simulated(self, problem: Problem) -> Evaluation:
         """Simulate it again, for its trajectory.
@@ -143,16 +132,8 @@ def counterexample_case(place: Path) -> Case:
     """
     file = counterexample_file(place)
     stored = load(file)
-    candidate = Candidate.from_json(stored.candidate)
     return Case(
-        file,
-        stored.requirement,
-        stored.problem,
-        candidate,
-        stored.robustness,
-        stored,
-        allow=stored.allow,
-        deny=stored.deny,
+        file, Candidate.from_json(stored.candidate), stored.problem, stored.allow, stored.deny, stored
     )
 
 
@@ -199,15 +180,13 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
         raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
     robustness, candidate = min(misses, key=lambda pair: pair[0])
     return Case(
-        directory,
-        name,
-        described.of(name).request.source,
+        directory / file_of(name if described.shared else ""),
         candidate,
-        robustness,
-        suffix=f"-{file_name(name)}" if described.shared else "",
-        simulations=len(judged),
-        allow=described.allow,
-        deny=described.deny,
+        described.of(name).request.source,
+        described.allow,
+        described.deny,
+        text=f"{name} was not falsified in {counted(len(judged), 'simulation')}; this is about the nearest "
+        f"miss, with robustness {signed(robustness)} ({margin_words(robustness)}).",
     )
 
 

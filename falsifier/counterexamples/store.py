@@ -5,8 +5,8 @@ so that it can be replayed after the FMU or the requirement has changed.
 """
 
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
 from typing import Any, Literal
@@ -16,15 +16,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from falsifier import __version__
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
-from falsifier.errors import CandidateError, SimulationError, SpecError, rejected
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.fmu import FmuModel, System, fmu_files, fmus_sha256, resolved
-from falsifier.problem.loading import load_source, reloadable
+from falsifier.fmu import fmu_files, fmus_sha256, resolved
+from falsifier.problem.loading import reloadable
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import RequirementRecord
 from falsifier.record.records import ConfirmedRecord
 from falsifier.stl.margins import signed
@@ -183,35 +183,33 @@ def counterexample_file(path: Path) -> Path:
     Raises:
         SpecError: if there is none, or more than one.
     """
-    directory = path if path.is_dir() else path.parent
     if not path.is_file():
-        keep_recorded(directory)  # the counterexample may be in the journal only
-    if not path.is_dir():
-        if not path.is_file():
-            raise SpecError(
-                "no such file or directory; expected a run directory or a counterexample file",
-                file=str(path),
-            )
+        keep_recorded(path if path.is_dir() else path.parent)  # it may be in the journal only
+    if path.is_file():
         return path
+    if not path.is_dir():
+        raise SpecError(
+            "no such file or directory; expected a run directory or a counterexample file", file=str(path)
+        )
     found = sorted(path.glob("counterexample*.json"))
-    if len(found) > 1:
-        names = ", ".join(str(f) for f in found)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        names = ", ".join(map(str, found))
         raise SpecError(
             f"this run has several counterexamples; choose one of these files: {names}", file=str(path)
         )
-    if not found:
-        expected = (
-            "expected a counterexample file or the directory of a run that found one (of a campaign: a "
-            "directory in its runs/)"
-        )
-        if not holds_run(path):
-            raise SpecError(f"not a run directory; {expected}", file=str(path))
-        raise SpecError(
-            f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that "
-            "found none",
-            file=str(path),
-        )
-    return found[0]
+    expected = (
+        "expected a counterexample file or the directory of a run that found one (of a campaign: a directory "
+        "in its runs/)"
+    )
+    if not holds_run(path):
+        raise SpecError(f"not a run directory; {expected}", file=str(path))
+    raise SpecError(
+        f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that found "
+        "none",
+        file=str(path),
+    )
 
 
 def file_of(requirement: str = "") -> str:
@@ -244,26 +242,32 @@ def keep_recorded(directory: Path) -> None:
 
     Runs that were killed, and runs of a campaign, leave only a journal. A directory without a run is left
     unchanged.
+
+    Raises:
+        JournalError: if what was confirmed is not recorded as a violation.
     """
     if not holds_run(directory):
         return
-    described = manifest.read(directory)
-    records = read_journal(directory)
-    evaluations: dict[str, dict[int, Evaluation]] = {}
+    described, records = manifest.read(directory), read_journal(directory)
     for record in records:
         if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
             continue
-        name = record.requirement
-        file = directory / file_of(name if described.shared else "")
+        file = directory / file_of(record.requirement if described.shared else "")
         if file.exists():
             continue
-        if name not in evaluations:
-            evaluations[name] = recorded_evaluations(directory, records, name, with_trajectories=False)
-        alone = described.of(name)
+        alone = described.of(record.requirement)
+        evaluations = recorded_evaluations(directory, records, record.requirement, with_trajectories=False)
+        evaluation = evaluations.get(record.index)
+        if evaluation is None or not evaluation.violated:
+            raise JournalError(
+                f"{directory / JOURNAL}: line {record.line} confirms a counterexample of "
+                f"{record.requirement}, but simulation {record.index + 1} is not recorded as a violation: no "
+                "run writes this; start a new one"
+            )
         content = _content(
             alone.requirement,
             alone.request.source,
-            evaluations[name][record.index],
+            evaluation,
             outcome="confirmed",
             reason=record.reason,
             fmu_sha256=described.fmu_sha256,
@@ -271,43 +275,6 @@ def keep_recorded(directory: Path) -> None:
             deny=described.deny,
         )
         save(content, file)
-
-
-def problem_of(stored: StoredCounterexample) -> Problem:
-    """Load the problem of a counterexample; its FMU gets no rights that it had not when it was found.
-
-    Raises:
-        SpecError: if the problem was made in Python, or its spec can no longer be loaded.
-    """
-    if stored.problem is None:
-        raise SpecError(
-            f"the problem of this counterexample of {stored.requirement} was made in Python: run the script "
-            "or test that found it"
-        )
-    return limited(load_source(stored.problem), stored.allow, stored.deny)[0]
-
-
-def limited(
-    problem: Problem, allow: Collection[str] | None, deny: Iterable[str], *, granted: Iterable[str] = ()
-) -> tuple[Problem, tuple[str, ...]]:
-    """Return the problem with no more rights of its FMU than were recorded, and those that are withheld.
-
-    Whoever is handed a counterexample may not read what a spec has come to allow since.
-
-    Args:
-        problem: the problem, with the rights that its spec gives now.
-        allow: what was allowed when it was recorded; None: not recorded, nothing is withheld.
-        deny: what was denied then, which stays denied.
-        granted: what the user allows now; paths begin in the current folder.
-    """
-    model = problem.model
-    if not isinstance(model, FmuModel | System):
-        return problem, ()
-    given = resolved(granted, Path())
-    kept = tuple(word for word in model.allow if allow is None or word in allow)
-    withheld = tuple(word for word in model.allow if word not in (*kept, *given))
-    allowed, denied = dict.fromkeys((*kept, *given)), dict.fromkeys((*model.deny, *deny))
-    return replace(problem, model=replace(model, allow=tuple(allowed), deny=tuple(denied))), withheld
 
 
 def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:

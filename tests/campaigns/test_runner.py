@@ -12,7 +12,8 @@ from falsifier.campaigns import (
     run_campaign,
 )
 from falsifier.campaigns.directory import campaign_lock
-from falsifier.counterexamples.store import load, problem_of, replay
+from falsifier.counterexamples.case import counterexample_case
+from falsifier.counterexamples.store import load, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
@@ -136,7 +137,7 @@ def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:
     (file,) = tmp_path.rglob("counterexample.json")
     stored = load(file.parent)
     assert stored.problem == ProblemSource(target="python:tests.problems:hard", parameterization="fixed")
-    assert replay(stored, problem_of(stored)).status == "violates"
+    assert replay(stored, counterexample_case(file).problem()[0]).status == "violates"
     file.unlink()
     resume_campaign(tmp_path)
     assert load(file) == stored

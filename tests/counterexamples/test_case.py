@@ -18,16 +18,18 @@ def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path)
     found = nearest_miss(tmp_path)
     assert result.best is not None
     assert found.candidate.key == result.best.candidate.key
-    assert (found.robustness, found.simulations) == (result.best.robustness, 5)
-    problem = impossible()
-    assert found.simulated(problem).robustness == result.best.robustness
-    assert found.beside("a.png") == tmp_path / "a.png"
+    assert (
+        f"in 5 simulations; this is about the nearest miss, with robustness {result.best.robustness:+.6g}"
+        in (found.text)
+    )
+    assert found.simulated(impossible()).robustness == result.best.robustness
+    assert (found.place, found.file) == (tmp_path, tmp_path / "counterexample.json")
 
 
 def test_a_run_with_a_counterexample_is_asked_about_that(tmp_path: Path) -> None:
     falsify(easy(), "corners", budget=5, directory=tmp_path)
     found = case_of(tmp_path)
-    assert found.stored is not None and found.robustness < 0 and not found.is_shrunk
+    assert found.stored is not None and found.stored.robustness < 0 and not found.is_shrunk
     assert case_of(found.place) == found
     simpler = save(found.stored.model_copy(update={"reason": "shrunk"}), tmp_path / "shrunk.json")
     assert case_of(tmp_path) == found
@@ -43,8 +45,8 @@ def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
     assert not case_of(tmp_path).is_miss
     found = case_of(tmp_path, "FAR")
     assert found.is_miss
-    assert found.requirement == "FAR"
-    assert found.beside("a.png").name == "a-FAR.png"
+    assert found.text.startswith("FAR was not falsified")
+    assert found.file.name == "counterexample-FAR.json"
     with pytest.raises(JournalError, match="this run searched HARD, NEVER, FAR, not OTHER"):
         case_of(tmp_path, "OTHER")
     with pytest.raises(SpecError, match="this is not one"):

@@ -11,7 +11,7 @@ from falsifier.cli import cli
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample
-from falsifier.counterexamples.store import load, problem_of, replay
+from falsifier.counterexamples.store import load, replay
 from falsifier.errors import JournalError, SpecError
 from tests.command import falsifier
 from tests.fmu.fixtures import path
@@ -57,7 +57,7 @@ def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) 
     assert again.falsified and again.spent.simulations == 1
 
     stored = load(tmp_path / "run")
-    replayed = replay(stored, problem_of(stored))
+    replayed = replay(stored, problem)
     assert replayed.status == "violates" and replayed.text.startswith("R: still violated")
     evaluation = replayed.evaluation
     assert evaluation is not None
@@ -70,7 +70,7 @@ def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) 
         resume(tmp_path / "run")
     spec.write_text(SPEC)
     (tmp_path / "Gain_2.fmu").write_bytes(path("Gain_3").read_bytes())
-    assert "an FMU of the system has changed" in replay(stored, problem_of(stored)).text
+    assert "an FMU of the system has changed" in replay(stored, load_problem("loop.toml")).text
     with pytest.raises(JournalError, match=r"Gain_2\.fmu has changed since the start"):
         resume(tmp_path / "run")
 
@@ -122,7 +122,7 @@ def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: py
     assert result.falsified
     assert list(json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]) == ["loop.ssp"]
     stored = load(tmp_path / "run")
-    assert replay(stored, problem_of(stored)).status == "violates"
+    assert replay(stored, problem).status == "violates"
     write(tmp_path / "loop.ssp", ssd.replace('"root"', '"other"'), "Plant_2", "Gain_2")
     with pytest.raises(JournalError, match=r"loop\.ssp has changed since the start"):
         resume(tmp_path / "run")

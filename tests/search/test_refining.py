@@ -69,7 +69,8 @@ def test_a_larger_budget_for_the_rest_does_not_move_the_levels(tmp_path: Path) -
 
 
 def test_the_record_says_what_the_levels_were(tmp_path: Path) -> None:
-    falsify("python:tests.problems:impossible", "uniform", budget=9, refine=True, directory=tmp_path)
+    target = "python:tests.problems:impossible"
+    result = falsify(target, "uniform", budget=9, refine=True, directory=tmp_path)
     described = manifest.read(tmp_path)
     assert described.parameterization == "refined"
     assert [(level.first, level.searched) for level in described.levels] == [
@@ -78,7 +79,8 @@ def test_the_record_says_what_the_levels_were(tmp_path: Path) -> None:
         (6, "fixed parameterization: u (12 control points, constant)"),
     ]
     miss = nearest_miss(tmp_path)
-    assert miss.simulated(miss.problem()[0]).robustness == pytest.approx(miss.robustness)
+    assert result.best is not None
+    assert miss.simulated(miss.problem()[0]).robustness == pytest.approx(result.best.robustness)
 
 
 def test_requirements_that_share_a_search_share_its_levels() -> None:
