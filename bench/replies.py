@@ -12,7 +12,7 @@ from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, ToolCall
 from falsifier.llm.replay import ScriptedChat
-from falsifier.llm.replies import Answer, ReplyForm
+from falsifier.llm.replies import ReplyForm
 
 SPACE = SearchSpace(
     (InputRange("throttle", 0.0, 100.0, control_points=3), InputRange("brake", 0.0, 325.0, control_points=2)),
@@ -54,7 +54,6 @@ def odd_replies() -> Iterator[tuple[str, ChatReply]]:
         "numbers as texts": TEXT.replace("[1, 2, 3]", '["1", "2", "3"]'),
         "bare list of numbers": "[1, 2, 3, 0, 5, 950]",
         "point": '{"point": [1, 2, 3, 0, 5, 950]}',
-        "tag without its end": "<point>1, 2, 3, 0, 5, 950",
         "null for the rationale": json.dumps(GOOD | {"rationale": None}),
         "superfluous remark": json.dumps(GOOD | {"confidence": 0.9}),
         "value a rounding beyond its range": TEXT.replace("[0, 5]", "[-0.0001, 5]"),
@@ -90,10 +89,10 @@ def outcome(reply: ChatReply) -> str:
     chat = ScriptedChat([reply])
     request = ChatRequest(messages=(Message(role="user", content="?"),))
     try:
-        answer: Answer = converse(chat, request, ReplyForm(SPACE).read, exchanges.append, reasks=0)
+        candidates = converse(chat, request, ReplyForm(SPACE).read, exchanges.append, reasks=0)
     except Exception:
         return f"rejected: {exchanges[0].problem}"
-    signals = {name: s.values for name, s in answer.candidates[0].signals.items()}
+    signals = {name: s.values for name, s in candidates[0].signals.items()}
     return "read" if signals == WANTED else f"read as something else: {signals}"
 
 

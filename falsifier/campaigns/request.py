@@ -38,7 +38,6 @@ class Method:
         variant: its prompt variant, or empty.
         parameterization: ``free`` or ``fixed``.
         profile: profile of the specs, or empty.
-        reply: ``json`` or ``points``.
         anonymous: whether prompts use neutral names.
         fallback: engine to switch to if the language model fails, or empty.
         together: whether several requirements shared one search.
@@ -50,7 +49,6 @@ class Method:
     variant: str = ""
     parameterization: str = "fixed"
     profile: str = ""
-    reply: str = "json"
     anonymous: bool = False
     fallback: str = ""
     together: bool = False
@@ -63,7 +61,6 @@ class Method:
         apart = {
             self.parameterization: self.parameterization != "fixed",
             self.profile: bool(self.profile),
-            self.reply: self.reply != "json",
             "neutral names": self.anonymous,
             f"fallback {self.fallback}": bool(self.fallback),
             "shared search": self.together,
@@ -147,7 +144,6 @@ def method_of(request: RunRequest) -> Method:
         variant=llm.variant or "",
         parameterization=problem.parameterization,
         profile=problem.profile or "",
-        reply=llm.reply,
         anonymous=llm.anonymous,
         fallback=llm.fallback or "",
         together=len(request.problems) > 1,
@@ -184,7 +180,6 @@ def _llm_settings(method: Method, asking: LLMSettings | None) -> LLMSettings | N
         "name": method.llm,
         "effort": method.effort or None,
         "variant": method.variant or None,
-        "reply": method.reply,
         "anonymous": method.anonymous,
         "fallback": method.fallback or None,
     }

@@ -293,7 +293,6 @@ def _methods(
             variant=variant,
             parameterization=parameterization,
             profile=profile,
-            reply=how.reply,
             anonymous=how.anonymous,
             fallback=how.fallback or "",
         )

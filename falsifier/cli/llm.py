@@ -1,18 +1,16 @@
 """``falsifier llm``: what a language model is sent, and whether it replies."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli.command import command
+from falsifier.cli.command import command, refuse
 from falsifier.cli.llm_options import (
     anonymous_option,
     connection_options,
     context_option,
-    llm_option_option,
     llm_settings,
     variant_option,
 )
@@ -24,7 +22,7 @@ from falsifier.problem.loading import load_source
 from falsifier.search import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
-    from falsifier.llm.messages import Message, Tool
+    from falsifier.llm.messages import Message
     from falsifier.problem.problem import Problem
     from falsifier.record.manifest import Manifest
     from falsifier.record.records import Record
@@ -34,7 +32,6 @@ if TYPE_CHECKING:
 @requirement_options
 @variant_option()
 @anonymous_option
-@llm_option_option
 @context_option
 @click.option(
     "--after",
@@ -47,25 +44,15 @@ if TYPE_CHECKING:
     "--at",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Question for sample N: with --after, the one after the N-1 samples before it; if TARGET is a run "
-    "directory, the one that was sent, with its reply.",
-)
-@click.option(  # only these two engines write prompts
-    "--engine",
-    type=click.Choice(["llm", "hybrid"]),
-    default="llm",
-    show_default=True,
-    help="Engine that asks; hybrid asks for several candidates at a time and offers a tool.",
+    help="If TARGET is a run directory: the question that was sent before sample N, with its reply.",
 )
 @json_option
 def prompt(
     *,
     variant: str | None,
     anonymous: bool,
-    llm_options: tuple[str, ...],
     directory: Path | None,
     at: int | None,
-    engine: str,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -73,16 +60,14 @@ def prompt(
 
     With --at, print a question that a run sent.
     """
-    from falsifier.engines.briefing import preview, preview_tool
-    from falsifier.engines.hybrid import Settings as HybridSettings
+    from falsifier.engines.briefing import preview
     from falsifier.record.journal import read_journal, recorded_evaluations
     from falsifier.record.questions import doubtful_confirmations
 
-    if at is not None and directory is None:
+    if at is not None:
+        refuse("--at prints what a run sent: falsifier llm prompt RUN --at N", after=directory)
         say(_sent(Path(options["target"]), at, as_json=as_json))
         return
-    asked = llm_settings({"llm": "", "llm_options": llm_options})
-    assert asked is not None
     problem = load_source(problem_source(options))
     records, evaluations = [], {}
     simulations: int | None = DEFAULT_SIMULATIONS
@@ -90,28 +75,17 @@ def prompt(
         simulations = _told_by(directory, problem).request.budget.simulations
         records = read_journal(directory)
         evaluations = recorded_evaluations(directory, records)
-    told = list(evaluations.values())[: None if at is None else at - 1]
-    settings = HybridSettings()
-    count = 1 if engine == "llm" else settings.count if told else 1
     messages = preview(
         problem,
         variant=variant,
-        evaluations=told,
-        count=count,
+        evaluations=list(evaluations.values()),
         anonymous=anonymous,
-        reply=asked.reply,
         simulations=simulations,
         doubtful=doubtful_confirmations(problem, records, evaluations),
-        lessons=_lessons(records) if at is None else "",
+        lessons=_lessons(records),
     )
-    tools: tuple[Tool, ...] = ()
-    if engine == "hybrid" and told:
-        calls = settings.what_if_calls
-        tools = (preview_tool(problem, calls=calls, variant=variant, anonymous=anonymous, reply=asked.reply),)
-    sent: Any = [{"role": message.role, "content": message.content} for message in messages]
-    if tools:
-        sent = {"messages": sent, "tools": [tool.model_dump() for tool in tools]}
-    say(as_shown(_as_text(messages, tools), sent, as_json=as_json))
+    sent = [{"role": message.role, "content": message.content} for message in messages]
+    say(as_shown(_as_text(messages), sent, as_json=as_json))
 
 
 def _lessons(records: Sequence["Record"]) -> str:
@@ -168,20 +142,11 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
     return "\n\n".join(parts)
 
 
-def _as_text(messages: Sequence["Message"], tools: Sequence["Tool"]) -> str:
-    """The messages, the tools, and how many tokens they have."""
+def _as_text(messages: Sequence["Message"]) -> str:
+    """The messages, and how many tokens they have."""
     from falsifier.llm.usage import count_tokens
 
     parts = [f"--- {message.role} ---\n{message.content}" for message in messages]
-    if tools:
-        parts.append(
-            "(The engine appends its reason for asking and its own predictions to the last message.)"
-        )
-    parts += [
-        f"--- tool {tool.name}, offered while the engine's predictions are good ---\n{tool.description}\n"
-        f"arguments: {json.dumps(tool.parameters)}"
-        for tool in tools
-    ]
     # What a provider can keep from question to question.
     constant, changing = (sum(count_tokens(m.content) for m in part) for part in (messages[:1], messages[1:]))
     total = constant + changing

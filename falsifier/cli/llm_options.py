@@ -12,7 +12,7 @@ from falsifier.context.values import NOTHING
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.errors import did_you_mean
-from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT, Effort, ReplyKind
+from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT, Effort
 from falsifier.search import DEFAULT_SIMULATIONS
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ _EXPECTED = {
     "price": "expected SENT:RECEIVED, finite numbers from 0 on, US dollars per million tokens, as 0.25:2",
     "timeout": "expected a number of seconds above 0",
     "cache": "expected yes, or no to ignore stored replies",
-    "reply": f"expected {' or '.join(get_args(ReplyKind))}",
 }
 _WITHOUT_LLM = "applies to language models only; add --llm NAME, or leave it out"
 # Words after an @ that are versions of a model, as Vertex AI has them.
@@ -78,8 +77,7 @@ llm_option_option = click.option(
     multiple=True,
     metavar="NAME=VALUE",
     help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
-    "tokens, cache=no, reply=points instead of json; all other names go to the provider unchanged, e.g. "
-    "max_tokens=4000. Repeatable.",
+    "tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. Repeatable.",
 )
 
 

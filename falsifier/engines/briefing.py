@@ -11,13 +11,13 @@ from falsifier.core.words import in_one_line
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, start_values
-from falsifier.llm import CONTEXT_VARIANT, ReplyKind
-from falsifier.llm.messages import Message, Tool
-from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS, Questions, Variant, View, variant_named
+from falsifier.llm import CONTEXT_VARIANT
+from falsifier.llm.messages import Message
+from falsifier.llm.prompts import Questions, Variant, View, variant_named
 from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.published import as_point
 from falsifier.llm.replies import ReplyForm
-from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf, predicted, what_if_tool
+from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, Predictor, predicted
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
@@ -54,18 +54,13 @@ class Briefing:
         problem: Problem,
         *,
         variant: str | None = None,
-        reply: ReplyKind = "json",
-        prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
         anonymous: bool = False,
         llm: str = "",
     ) -> None:
         problem, self.variant = told_context(problem, variant, anonymous=anonymous)
-        view = View.of(problem)
-        if reply == "points":  # numbers in a list have the control points of the spec
-            view = replace(view, space=view.space.fixed)
-        self._view = view
-        self._disguise = Disguise.of(view) if anonymous else None
-        self._reply, self._tokens, self._llm = reply, prompt_tokens, llm
+        self._view = View.of(problem)
+        self._disguise = Disguise.of(self._view) if anonymous else None
+        self._llm = llm
         self._start = partial(start_values, problem)
         self._questions: Questions | None = None
         self._untold: list[Evaluation] = []
@@ -99,7 +94,7 @@ class Briefing:
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
         told = self.hidden(candidate)
-        if not self.variant.has("names") or (self.variant.is_published and self._reply == "points"):
+        if not self.variant.has("names"):
             return "; ".join(as_point(self.view, told))
         return in_one_line(told)
 
@@ -124,18 +119,17 @@ class Briefing:
         """
         return ReplyForm(
             self.view.space,
-            named=self.variant.has("names") and self._reply == "json",
-            points=self._reply == "points",
+            named=self.variant.has("names"),
             free=self.variant.has("freedom"),
             count=count,
             reasoned=reasoned,
-            lessons=reasoned and self._reply == "json" and self.variant.has("lessons"),
+            lessons=reasoned and self.variant.has("lessons"),
         )
 
-    def tool(self, what_if: WhatIf) -> PredictionTool:
+    def tool(self, predictor: Predictor) -> PredictionTool:
         """Return the tool with which the LLM requests predictions."""
         form = self.form(MOST_CANDIDATES, reasoned=False)
-        return PredictionTool(what_if, form, self.variant, reveal=self.revealed, hide=self._hidden_verdict)
+        return PredictionTool(predictor, form, self.variant, reveal=self.revealed, hide=self._hidden_verdict)
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
@@ -195,9 +189,7 @@ class Briefing:
             if self._disguise:
                 self._disguise = Disguise.of(self._view, start)
                 start = self._disguise.hidden_values(start)
-            self._questions = Questions(
-                self.view, self.variant, reply=self._reply, start=start, tokens=self._tokens, llm=self._llm
-            )
+            self._questions = Questions(self.view, self.variant, start=start, llm=self._llm)
         return self._questions
 
     def _hidden_verdict(self, verdict: Verdict) -> Verdict:
@@ -239,10 +231,7 @@ def preview(
     *,
     variant: str | None = None,
     evaluations: Sequence[Evaluation] = (),
-    count: int = 1,
-    prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
     anonymous: bool = False,
-    reply: ReplyKind = "json",
     simulations: int | None = None,
     doubtful: Sequence[Confirmation] = (),
     lessons: str = "",
@@ -253,17 +242,12 @@ def preview(
         problem: the problem to search.
         variant: name of the prompt variant; None: the default one.
         evaluations: what was simulated so far, in order.
-        count: number of candidates to ask for.
-        prompt_tokens: maximum number of tokens of a prompt.
         anonymous: whether the LLM gets neutral names instead of real ones.
-        reply: what a reply is to consist of.
         simulations: maximum number of simulations of the run; None: no limit.
         doubtful: violations among the evaluations that do not count.
         lessons: what the LLM wrote down in its last reply.
     """
-    briefing = Briefing(
-        problem, variant=variant, reply=reply, prompt_tokens=prompt_tokens, anonymous=anonymous
-    )
+    briefing = Briefing(problem, variant=variant, anonymous=anonymous)
     briefing.simulations, briefing.lessons = simulations, lessons
     doubts = {c.candidate.key: c for c in doubtful}
     for evaluation in evaluations:
@@ -275,22 +259,7 @@ def preview(
             briefing.rationales[candidate.key] = candidate.rationale
         briefing.tell([evaluation])
         briefing._caught_up()
-    return briefing.question(count)
-
-
-def preview_tool(
-    problem: Problem,
-    *,
-    calls: int,
-    variant: str | None = None,
-    anonymous: bool = False,
-    reply: ReplyKind = "json",
-) -> Tool:
-    """Return the tool that a question with permission to request predictions would offer; sends nothing."""
-    form = Briefing(problem, variant=variant, reply=reply, anonymous=anonymous).form(
-        MOST_CANDIDATES, reasoned=False
-    )
-    return what_if_tool(form.schema(), calls=calls)
+    return briefing.question(1)
 
 
 def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float) -> str:

@@ -30,7 +30,6 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import NoValidReplyError, OnExchange
 from falsifier.llm.messages import Chat
-from falsifier.llm.tools import WhatIf
 from falsifier.problem.problem import Problem
 
 _LOG = logging.getLogger(__name__)
@@ -44,6 +43,11 @@ _GROWTH = 4
 _NOTABLE = 0.1
 # A candidate is the same experiment as a sample if it is within this share of each range of it at all times.
 _SAME = 0.1
+# Number of candidates requested after the first answer, which has one.
+_COUNT = 5
+# Number of successive predicted violations that did not occur after which predictions are no longer trusted
+# and the LLM is told so.
+_MOST_MISSES = 3
 # Maximum number of the surrogate's latest samples of which the LLM is told the reason.
 _MOST_REASONS = 4
 # Characters of a reason in a remark.
@@ -54,27 +58,6 @@ _SCALED = "scaled robustness"
 # The LLM's candidates replace half of the stepping inputs and the constants between switching ones, which
 # show how the system responds, but no input that may violate: it would be missed if the LLM does not help.
 ADVISED = SurrogateSettings(pauses=0, probes=1)
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """How the LLM is asked, and how its answers are used.
-
-    Attributes:
-        count: number of candidates requested after the first answer, which has one.
-        promising: share of the best robustness by which an answer must be predicted to lower it to be
-            simulated, unless it is predicted to be better than what the surrogate would do next.
-        misses: number of successive predicted violations that did not occur after which predictions are no
-            longer trusted and the LLM is told so.
-        what_if_calls: maximum number of requests for predictions per question. Each sends the whole
-            conversation again, so three cost up to four requests plus rejected replies: enough to compare,
-            correct and check.
-    """
-
-    count: int = 5
-    promising: float = 0.1
-    misses: int = 3
-    what_if_calls: int = 3
 
 
 @dataclass(slots=True)
@@ -108,7 +91,16 @@ class Turns:
 
 
 class Hybrid:
-    """The surrogate engine with a language model as adviser."""
+    """The surrogate engine with a language model as adviser.
+
+    Args:
+        problem: the problem to search.
+        seed: of the surrogate.
+        adviser: asks the LLM.
+        promising: share of the best robustness by which an answer must be predicted to lower it to be
+            simulated, unless it is predicted to be better than what the surrogate would do next.
+        surrogate_settings: settings of the surrogate.
+    """
 
     name = "hybrid"
 
@@ -118,13 +110,13 @@ class Hybrid:
         *,
         seed: int,
         adviser: LLMEngine,
-        settings: Settings | None = None,
+        promising: float = 0.1,
         surrogate_settings: SurrogateSettings = ADVISED,
     ) -> None:
         self.adviser = adviser
-        self.settings = settings or Settings()
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
         self.turns = Turns()
+        self._promising = promising
         self._best: tuple[float, Candidate] | None = None
         self._since_best = 0
         self._points: list[Array] = []
@@ -226,13 +218,8 @@ class Hybrid:
         """Ask for several candidates; return them, the most promising one first."""
         notes = [*self._standing(), *self._repeats, *self._reasons_told()]
         self._repeats.clear()
-        calls = self.settings.what_if_calls if self._is_trusted else 0
-        candidates = self.adviser.propose(
-            self.settings.count,
-            notes,
-            what_if=WhatIf(self.surrogate, calls) if calls else None,
-            dispensable=True,
-        )
+        predictor = self.surrogate if self._is_trusted else None
+        candidates = self.adviser.propose(_COUNT, notes, predictor=predictor, dispensable=True)
         self.surrogate.suggest(candidates)
         predictions = self.surrogate.foresee(candidates) if self._is_trusted else []
         if not predictions:
@@ -279,16 +266,16 @@ class Hybrid:
         rivals = [] if self._next is None else [self._next]
         # Against the prediction of the best sample, not its robustness: early predictions are off as a whole.
         new, best, *other = (v.robustness for v in self.surrogate.foresee([candidate, sample, *rivals]))
-        return best - new >= self.settings.promising * abs(robustness) or any(new < r for r in other)
+        return best - new >= self._promising * abs(robustness) or any(new < r for r in other)
 
     @property
     def _is_trusted(self) -> bool:
         """Whether recent predictions were good."""
-        return self.surrogate.is_trusted and self.surrogate.misses < self.settings.misses
+        return self.surrogate.is_trusted and self.surrogate.misses < _MOST_MISSES
 
     def _standing(self) -> list[str]:
         """Return how the search stands, in the words that the LLM is told."""
-        if self.surrogate.misses >= self.settings.misses:
+        if self.surrogate.misses >= _MOST_MISSES:
             return [
                 "A numerical optimiser shares this search and fits a model to the samples above. It "
                 f"predicted a violation {self.surrogate.misses} times in a row and was wrong each time: do "

@@ -16,12 +16,10 @@ from falsifier.engines.protocol import RANDOM_CHANGE, Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm import ReplyKind
+from falsifier.llm.candidate_text import lessons_in
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
-from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
-from falsifier.llm.replies import Answer
-from falsifier.llm.tools import WhatIf
+from falsifier.llm.tools import Predictor
 from falsifier.problem.problem import Problem
 
 # Questions in a row without a valid answer after which an LLM is not worth its money.
@@ -42,10 +40,8 @@ class LLMEngine:
         problem: the problem to search.
         chat: the chat with the LLM.
         variant: name of the prompt variant, which determines what prompts contain; None: the default one.
-        reply: what replies consist of; with ``points`` control points stay as the spec has them.
         on_exchange: called with every exchange until ``attach`` replaces it.
         sample: number that distinguishes runs with equal questions, so that cached replies are not shared.
-        prompt_tokens: maximum number of tokens of a prompt, estimated.
         anonymous: whether the LLM gets neutral names instead of real ones.
         fallback: engine to switch to if the LLM cannot be reached or gives no valid reply; None: the error
             ends the run.
@@ -63,18 +59,14 @@ class LLMEngine:
         chat: Chat,
         *,
         variant: str | None = None,
-        reply: ReplyKind = "json",
         on_exchange: OnExchange = lambda _: None,
         sample: int = 0,
-        prompt_tokens: int = DEFAULT_PROMPT_TOKENS,
         anonymous: bool = False,
         fallback: Engine | None = None,
     ) -> None:
         self.briefing = Briefing(
             problem,
             variant=variant,
-            reply=reply,
-            prompt_tokens=prompt_tokens,
             anonymous=anonymous,
             llm=chat.llm,
         )
@@ -139,7 +131,7 @@ class LLMEngine:
         count: int,
         notes: Sequence[str] = (),
         *,
-        what_if: WhatIf | None = None,
+        predictor: Predictor | None = None,
         dispensable: bool = False,
     ) -> list[Candidate]:
         """Ask one question of an engine that leads the search; return new candidates, at least one.
@@ -147,8 +139,8 @@ class LLMEngine:
         Args:
             count: maximum number of candidates.
             notes: lines to add to the question, after problem and history.
-            what_if: permission to request predictions before answering; ignored if the LLM does not support
-                tools.
+            predictor: makes the predictions that the LLM may request before it answers; ignored if the LLM
+                does not support tools.
             dispensable: whether the search continues without an answer. A missing answer is then recorded, so
                 that a resumed run continues in the same way.
 
@@ -157,19 +149,19 @@ class LLMEngine:
         """
         briefing = self.briefing
         messages = briefing.question(count, notes)
-        tool = None if what_if is None else briefing.tool(what_if)
+        tool = None if predictor is None else briefing.tool(predictor)
         form = briefing.form(count)
         request = ChatRequest(
             messages=messages,
-            reply_schema=None if form.points else form.schema(),
+            reply_schema=form.schema(),
             tools=() if tool is None else (tool.offer,),
             sample=self._sample,
         )
 
         def read(text: str) -> list[Candidate]:
-            answer = form.read(text, origin=self.name)
-            new = self._new(answer)
-            briefing.lessons = answer.lessons or briefing.lessons
+            new = self._new(form.read(text, origin=self.name))
+            if form.lessons:
+                briefing.lessons = lessons_in(text) or briefing.lessons
             return new[:count]
 
         try:
@@ -223,14 +215,14 @@ class LLMEngine:
         _LOG.warning("%s. Continuing with %s.", error, what or source)
         self._reasons.setdefault(source, shorten(str(error), _LONGEST_REASON, placeholder=" ..."))
 
-    def _new(self, answer: Answer) -> list[Candidate]:
-        """Return the new candidates of an answer.
+    def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:
+        """Return the new ones of the proposed candidates, as they will be told.
 
         Raises:
             RejectedReplyError: if there is none.
         """
         briefing = self.briefing
-        candidates = [briefing.canonical(c) for c in answer.candidates]
+        candidates = [briefing.canonical(c) for c in proposed]
         seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in briefing.numbers.items()}
         seen |= {c.key: "one that was proposed already" for c in briefing.pending}
         new = {c.key: c for c in candidates if c.key not in seen}

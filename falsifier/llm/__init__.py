@@ -14,5 +14,3 @@ from typing import Literal
 # here is all that options of the command line need, so that --help imports nothing else.
 DEFAULT_VARIANT, CONTEXT_VARIANT = "MP5", "MP6"
 Effort = Literal["none", "minimal", "low", "medium", "high"]
-# What a reply consists of: a JSON object, or the numbers of each candidate between <point> and </point>.
-ReplyKind = Literal["json", "points"]

@@ -1,12 +1,10 @@
-"""Candidates as a language model writes them: JSON of several forms, or numbers between ``<point>`` tags.
+"""Candidates as a language model writes them, in JSON of several forms.
 
 What is read here is not compared with a search space yet; ``replies`` does that.
 """
 
 import json
 import re
-from collections.abc import Sequence
-from math import isfinite
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationError
@@ -16,7 +14,6 @@ from falsifier.core.signals import Interpolation
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import objects_in, without_thoughts
 
-_POINT_TAG = re.compile(r"<(/?)point>", re.IGNORECASE)
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*", re.ASCII)
 # Numbers and runs are written with fewer characters; for longer texts the expressions above would take a time
@@ -121,37 +118,17 @@ class WrittenCandidate(BaseModel):
     point: Annotated[list[float] | None, FailFast(), BeforeValidator(_unrolled)] = None
 
 
-def candidates_in(text: str, *, points: bool, count: int) -> list[WrittenCandidate | RejectedReplyError]:
-    """Read the candidates of a reply in order; one that cannot be read is replaced by what is wrong with it.
-
-    Args:
-        text: the reply.
-        points: whether numbers between tags were asked for, not JSON; the other form is read too.
-        count: number of points that were asked for.
+def candidates_in(text: str) -> list[dict[str, Any]]:
+    """Return the candidates of a reply in order, valid or not.
 
     Raises:
-        RejectedReplyError: if the reply contains no candidate, valid or not.
+        RejectedReplyError: if there is none.
     """
-    text = without_thoughts(text)
-    found: Sequence[str | dict[str, Any]]
-    if points:
-        # Reasoning may contain drafts before what is meant, and speak of the tags.
-        found = _points(text)[-count:] or _objects(text)
-        missing, where = "numbers between <point> and </point>", " between <point> and </point>"
-    else:
-        found = _objects(text) or _points(text)
-        missing, where = "JSON object with a candidate", ""
+    found = next((some for one in objects_in(text) if (some := _candidates_of(one))), [])
     if not found:
-        raise RejectedReplyError(f"it contains no {missing}{'' if points else _other_keys(text)}")
-    each: list[WrittenCandidate | RejectedReplyError] = []
-    for one in found:
-        try:
-            each.append(
-                WrittenCandidate(point=_numbers(one, where)) if isinstance(one, str) else _validated(one)
-            )
-        except RejectedReplyError as rejection:
-            each.append(rejection)
-    return each
+        other = _other_keys(without_thoughts(text))
+        raise RejectedReplyError(f"it contains no JSON object with a candidate{other}")
+    return found
 
 
 def lessons_in(text: str) -> str:
@@ -159,10 +136,6 @@ def lessons_in(text: str) -> str:
     objects = (_plain_keys(one) for one in objects_in(text) if isinstance(one, dict))
     lessons = next((one["lessons"] for one in objects if "lessons" in one), "")
     return printable(str(lessons or "")[:_LONGEST_RATIONALE])
-
-
-def _objects(text: str) -> list[dict[str, Any]]:
-    return next((found for one in objects_in(text) if (found := _candidates_of(one))), [])
 
 
 def _candidates_of(found: Any) -> list[dict[str, Any]]:
@@ -191,34 +164,12 @@ def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
     return {names.get(key, str(key)): value for key, value in found.items()}
 
 
-def _points(text: str) -> list[str]:
-    """What stands between the tags, or after the only one."""
-    found: list[str]
-    found, begun = [], -1
-    for tag in _POINT_TAG.finditer(text):
-        if not tag[1]:
-            begun = tag.end()
-        elif begun >= 0:
-            found.append(text[begun : tag.start()])
-            begun = -1
-    if begun >= 0 and not found:  # a model that stops at the end of the numbers
-        found.append(text[begun:])
-    return found[-_MOST_CANDIDATES:]
+def written_candidate(found: dict[str, Any]) -> WrittenCandidate:
+    """Read one candidate.
 
-
-def _numbers(text: str, where: str) -> list[float]:
-    """Numbers of a point; the tags are spoken of only if they were asked for."""
-    words = [w for w in re.split(r"[\s,;()\[\]]+", text) if w]
-    for word in words:
-        if len(word) > LONGEST_NUMBER or not _NUMBER.fullmatch(word):
-            raise RejectedReplyError(f"expected only numbers{where}, got {quoted(word)}")
-    numbers = [float(word) for word in words]
-    if not all(map(isfinite, numbers)):
-        raise RejectedReplyError(f"expected only finite numbers{where}")
-    return numbers
-
-
-def _validated(found: dict[str, Any]) -> WrittenCandidate:
+    Raises:
+        RejectedReplyError: stating what is wrong first.
+    """
     try:
         return WrittenCandidate.model_validate(found)
     except ValidationError as error:

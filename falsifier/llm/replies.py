@@ -1,7 +1,7 @@
 """Replies of a language model: the required form, and the candidates of a search space that a reply has.
 
-A prompt asks for one of two forms: JSON with signals by name and a rationale, or the numbers of a point in
-order between ``<point>`` and ``</point>``. A reply in the other form is read too.
+A prompt asks for signals by name, or for the numbers of a point in order. A reply in the other form is read
+too.
 """
 
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ from falsifier.llm.candidate_text import (
     WrittenCandidate,
     WrittenSignal,
     candidates_in,
-    lessons_in,
     quoted,
+    written_candidate,
 )
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import schema_of_list, schema_of_object
@@ -33,19 +33,6 @@ _NUMBERS = schema_of_list({"type": "number"})
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What a reply says.
-
-    Attributes:
-        candidates: the valid ones, in order.
-        lessons: what the LLM wrote down for its next question.
-    """
-
-    candidates: tuple[Candidate, ...]
-    lessons: str = ""
-
-
-@dataclass(frozen=True, slots=True)
 class ReplyForm:
     """What a reply must contain.
 
@@ -53,7 +40,6 @@ class ReplyForm:
         space: search space that candidates must fit.
         named: signals and parameters by name; else one list of numbers in the order of the dimensions.
         free: whether a free parameterization may be used if the space allows it.
-        points: numbers between tags are asked for, not JSON; tools take the same numbers as JSON.
         count: number of candidates.
         reasoned: whether each candidate comes with a rationale.
         lessons: whether the LLM may write down what it is to be told again.
@@ -62,7 +48,6 @@ class ReplyForm:
     space: SearchSpace
     named: bool = True
     free: bool = False
-    points: bool = False
     count: int = 1
     reasoned: bool = True
     lessons: bool = False
@@ -110,8 +95,8 @@ class ReplyForm:
             parts["parameters"] = schema_of_list(parameter, len(parameters), len(parameters))
         return parts
 
-    def read(self, text: str, *, origin: str = "") -> Answer:
-        """Read the valid candidates of a reply, and what it says beside them.
+    def read(self, text: str, *, origin: str = "") -> list[Candidate]:
+        """Return the valid candidates of a reply, in order.
 
         Raises:
             RejectedReplyError: if none is valid; states what is wrong with each.
@@ -123,7 +108,7 @@ class ReplyForm:
             raise RejectedReplyError(
                 "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
             )
-        return Answer(tuple(candidates), lessons_in(text) if self.lessons else "")
+        return candidates
 
     def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
         """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.
@@ -132,11 +117,9 @@ class ReplyForm:
             RejectedReplyError: if the reply contains no candidate, valid or not.
         """
         each: list[Candidate | RejectedReplyError] = []
-        for written in candidates_in(text, points=self.points, count=self.count):
+        for found in candidates_in(text):
             try:
-                each.append(
-                    written if isinstance(written, RejectedReplyError) else self._candidate(written, origin)
-                )
+                each.append(self._candidate(written_candidate(found), origin))
             except RejectedReplyError as rejection:
                 each.append(rejection)
         return each

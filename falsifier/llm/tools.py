@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
@@ -17,6 +17,9 @@ from falsifier.stl.margins import signed
 NAME = "predict"
 # Maximum number of candidates predicted per call; a longer answer would cost tokens for little benefit.
 MOST_CANDIDATES = 10
+# Maximum number of calls per turn that are answered. Each sends the whole conversation again, so three cost
+# up to four requests plus rejected replies: enough to compare, correct and check.
+MOST_CALLS = 3
 
 
 class Predictor(Protocol):
@@ -32,25 +35,12 @@ class Predictor(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class WhatIf:
-    """Permission to request predictions during one turn.
-
-    Attributes:
-        predictor: makes the predictions.
-        calls: maximum number of calls that are answered.
-    """
-
-    predictor: Predictor
-    calls: int
-
-
 @dataclass
 class PredictionTool:
     """Answers the calls of one turn.
 
     Attributes:
-        what_if: the predictor and the number of calls.
+        predictor: makes the predictions.
         form: required form of the candidates.
         variant: prompt variant, which limits what the answers reveal.
         reveal: maps a candidate as the LLM writes it to the real one.
@@ -58,7 +48,7 @@ class PredictionTool:
         answered: number of calls answered so far.
     """
 
-    what_if: WhatIf
+    predictor: Predictor
     form: ReplyForm
     variant: Variant
     reveal: Callable[[Candidate], Candidate]
@@ -68,7 +58,18 @@ class PredictionTool:
     @property
     def offer(self) -> Tool:
         """The tool's description for the LLM."""
-        return what_if_tool(self.form.schema(), calls=self.what_if.calls)
+        return Tool(
+            name=NAME,
+            description=(
+                "Predicts the robustness of candidates, using dynamics fitted to the samples so far. Nothing "
+                "is simulated, so a prediction is free and a sample is not; but predictions can be wrong, "
+                "and the answer states the size of the recent errors. Use it before you reply: compare "
+                "different structures first, then refine the most promising one. Candidates have the form of "
+                f"the reply, without rationale. At most {counted(MOST_CALLS, 'call')} per turn can be "
+                "answered."
+            ),
+            parameters=self.form.schema(),
+        )
 
     def respond(self, call: ToolCall) -> str:
         """Answer one call.
@@ -78,18 +79,17 @@ class PredictionTool:
         """
         if call.name != NAME:
             raise RejectedReplyError(f"there is no tool {call.name!r}, only {NAME!r}")
-        if self.answered >= self.what_if.calls:
+        if self.answered >= MOST_CALLS:
             raise RejectedReplyError(
-                f"the limit of {counted(self.what_if.calls, 'call')} is reached; "
-                "reply with your candidates now"
+                f"the limit of {counted(MOST_CALLS, 'call')} is reached; reply with your candidates now"
             )
         found = self.form.read_each(call.arguments)
         if all(isinstance(one, RejectedReplyError) for one in found):
             raise RejectedReplyError(f"the arguments are wrong: {found[0]}")
         self.answered += 1
-        told, predictor = found[:MOST_CANDIDATES], self.what_if.predictor
+        told = found[:MOST_CANDIDATES]
         valid = [self.reveal(one) for one in told if isinstance(one, Candidate)]
-        verdicts = iter(predictor.foresee(valid) if valid else ())
+        verdicts = iter(self.predictor.foresee(valid) if valid else ())
         lines = [
             predicted(self.variant, self.hide(next(verdicts)))
             if isinstance(one, Candidate)
@@ -98,9 +98,9 @@ class PredictionTool:
         ]
         if len(found) > MOST_CANDIDATES:
             lines.append(f"and {len(found) - MOST_CANDIDATES} more: not predicted; send fewer per call")
-        left = self.what_if.calls - self.answered
+        left = MOST_CALLS - self.answered
         more = f"{counted(left, 'more call')} can be answered" if left else "This was the last call"
-        error = 100 * predictor.recent_error
+        error = 100 * self.predictor.recent_error
         return "\n".join(
             (
                 *(f"Candidate {i}: {line}" for i, line in enumerate(lines, start=1)),
@@ -108,26 +108,6 @@ class PredictionTool:
                 f"{more}; then reply with your candidates.",
             )
         )
-
-
-def what_if_tool(parameters: dict[str, Any], *, calls: int) -> Tool:
-    """Describe the tool to the LLM.
-
-    Args:
-        parameters: JSON Schema of the arguments: a reply's candidates, without rationale.
-        calls: maximum number of calls that are answered.
-    """
-    return Tool(
-        name=NAME,
-        description=(
-            "Predicts the robustness of candidates, using dynamics fitted to the samples so far. Nothing is "
-            "simulated, so a prediction is free and a sample is not; but predictions can be wrong, and the "
-            "answer states the size of the recent errors. Use it before you reply: compare different "
-            "structures first, then refine the most promising one. Candidates have the form of the reply, "
-            f"without rationale. At most {counted(calls, 'call')} per turn can be answered."
-        ),
-        parameters=parameters,
-    )
 
 
 def predicted(variant: Variant, verdict: Verdict) -> str:

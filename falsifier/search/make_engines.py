@@ -161,7 +161,6 @@ def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: i
         problem,
         chat,
         variant=llm.variant,
-        reply=llm.reply,
         sample=request.seed,
         anonymous=llm.anonymous,
         fallback=fallback,

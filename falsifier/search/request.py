@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from falsifier.core.secrets import holds_credentials, is_secret_option
-from falsifier.llm import Effort, ReplyKind
+from falsifier.llm import Effort
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address
 from falsifier.problem.source import ProblemSource
@@ -34,9 +34,6 @@ class LLMSettings(_Strict):
     effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
-    reply: ReplyKind = Field(
-        default="json", description="What a reply consists of: a JSON object, or numbers between tags."
-    )
     options: dict[str, str | int | float] = Field(
         default_factory=dict, description="Passed to litellm unchanged."
     )

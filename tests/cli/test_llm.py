@@ -21,10 +21,6 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     with serving(reply(BRAKE_LATE), reply(FULL)) as server:
         falsifier(*at1(server.url, "--out", "run"), cwd=tmp_path, env=ENV)
         sent = server.received[1].body["messages"]
-    printed = falsifier(
-        *("llm", "prompt", "AT1", "--variant", "MP4", "--after", "run", "--at", "2", "--json"), cwd=tmp_path
-    )
-    assert json.loads(printed.out) == sent
     rich = falsifier("llm", "prompt", "AT1", "--after", "run", cwd=tmp_path).out
     assert "2 of 100 simulations spent, 98 left. Propose the next sample." in rich
     at = falsifier("llm", "prompt", "run", "--at", "2", cwd=tmp_path)
@@ -34,25 +30,10 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     assert (no_run.code, "AT1: not a run directory" in no_run.err) == (2, True)
     none = falsifier("llm", "prompt", "run", "--at", "3", cwd=tmp_path)
     assert (none.code, "the run has no sample 3" in none.err) == (2, True)
+    both = falsifier("llm", "prompt", "AT1", "--after", "run", "--at", "2", cwd=tmp_path)
+    assert (both.code, "--after: --at prints what a run sent" in both.err) == (2, True)
     other = falsifier("llm", "prompt", "CC1", "--after", "run", cwd=tmp_path)
     assert (other.code, "run is a run of AT1 on the model" in other.err) == (2, True)
-
-
-def test_the_prompt_of_the_hybrid_shows_its_tool_once_there_are_samples(tmp_path: Path) -> None:
-    first = falsifier("llm", "prompt", "AT1", "--engine", "hybrid", cwd=tmp_path)
-    assert "Propose the first sample" in first.out
-    assert "--- tool" not in first.out
-    falsifier("run", "AT1", "--engine", "corners", "--out", "run", cwd=tmp_path)
-    later = ("llm", "prompt", "AT1", "--engine", "hybrid", "--after", "run", "--anonymous")
-    text = falsifier(*later, cwd=tmp_path).out
-    assert "Propose the next 5 different samples" in text
-    assert "--- tool predict, offered while" in text and "At most 3 calls" in text
-    shown = falsifier(*later, "--json", cwd=tmp_path).json
-    assert [m["role"] for m in shown["messages"]] == ["system", "user"]
-    (tool,) = shown["tools"]
-    item = tool["parameters"]["properties"]["candidates"]["items"]
-    assert item["properties"]["signals"]["items"]["properties"]["name"]["enum"] == ["u1", "u2"]
-    assert "throttle" not in text
 
 
 def test_check_reports_what_runs_need_and_fails_without_a_usable_answer(tmp_path: Path) -> None:
@@ -67,24 +48,6 @@ def test_check_reports_what_runs_need_and_fails_without_a_usable_answer(tmp_path
         assert part in done.out
     assert (unusable.code, "no usable answer came" in unusable.out) == (3, True)
     assert ENV["OPENAI_API_KEY"] not in done.out + done.err
-
-
-def test_replies_as_points_are_asked_for_and_recorded(tmp_path: Path) -> None:
-    asking = ("llm", "prompt", "AT1", "--variant", "MP2", "--llm-option", "reply=points", "--json")
-    printed = json.loads(falsifier(*asking, cwd=tmp_path).out)
-    with serving(Step("All out. <point>100, 100, 100, 100, 100, 100, 100, 0, 0, 0</point>")) as server:
-        done = falsifier(
-            *at1(server.url, "--variant", "MP2", "--llm-option", "reply=points", "--out", "run"),
-            cwd=tmp_path,
-            env=ENV,
-        )
-        (asked,) = server.received
-    assert (done.code, asked.body["messages"]) == (1, printed)
-    assert "response_format" not in asked.body and "</point>" in printed[0]["content"]
-    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
-    assert '"reply": "points"' in json.dumps(manifest)
-    unnamed = falsifier("run", "AT1", "--llm-option", "reply=points", cwd=tmp_path)
-    assert (unnamed.code, "--llm-option: applies to language models only" in unnamed.err) == (2, True)
 
 
 def test_the_printed_prompt_has_the_context_that_is_named(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a language model is told; a preview shows what is sent (test_what_if: also the tool)."""
+"""What a language model is told; a preview shows what is sent."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -6,35 +6,25 @@ from pathlib import Path
 import pytest
 
 from falsifier.context.values import Context, Named
-from falsifier.engines.briefing import Briefing, preview, told_context
+from falsifier.engines.briefing import preview, told_context
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.source import ProblemSource
-from falsifier.testing import FREE, lag_problem
+from falsifier.testing import lag_problem
 
 
 @pytest.mark.parametrize("variant", ["MP1", "MP2", "MP5"])
 def test_a_preview_is_what_is_sent(variant: str) -> None:
     problem = lag_problem()
-    chat = ScriptedChat(["<point>0 0 0 0</point>", "<point>0 0 0 1</point>"])
+    chat = ScriptedChat(['{"point": [0, 0, 0, 0]}', '{"point": [0, 0, 0, 1]}'])
     engine = LLMEngine(problem, chat, variant=variant)
     evaluation = evaluate(problem, *engine.ask())
     engine.tell([evaluation])
     engine.ask()
     assert chat.requests[0].messages == preview(problem, variant=variant)
     assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
-
-
-@pytest.mark.parametrize("variant", ["MP1", "MP5"])
-def test_the_form_of_replies_follows_variant_and_kind(variant: str) -> None:
-    problem = lag_problem(free=FREE)
-    json, points = (Briefing(problem, variant=variant, reply=kind) for kind in ("json", "points"))
-    assert json.view.space == problem.space
-    assert all(r.free is None for r in points.view.space.inputs), "numbers are the spec's control points"
-    assert [b.form(2).points for b in (json, points)] == [False, True]
-    assert [b.form(2).named for b in (json, points)] == [variant == "MP5", False]
 
 
 def test_context_is_read_only_if_it_is_told(tmp_path: Path) -> None:

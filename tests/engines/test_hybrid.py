@@ -10,7 +10,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.engines import make_engine
 from falsifier.engines.briefing import Briefing
-from falsifier.engines.hybrid import Hybrid, Settings, Turns, helps
+from falsifier.engines.hybrid import Hybrid, Turns, helps
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
@@ -127,8 +127,7 @@ def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
     problem = wide_problem()
     # Higher inputs give a higher x: the surrogate, once trained, must put 1.5 first.
     script = Script([[-1.5, 0.0, 1.5, -0.5, 0.5]], problem)
-    settings = Settings(promising=-1.0)
-    engine = Hybrid(problem, seed=0, adviser=script, settings=settings, surrogate_settings=SETTINGS)
+    engine = Hybrid(problem, seed=0, adviser=script, promising=-1.0, surrogate_settings=SETTINGS)
     asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=25)
     later = [c for c in asked if c.origin == "scripted" and "predicted robustness" in c.rationale]
     assert later, "no answer was ranked"

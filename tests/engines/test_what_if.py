@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.engines.briefing import preview_tool
-from falsifier.engines.hybrid import Hybrid, Settings
+from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
@@ -23,7 +22,6 @@ from falsifier.testing import drive, simulated
 from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS
 
-EAGER = Settings(promising=-9.0)
 Line = str | ChatReply | Exception
 
 
@@ -50,7 +48,7 @@ def call(*levels: float, name: str = "u") -> ChatReply:
 
 def hybrid(chat: Chat, *, anonymous: bool = False) -> Hybrid:
     adviser = LLMEngine(wide_problem(), chat, anonymous=anonymous)
-    return Hybrid(wide_problem(), seed=0, adviser=adviser, settings=EAGER, surrogate_settings=SETTINGS)
+    return Hybrid(wide_problem(), seed=0, adviser=adviser, promising=-9.0, surrogate_settings=SETTINGS)
 
 
 def run(engine: Engine, rounds: int = 14) -> list[str]:
@@ -106,8 +104,6 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
     # An x between numbers counts repeated values.
     assert not re.search(r"\bu\b|(?<!\d )\bx\b|\blag\b|drive|position", everything)
     assert any(set(c.signals["u"].values) == {1.75} for c in asked)
-    shown = preview_tool(wide_problem(), calls=EAGER.what_if_calls, anonymous=True)
-    assert shown == sent[0].tools[0]
 
 
 class TestResume:

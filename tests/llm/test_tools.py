@@ -10,7 +10,7 @@ from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import ToolCall
 from falsifier.llm.prompts import VARIANTS
 from falsifier.llm.replies import ReplyForm
-from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, WhatIf
+from falsifier.llm.tools import MOST_CALLS, MOST_CANDIDATES, PredictionTool
 from falsifier.stl import Verdict
 from falsifier.testing import lag_problem
 
@@ -28,12 +28,11 @@ class Foreteller:
         return [Verdict(c.signals["u"].values[-1], 2.5, "x <= 0.9") for c in candidates]
 
 
-def tool(calls: int = 3, variant: str = "MP5") -> tuple[PredictionTool, Foreteller]:
+def tool(variant: str = "MP5") -> tuple[PredictionTool, Foreteller]:
     foreteller = Foreteller()
     form = ReplyForm(lag_problem().space, count=MOST_CANDIDATES, reasoned=False)
-    what_if = WhatIf(foreteller, calls)
     return (
-        PredictionTool(what_if, form, VARIANTS[variant], reveal=lambda c: c, hide=lambda v: v),
+        PredictionTool(foreteller, form, VARIANTS[variant], reveal=lambda c: c, hide=lambda v: v),
         foreteller,
     )
 
@@ -71,11 +70,12 @@ class TestPredictionTool:
         ],
     )
     def test_wrong_calls_say_what_is_wrong_and_do_not_count(self, call: ToolCall, problem: str) -> None:
-        made, _ = tool(calls=1)
+        made, _ = tool()
+        made.answered = MOST_CALLS - 1
         with pytest.raises(RejectedReplyError, match=problem):
             made.respond(call)
         assert "last call" in made.respond(about(0.5))
-        with pytest.raises(RejectedReplyError, match="limit of 1 call is reached"):
+        with pytest.raises(RejectedReplyError, match="limit of 3 calls is reached"):
             made.respond(about(0.7))
 
     def test_too_many_candidates_are_cut(self) -> None:

@@ -14,17 +14,10 @@ from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm import ReplyKind
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
-from falsifier.llm.prompts.standing import (
-    INTERPOLATION_WORDS,
-    RATIONALE,
-    formula_text,
-    json_form,
-    points_form,
-)
+from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, RATIONALE, formula_text, json_form
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Always, Eventually, Formula, Until
@@ -56,14 +49,13 @@ _GUIDANCE_ON_OUTPUTS = (
 )
 
 
-def published_standing(view: View, variant: Variant, *, count: int = 1, reply: ReplyKind = "json") -> str:
+def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
     """Return the constant part of a question.
 
     Args:
         view: the problem.
         variant: which parts it contains.
         count: number of candidates wanted.
-        reply: what a reply is to consist of.
     """
     named, what = variant.has("names"), view.chosen
     sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
@@ -76,12 +68,7 @@ def published_standing(view: View, variant: Variant, *, count: int = 1, reply: R
     if variant.has("values"):
         guidance.append(_GUIDANCE_ON_OUTPUTS.format(what=what))
     sections.append("\n".join(guidance))
-    if reply == "points":
-        sections.append(
-            points_form(count, f"{counted(len(view.space.dimensions), 'number')} in the order above")
-        )
-    else:
-        sections.append(f"{json_form(count)}\n{_blank(view, count, named=named)}")
+    sections.append(f"{json_form(count)}\n{_blank(view, count, named=named)}")
     return "\n\n".join(sections)
 
 

@@ -14,7 +14,6 @@ from falsifier.core.words import counted, listed
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
-from falsifier.llm import ReplyKind
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts.numbers import as_signals
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
@@ -106,7 +105,6 @@ class Questions:
     Args:
         view: the problem; may be replaced by one that tells the same with other scales.
         variant: which parts a question contains.
-        reply: what a reply is to consist of.
         start: smallest and largest value of each output at time 0, by name, as far as known.
         tokens: maximum number of tokens of a question.
         llm: name of the LLM whose tokens are counted.
@@ -117,13 +115,12 @@ class Questions:
         view: View,
         variant: Variant,
         *,
-        reply: ReplyKind = "json",
         start: Mapping[str, tuple[float, float]] | None = None,
         tokens: int = DEFAULT_PROMPT_TOKENS,
         llm: str = "",
     ) -> None:
         self.view = view
-        self._variant, self._reply, self._tokens = variant, reply, tokens
+        self._variant, self._tokens = variant, tokens
         self._start = dict(start or {}) if variant.has("circumstances") else {}
         self._count: Callable[[str], int] = lambda text: count_tokens(text, llm)
         self._fixed = self._count(self._standing(1))
@@ -192,8 +189,8 @@ class Questions:
 
     def _standing(self, count: int) -> str:
         if self._variant.is_published:
-            return published_standing(self.view, self._variant, count=count, reply=self._reply)
-        return standing(self.view, self._variant, count=count, reply=self._reply, start=self._start)
+            return published_standing(self.view, self._variant, count=count)
+        return standing(self.view, self._variant, count=count, start=self._start)
 
     def _aim(self) -> int:
         return min(self._tokens, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
@@ -361,7 +358,7 @@ class Questions:
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
         if not self._variant.is_published:
             return as_signals(self.view, candidate)
-        if not self._variant.has("names") or self._reply == "points":
+        if not self._variant.has("names"):
             return as_point(self.view, candidate)
         return as_values(self.view, candidate)
 

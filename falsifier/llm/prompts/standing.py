@@ -10,8 +10,7 @@ from dataclasses import replace
 
 from falsifier.context.values import Context
 from falsifier.core.space import Freedom, InputRange, ParameterRange, nearest_value
-from falsifier.core.words import counted, listed
-from falsifier.llm import ReplyKind
+from falsifier.core.words import listed
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
@@ -74,10 +73,6 @@ _JUMPS = (
     "long for what the system does meanwhile."
 )
 
-_POINTS = (
-    "Think step by step, but write no code. End your reply with {what}: its {order}; separate the numbers by "
-    "commas and put {them} between <point> and </point>."
-)
 _JSON = "Reply with one JSON object{many} in this form, with one or two sentences of rationale{own}:"
 _OWN_NUMBERS = "; the numbers below only show the form, choose your own"
 RATIONALE = "why these values"
@@ -99,7 +94,6 @@ def standing(
     variant: Variant,
     *,
     count: int = 1,
-    reply: ReplyKind = "json",
     start: Mapping[str, tuple[float, float]] | None = None,
 ) -> str:
     """Return the constant part of a question.
@@ -108,15 +102,10 @@ def standing(
         view: the problem.
         variant: which parts it contains.
         count: number of candidates wanted.
-        reply: what a reply is to consist of.
         start: smallest and largest value of each output at time 0, by name, as far as known.
     """
     if not variant.has("context"):
         view = replace(view, context=Context())
-    if reply == "points":
-        form = points_form(count, _order(view))
-    else:
-        form = "\n".join((json_form(count, own=_OWN_NUMBERS), *_example_and_notes(view, count)))
     text = _STANDING.format(
         task=_TASK.format(what=view.chosen),
         system=_system(view),
@@ -125,7 +114,7 @@ def standing(
         choice="\n".join(_choice(view)),
         context="\n".join(_context(view)),
         advice="\n".join(_advice(view)),
-        reply=form,
+        reply="\n".join((json_form(count, own=_OWN_NUMBERS), *_example_and_notes(view, count))),
     )
     return "\n\n".join(section for section in text.split("\n\n") if section)
 
@@ -164,12 +153,6 @@ def _prefixed(formula: Formula) -> str:
     """Operand of a prefix operator; two of these in a row need no parentheses between them."""
     text = formula_text(formula)
     return text if isinstance(formula, Always | Eventually | Not | Next) else f"({text})"
-
-
-def points_form(count: int, order: str) -> str:
-    """Say how a reply has numbers between tags; ``order`` names them."""
-    what, them = ("the new sample", "them") if count == 1 else (f"{count} different samples", "each sample")
-    return _POINTS.format(what=what, order=order, them=them)
 
 
 def json_form(count: int, *, own: str = "") -> str:
@@ -353,18 +336,6 @@ def _example_and_notes(view: View, count: int) -> Iterator[str]:
     if free:
         yield _FREE_NOTE
     yield _LESSONS_NOTE
-
-
-def _order(view: View) -> str:
-    """Which numbers a point has."""
-    signals = (
-        f"the value of {r.name}"
-        if r.control_points == 1
-        else f"the values of {r.name} at its {r.control_points} control points"
-        for r in view.space.inputs
-    )
-    named = ", ".join((*signals, *(p.name for p in view.space.parameters)))
-    return f"{counted(len(view.space.dimensions), 'number')} in this order: {named}"
 
 
 def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:

@@ -257,7 +257,6 @@ def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
         ("--variant", llm.variant),
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
         ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
-        ("--llm-option", None if llm.reply == "json" else f"reply={llm.reply}"),
         ("--anonymous", True if llm.anonymous else None),
         ("--fallback", llm.fallback),
     ]

@@ -11,6 +11,7 @@ from falsifier.context.values import Compared, Context, Excerpt
 from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.errors import SpecError
 from falsifier.llm import DEFAULT_VARIANT
+from falsifier.llm.candidate_text import lessons_in
 from falsifier.llm.prompts import VARIANTS, View, variant_named
 from falsifier.llm.prompts.standing import formula_text
 from falsifier.llm.replies import ReplyForm
@@ -139,17 +140,9 @@ class TestReply:
         for count in (1, 3):
             form = ReplyForm(self.problem.space, free=True, count=count, lessons=True)
             example = self.example("MP5", count=count)
-            answer = form.read(example)
-            assert answer.candidates[0].signals["u"].times == (0.0, 2.4, 6.2)
-            assert answer.lessons
+            assert form.read(example)[0].signals["u"].times == (0.0, 2.4, 6.2)
+            assert lessons_in(example)
             assert list(json.loads(example)) == list(form.schema()["properties"]), "in the same order"
-
-    def test_points_are_asked_for_in_a_stated_order(self) -> None:
-        fixed = replace(self.problem, space=self.problem.space.fixed)
-        assert "its 5 numbers in the order above" in standing(fixed, "MP2", reply="points")
-        own = standing(fixed, "MP5", reply="points")
-        assert "its 5 numbers in this order: the values of u at its 4 control points, x0" in own
-        assert "lessons" not in own
 
 
 class TestAdvice:
