@@ -15,7 +15,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.description import WINDOWS, Description, describe, file_hash, needed_tool_text
-from falsifier.fmu.process import FmuOrder, Isolated, Request, load, simulate
+from falsifier.fmu.process import Coupling, Isolated, Member, Network, Order, Place, load, simulate
 from falsifier.fmu.systems import System
 
 
@@ -90,7 +90,7 @@ class FmuModel(Isolated):
         load(replace(self.order, logging=True))
 
     @property
-    def order(self) -> FmuOrder:
+    def order(self) -> Order:
         """What workers are asked to simulate."""
         return _order(self)
 
@@ -134,19 +134,17 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 
 
 @lru_cache(maxsize=64)
-def _order(model: FmuModel) -> FmuOrder:
+def _order(model: FmuModel) -> Order:
     description = describe(model.path, model.sha256)
     through_wine = model.windows or description.needs_wine(model.interface)
-    return FmuOrder(
-        description=description,
-        shown=str(model.path),
+    member = Member("", model.path, model.sha256, description, None, model.interface)
+    places = {name: Place(0, name) for name in description.slots}
+    return Order(
+        network=Network(str(model.path), (member,), (), (0,), (), Coupling(), description, places),
         key=(model.sha256, model.interface, model.logging, through_wine, model.rights),
-        archives={"": (model.path, model.sha256)},
-        kind=Request.LOAD,
         logging=model.logging,
         rights=model.rights,
         through_wine=through_wine,
-        interface=model.interface,
     )
 
 

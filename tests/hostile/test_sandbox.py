@@ -147,7 +147,7 @@ OTHER = """
 model.close()
 other = FmuModel(Path(fmu).with_name("Lag_2.fmu"))
 other.simulate(dict(), dict(), Experiment(1.0, 0.1, ("y",)))
-found = Path(os.environ["TMPDIR"]).glob("*/*/modelDescription.xml")
+found = Path(os.environ["TMPDIR"]).glob("*/*/0/modelDescription.xml")
 (folder,) = (each.parent for each in found if 'modelName="Lag"' in each.read_text())
 (folder / "victim").write_text("content")
 os.environ["HOSTILE_LICENSE"] = str(folder)

@@ -1,9 +1,19 @@
 """Processes in which FMUs run, from the side of the process that requests simulations."""
 
-from falsifier.fmu.process import encoding, outcome
-from falsifier.fmu.process.connection import Reply, Request, Where
-from falsifier.fmu.process.order import FmuOrder, Order, is_held
-from falsifier.fmu.process.plan import Plan, solver_tolerance
+from falsifier.fmu.process.network import (
+    SYSTEM,
+    Coupling,
+    Extrapolation,
+    Isolation,
+    Link,
+    Loops,
+    Member,
+    Method,
+    Network,
+    Place,
+    full_name,
+)
+from falsifier.fmu.process.order import Order, own_steps
 from falsifier.fmu.process.registry import (
     REGISTRY,
     Isolated,
@@ -18,23 +28,26 @@ from falsifier.fmu.process.workplace import WorkFolder
 
 __all__ = [
     "REGISTRY",
-    "FmuOrder",
+    "SYSTEM",
+    "Coupling",
+    "Extrapolation",
     "Isolated",
+    "Isolation",
+    "Link",
+    "Loops",
+    "Member",
+    "Method",
+    "Network",
     "Order",
-    "Plan",
-    "Reply",
-    "Request",
+    "Place",
     "Rights",
-    "Where",
     "WorkFolder",
-    "encoding",
-    "is_held",
+    "full_name",
     "load",
-    "outcome",
+    "own_steps",
     "resolved",
     "rights_text",
     "simulate",
-    "solver_tolerance",
     "stop_simulations",
     "watching",
 ]

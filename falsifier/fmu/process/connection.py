@@ -35,7 +35,6 @@ class Request(IntEnum):
     LOAD = 1
     PREPARE = 2
     SIMULATE = 3
-    LOAD_SYSTEM = 4
 
 
 class Where(IntEnum):

@@ -10,9 +10,9 @@ from urllib.parse import quote
 
 import numpy as np
 
-from falsifier.core.model import Interface
 from falsifier.errors import ModelError
 from falsifier.fmu.description import Description, windows_path
+from falsifier.fmu.process.network import Member
 
 # Storage types of values; their position is the number that request.c reads.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
@@ -107,32 +107,23 @@ def _table(description: Description, names: Sequence[str]) -> tuple[bytes, list[
     return b"".join(calls), places
 
 
-def fmu(
-    description: Description,
-    shown: str,
-    folder: Path,
-    interface: Interface,
-    *,
-    logging: bool,
-    through_wine: bool = False,
-) -> bytes:
+def fmu(member: Member, folder: Path, *, logging: bool, through_wine: bool) -> bytes:
     """Return what the worker needs to load an FMU.
 
     Args:
-        description: its description.
-        shown: what errors call it.
+        member: the FMU and its interface.
         folder: where it was unpacked.
-        interface: interface to simulate with.
         logging: whether to ask it for messages.
         through_wine: whether the worker is the program for Windows.
 
     Raises:
         ModelError: if it has no library for the worker.
     """
+    description, interface = member.description, member.interface
     libraries = description.libraries
     found = libraries.windows if through_wine else libraries.here
     if interface not in found:
-        raise ModelError(f"{shown}: {libraries.lacking[interface]}")
+        raise ModelError(f"{member.path}: {libraries.lacking[interface]}")
     library = folder / found[interface]
     resources = folder / "resources"
     if through_wine:

@@ -156,7 +156,7 @@ def simulate(
 def _plan(
     order: Order, experiment: Experiment, inputs: tuple[str, ...], parameters: tuple[str, ...], pieces: int
 ) -> Plan:
-    return make_plan(order.description, experiment, inputs, parameters, pieces=pieces)
+    return make_plan(order.network.description, experiment, inputs, parameters, pieces=pieces)
 
 
 def load(order: Order) -> None:
@@ -167,7 +167,7 @@ def load(order: Order) -> None:
     """
     runner = Runner(REGISTRY.workplace, order)
     try:
-        runner.load(make_plan(order.description, Experiment(1.0, 1.0, ()), (), ()))
+        runner.load(make_plan(order.network.description, Experiment(1.0, 1.0, ()), (), ()))
     finally:
         runner.close()
 

@@ -245,7 +245,7 @@ class Runner:
             return
         name = self._order.component(reply.component)
         said = f"{name}: {reply.text}" if name else reply.text
-        text = f"{self._order.shown}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
+        text = f"{self._order.network.name}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
         # What has loaded before is not unusable for that.
         raise SimulationError(text) if may_load_later and self._has_loaded else ModelError(text)
 
@@ -260,7 +260,7 @@ class Runner:
             self._worker = None
             how, _, end = said.partition(": ")
             reason = f"{how} while it was loaded{f' ({end})' if end else ''}"
-        text = f"{self._order.shown}: {reason}{outcome.last_lines(log)}"
+        text = f"{self._order.network.name}: {reason}{outcome.last_lines(log)}"
         if not self._has_loaded:
             return ModelError(text)
         hangs = isinstance(error, TimeoutError)

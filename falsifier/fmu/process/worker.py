@@ -24,7 +24,7 @@ from falsifier.fmu.process.connection import (
 )
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import Plan, Room, check_values
+from falsifier.fmu.process.plan import HEADER, Plan, Room, check_values
 from falsifier.fmu.process.rights import Told, read_told
 from falsifier.fmu.process.start import RUNNING, SIMULATED, Started, crash_code
 from falsifier.fmu.process.workplace import Workplace
@@ -143,7 +143,7 @@ class Worker:
         logging: bool,
     ) -> None:
         self._order = order
-        folder = workplace.unpacked(order.archives)
+        folder = workplace.unpacked([(m.path, m.sha256) for m in order.network.members])
         known = len(REUSES) if reuse is None else REUSES.index(reuse)
         self._ways = integers(known, sum(1 << REUSES.index(way) for way in untrusted))
         self._load = order.load(folder, logging=logging)
@@ -180,7 +180,9 @@ class Worker:
             )
             end = exit_text(self.end())
             raise ModelError(f"the program that runs FMUs does not start ({end}){hint}") from error
-        send(program, self._order.kind, self._ways + self._load)
+        # The worker tells there which component it loads.
+        self._started.memory.fit(HEADER)
+        send(program, Request.LOAD, self._ways + self._load)
         return self.receive(limit)
 
     def prepare(self, plan: Plan, limit: float) -> Reply:

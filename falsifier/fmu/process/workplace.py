@@ -9,7 +9,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -111,26 +111,29 @@ class Workplace(WorkFolder):
         super().__init__()
         self._making = threading.Lock()
 
-    def unpacked(self, archives: Mapping[str, tuple[Path, str]]) -> Path:
-        """Return the folder to which FMUs are unpacked; unpack them if necessary.
+    def unpacked(self, archives: Sequence[tuple[Path, str]]) -> Path:
+        """Return the folder to which FMUs are unpacked, each to its number; unpack them if necessary.
 
         Two components with the same FMU get a folder each: a library that is loaded from two files has its
         static data twice.
 
+        Args:
+            archives: the FMUs and their hashes.
+
         Raises:
             ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
         """
-        key = sha256(repr([(name, sha) for name, (_, sha) in archives.items()]).encode()).hexdigest()[:16]
+        key = sha256("".join(sha for _, sha in archives).encode()).hexdigest()[:16]
         folder = self.path / key
         with self._making:
             if not folder.is_dir():
                 partial = folder.with_suffix(".partial")
-                for name, (path, sha) in archives.items():
+                for number, (path, sha) in enumerate(archives):
                     if file_hash(path) != sha:
                         raise ModelError(
                             f"{path}: the file has changed since the model was loaded; load the model again"
                         )
-                    extract(path, partial / name)
+                    extract(path, partial / str(number))
                 partial.rename(folder)
         return folder
 

@@ -1,12 +1,9 @@
 """Several connected FMUs as one model: components, connections, order of stepping."""
 
-from falsifier.fmu.systems.network import (
+from falsifier.fmu.process import (
     SYSTEM,
-    Component,
-    Connection,
     Coupling,
     Extrapolation,
-    Frame,
     Isolation,
     Link,
     Loops,
@@ -15,6 +12,7 @@ from falsifier.fmu.systems.network import (
     Network,
     Place,
 )
+from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.step_order import late_links
 from falsifier.fmu.systems.system import System
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from falsifier.fmu.description import Structure
-from falsifier.fmu.systems.network import SYSTEM, Link, Member, Place
+from falsifier.fmu.process import SYSTEM, Link, Member, Place
 
 
 class Dependencies:

@@ -8,23 +8,23 @@ from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import instance, one_of, positive, whole
-from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
+from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.process import Isolated, Request, simulate
-from falsifier.fmu.systems.network import (
-    Component,
-    Connection,
+from falsifier.fmu.process import (
     Coupling,
     Extrapolation,
-    Frame,
+    Isolated,
     Isolation,
     Loops,
     Method,
     Network,
+    Order,
+    own_steps,
+    simulate,
 )
-from falsifier.fmu.systems.order import SystemOrder
+from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.wiring import make_network
 
 
@@ -113,8 +113,6 @@ class System(Isolated):
             SimulationError: if there is no complete trajectory; names the component that failed.
             SpecError: if a component's own step is not an integer multiple of the communication step.
         """
-        if experiment.outputs:
-            self.check_steps(experiment)
         values = dict(self.frame.values)
         texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))
         experiment = replace(experiment, strings=(*texts, *experiment.strings)) if texts else experiment
@@ -135,28 +133,11 @@ class System(Isolated):
         Raises:
             SpecError: naming the component and steps that fit.
         """
-        step = experiment.step_size or experiment.output_interval
-        for name, component in self.parts.items():
-            if component.step is None:
-                continue
-            key = f"components.{name}.step"
-            if component.step > experiment.stop_time * (1.0 + GRID_ROUNDING):
-                raise SpecError(
-                    f"{component.step:g} s is longer than the simulation, which stops at "
-                    f"{experiment.stop_time:g} s; the component would never step; shorten its step",
-                    key=key,
-                )
-            count = max(round(component.step / step), 1)
-            if abs(component.step / step - count) > GRID_ROUNDING * count:
-                raise SpecError(
-                    f"{component.step:g} s is not an integer multiple of the communication step {step:g} s; "
-                    f"set step_size = {component.step / (count + (component.step > count * step)):.12g}, or "
-                    "another step here",
-                    key=key,
-                )
+        for member in self.network.members:
+            own_steps(member, experiment.step_size or experiment.output_interval, experiment.stop_time)
 
     @property
-    def order(self) -> SystemOrder:
+    def order(self) -> Order:
         """What workers are asked to simulate."""
         return _order(self)
 
@@ -169,17 +150,12 @@ def _key(system: System) -> str:
 
 
 @lru_cache(maxsize=64)
-def _order(system: System) -> SystemOrder:
-    network = system.network
-    return SystemOrder(
-        description=network.description,
-        shown=network.name,
+def _order(system: System) -> Order:
+    return Order(
+        network=system.network,
         key=(system.key, system.logging, system.rights),
-        archives={str(k): (m.path, m.sha256) for k, m in enumerate(network.members)},
-        kind=Request.LOAD_SYSTEM,
         logging=system.logging,
         rights=system.rights,
-        network=network,
     )
 
 

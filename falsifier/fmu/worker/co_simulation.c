@@ -81,21 +81,6 @@ static struct outcome advance_3(struct fmu *fmu, double start, double end, int *
     }
 }
 
-/* Set the inputs at a communication point. */
-static struct outcome set_inputs(struct fmu *fmu, struct plan *plan, double time, int is_initialised)
-{
-    if (plan->inputs.ports.count) {
-        put_inputs(&plan->inputs, time);
-        unsigned status = exchange_values(fmu, &plan->inputs.ports);
-        if (status > 1)
-            return (struct outcome){status, SETTING};
-    }
-    /* Initialisation has already set the values at time 0. */
-    if (plan->held.ports.count && put_inputs(&plan->held, time) && is_initialised)
-        return change_at_event(fmu, &plan->held.ports);
-    return done;
-}
-
 /* Do one communication step; ends says whether the FMU ends the simulation. */
 struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
 {
@@ -127,48 +112,4 @@ struct outcome begin_steps(struct fmu *fmu)
         return o;
     unsigned status = fmu->step.enter_step_mode(fmu->instance);
     return (struct outcome){status, status > 1 ? EVENT : DONE};
-}
-
-static struct outcome begin(struct fmu *fmu, struct plan *plan)
-{
-    struct outcome o = begin_steps(fmu);
-    if (o.where != DONE)
-        return o;
-    unsigned status = read_row(fmu, plan, 0);
-    return (struct outcome){status, status > 1 ? GETTING : DONE};
-}
-
-/* Do all communication steps.
- *
- * The step sizes are differences of the communication points. The FMU adds them to its time again, which is
- * exact for these; with k * size + size it would pass the stop time by a rounding error, and some refuse. */
-struct outcome co_simulate(struct fmu *fmu, struct plan *plan, struct progress *progress)
-{
-    size_t steps = (plan->samples - 1) * plan->every;
-    double size = plan->stop_time / (double)steps;
-    find_step_functions(fmu);
-    struct outcome o = begin(fmu, plan);
-    for (size_t k = 0; k < steps && o.where == DONE;) {
-        double start = (double)k * size;
-        double end = k + 1 == steps ? plan->stop_time : fmin((double)(k + 1) * size, plan->stop_time);
-        int ends = 0;
-        o = set_inputs(fmu, plan, start, k > 0);
-        if (o.where == DONE)
-            o = do_step(fmu, start, end, &ends);
-        if (o.where != DONE)
-            break;
-        int late = is_late(progress, (double)++k * size);
-        if (k % plan->every == 0) {
-            unsigned status = read_row(fmu, plan, k / plan->every);
-            if (status > 1)
-                return (struct outcome){status, GETTING};
-        }
-        if (k == steps)
-            break;
-        if (ends)
-            return (struct outcome){0, TERMINATED};
-        if (late)
-            return (struct outcome){0, TIMEOUT};
-    }
-    return o;
 }

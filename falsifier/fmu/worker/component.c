@@ -67,10 +67,11 @@ static struct outcome set_first(struct component *c)
 
 static struct outcome leave(struct component *c)
 {
-    struct outcome o = leave_initialisation(&c->fmu);
+    struct event_info_1 first_events = {0};
+    struct outcome o = leave_initialisation(&c->fmu, &c->plan, &first_events);
     if (o.where != DONE)
         return o;
-    return c->fmu.is_model_exchange ? begin_solving(&c->fmu, NULL) : begin_steps(&c->fmu);
+    return c->fmu.is_model_exchange ? begin_solving(&c->fmu, &first_events) : begin_steps(&c->fmu);
 }
 
 /* Give a component its inputs and do its step. */
@@ -79,7 +80,7 @@ static struct outcome step(struct component *c)
     struct exchange *x = c->exchange;
     x->ends = 0;
     if (c->fmu.is_model_exchange)
-        return solve_step(&c->fmu, x->start, x->end, x->jumps, &x->ends);
+        return solve_step(&c->fmu, x->start, x->end, x->jumps, c->system->progress, &x->ends);
     const struct ports *plain = &c->plan.inputs.ports, *held = &c->plan.held.ports;
     struct outcome o = checked(write_row(&c->fmu, plain, c->in), SETTING);
     if (o.where == DONE && x->jumps) {

@@ -64,25 +64,15 @@ static struct outcome set_parameters(struct fmu *fmu, const struct plan *plan)
     return (struct outcome){status, status > 1 ? WRITING : DONE};
 }
 
-static struct outcome set_inputs(struct fmu *fmu, struct plan *plan)
-{
-    struct inputs *both[] = {&plan->inputs, &plan->held};
-    for (int k = 0; k < 2; k++) {
-        for (size_t j = 0; j < both[k]->ports.count; j++)
-            put(&both[k]->ports.places[j], both[k]->rows[j][0].c[0]);
-        unsigned status = exchange_values(fmu, &both[k]->ports);
-        failing = "inputs";
-        if (status > 1)
-            return (struct outcome){status, WRITING};
-    }
-    return done;
-}
-
-/* Set the parameters and enter initialisation mode (FMI 2 and 3). */
+/* Set the parameters and enter initialisation mode, which FMI 1 does not have. */
 struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan)
 {
-    struct outcome o = set_parameters(fmu, plan);
-    if (o.where != DONE)
+    struct outcome o = done;
+    if (fmu->major == 1 && fmu->is_model_exchange)
+        o = called("SetTime", ((time_1)fmu_required(fmu, "SetTime"))(fmu->instance, 0.0));
+    if (o.where == DONE)
+        o = set_parameters(fmu, plan);
+    if (o.where != DONE || fmu->major == 1)
         return o;
     if (fmu->major == 3) {
         enter_3 f = (enter_3)fmu_required(fmu, "EnterInitializationMode");
@@ -95,40 +85,17 @@ struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan)
     return o.where == DONE ? call(fmu, "EnterInitializationMode") : o;
 }
 
-struct outcome leave_initialisation(struct fmu *fmu)
+/* End the initialisation after the inputs were set; FMI 1 initialises here. Its model exchange fills first_events. */
+struct outcome leave_initialisation(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events)
 {
-    return call(fmu, "ExitInitializationMode");
-}
-
-static struct outcome initialise_first_version(
-    struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events)
-{
-    struct outcome o = done;
-    if (fmu->is_model_exchange)
-        o = called("SetTime", ((time_1)fmu_required(fmu, "SetTime"))(fmu->instance, 0.0));
-    if (o.where == DONE)
-        o = set_parameters(fmu, plan);
-    if (o.where == DONE)
-        o = set_inputs(fmu, plan);
-    if (o.where != DONE)
-        return o;
+    if (fmu->major > 1)
+        return call(fmu, "ExitInitializationMode");
     if (!fmu->is_model_exchange) {
         initialise_slave_1 f = (initialise_slave_1)fmu_required(fmu, "InitializeSlave");
         return called("InitializeSlave", f(fmu->instance, 0.0, 1, plan->stop_time));
     }
     initialise_1 f = (initialise_1)fmu_required(fmu, "Initialize");
     return called("Initialize", f(fmu->instance, (char)plan->has_tolerance, plan->tolerance, first_events));
-}
-
-/* Initialise a new or reset instance; first_events is filled by FMI 1 model exchange. */
-struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events)
-{
-    if (fmu->major == 1)
-        return initialise_first_version(fmu, plan, first_events);
-    struct outcome o = enter_initialisation(fmu, plan);
-    if (o.where == DONE)
-        o = set_inputs(fmu, plan);
-    return o.where == DONE ? leave_initialisation(fmu) : o;
 }
 
 /* End the simulation; a bad status is ignored, because the trajectory is complete. */

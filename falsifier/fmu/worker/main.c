@@ -16,7 +16,7 @@
 #include "platform.h"
 #include "session.h"
 
-enum kind { CONNECT, LOAD, PREPARE, SIMULATE, LOAD_SYSTEM };
+enum kind { CONNECT, LOAD, PREPARE, SIMULATE };
 
 #define MESSAGE_BYTES 4096
 #define CUT_OFF 74 /* exit code: nobody can be replied to */
@@ -25,8 +25,6 @@ enum kind { CONNECT, LOAD, PREPARE, SIMULATE, LOAD_SYSTEM };
 #define LEAVING 2u /* the process ends after this reply */
 /* Waking up a process takes about 40 microseconds, which is a lot compared with a simulation shorter than this. */
 #define QUICK_SECONDS 500e-6
-
-static struct subject subject;
 
 jmp_buf end_of_request;
 const char *failing = "";
@@ -107,14 +105,6 @@ static void connect(struct request *r)
         end_process(CUT_OFF);
 }
 
-static void load(struct request *r, void (*read_subject)(struct request *, struct subject *))
-{
-    enum reuse reuse = (enum reuse)read_size(r);
-    unsigned untrusted = (unsigned)read_size(r);
-    read_subject(r, &subject);
-    start_session(&subject, reuse, untrusted);
-}
-
 /* Returns whether the process goes on. */
 static int simulate(struct request *r)
 {
@@ -139,8 +129,7 @@ static int answer(enum kind kind, struct request *r)
     failing = "";
     switch (kind) {
     case CONNECT: connect(r); break;
-    case LOAD: load(r, read_one_fmu); break;
-    case LOAD_SYSTEM: load(r, read_one_system); break;
+    case LOAD: start_session(r); break;
     case PREPARE: prepare_session(*r); break;
     case SIMULATE: return simulate(r);
     default: give_up("request %d is unknown", (int)kind);

@@ -28,7 +28,6 @@ struct solver {
     double *weights; /* absolute tolerance of each state */
 
     double time, next_step, next_event;
-    size_t column; /* to record next */
     int implicit, stiff_hits, other_hits, events, jacobian_known;
 
     double *x, *new_x;          /* states, and those at the end of a trial step */

@@ -123,7 +123,7 @@ double *map_room(const char *place)
     if (last)
         UnmapViewOfFile(last);
     last = NULL;
-    if (!widen(place, path))
+    if (!*place || !widen(place, path))
         return NULL;
     HANDLE file = CreateFileW(path, GENERIC_READ | GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL,
                               OPEN_EXISTING, 0, NULL);

@@ -79,12 +79,6 @@ unsigned read_values(const struct fmu *fmu, const struct ports *ports, double *n
     return status;
 }
 
-/* Record all outputs. */
-unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column)
-{
-    return read_values(fmu, &plan->outputs, plan->recorded + column, plan->samples);
-}
-
 unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers)
 {
     for (size_t j = 0; j < ports->count; j++)
@@ -114,21 +108,4 @@ double piece_at(const struct piece *p, double time)
 double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
 {
     return piece_at(&inputs->rows[j][piece], time);
-}
-
-/* Write the values of all inputs at a time to their buffers. */
-int put_inputs(struct inputs *inputs, double time)
-{
-    int changed = 0;
-    for (size_t j = 0; j < inputs->ports.count; j++) {
-        size_t piece = inputs->current[j];
-        while (start_of(inputs, j, piece + 1) <= time + rounding(time))
-            piece++;
-        inputs->current[j] = piece;
-        double value = value_at(inputs, j, piece, time);
-        changed = changed || value != inputs->values[j];
-        inputs->values[j] = value;
-        put(&inputs->ports.places[j], value);
-    }
-    return changed;
 }

@@ -97,7 +97,6 @@ void read_inputs(struct request *r, const struct fmu *fmu, size_t pieces, struct
     inputs->pieces = pieces;
     inputs->rows = need(inputs->ports.count, sizeof *inputs->rows);
     inputs->current = need(inputs->ports.count, sizeof *inputs->current);
-    inputs->values = need(inputs->ports.count, sizeof *inputs->values);
     inputs->fixed_count = read_size(r);
     inputs->fixed = need(inputs->fixed_count, sizeof *inputs->fixed);
     inputs->fixed_rows = need(inputs->fixed_count, sizeof *inputs->fixed_rows);
@@ -105,15 +104,6 @@ void read_inputs(struct request *r, const struct fmu *fmu, size_t pieces, struct
         read_place(r, &inputs->ports, &inputs->fixed[k]);
         inputs->fixed_rows[k] = read_size(r);
     }
-}
-
-/* Inputs that follow signals: rows of the table of pieces. */
-static void read_driven(
-    struct request *r, const struct fmu *fmu, size_t pieces, const double *table, struct inputs *inputs)
-{
-    read_inputs(r, fmu, pieces, inputs);
-    for (size_t j = 0; j < inputs->ports.count; j++)
-        inputs->rows[j] = (const struct piece *)(table + read_size(r) * 5 * pieces);
 }
 
 void read_strings(struct request *r, struct plan *plan)
@@ -124,38 +114,4 @@ void read_strings(struct request *r, struct plan *plan)
         plan->strings[k].reference = (uint32_t)read_size(r);
         plan->strings[k].text = read_text(r);
     }
-}
-
-/* Map the memory of simulations; it begins with a header. */
-double *read_room(struct request *r)
-{
-    const char *place = read_text(r);
-    double *room = map_room(place);
-    if (!room)
-        give_up("the memory of a simulation cannot be mapped%s%s", *place ? ": " : "", place);
-    return room;
-}
-
-/* Read a plan; its shared memory is laid out as Room is: header, parameters, inputs, outputs. */
-void read_plan(struct request *r, const struct fmu *fmu, struct plan *plan)
-{
-    memset(plan, 0, sizeof *plan);
-    plan->header = read_room(r);
-    double *room = plan->header + HEADER;
-    plan->samples = read_size(r);
-    plan->every = read_size(r);
-    size_t pieces = read_size(r);
-    size_t parameters = read_size(r), inputs = read_size(r);
-    plan->has_tolerance = (int)read_size(r);
-    plan->stop_time = read_number(r);
-    plan->max_step = read_number(r);
-    plan->tolerance = read_number(r);
-    plan->solver_tolerance = read_number(r);
-    read_strings(r, plan);
-    plan->parameter_values = room;
-    plan->recorded = room + parameters + inputs * 5 * pieces;
-    read_ports(r, fmu, "Set", &plan->parameters);
-    read_driven(r, fmu, pieces, room + parameters, &plan->inputs);
-    read_driven(r, fmu, pieces, room + parameters, &plan->held);
-    read_ports(r, fmu, "Get", &plan->outputs);
 }

@@ -9,6 +9,7 @@
 
 #include "platform.h"
 #include "session.h"
+#include "system.h"
 
 /* Simulations longer than this are not repeated to find out whether a reset reproduces the results. */
 #define MOST_TEST_SECONDS 1.0
@@ -19,7 +20,7 @@
 
 static const char *const WAYS[] = {"reset", "state", "instance", "library", "process"};
 
-static struct subject *subject;
+static struct system fmus;
 static struct request plan; /* as it was received: read again after the library was loaded again */
 static enum { NEW, BROKEN, FINISHED } condition;
 static enum reuse reuse;
@@ -28,22 +29,51 @@ static int is_taken, instances, is_known;
 static size_t first_size;
 static double *trial; /* outputs of a test */
 
-void start_session(struct subject *made, enum reuse how, unsigned not_to_try)
+/* Processes for the components are started before any library is loaded. */
+static const char *load(void)
 {
-    subject = made;
+    for (size_t k = 0; k < fmus.count && fmus.is_separate; k++)
+        start_process(&fmus.components[k]);
+    return ask_each(&fmus, LOAD_LIBRARY).where == DONE ? NULL : failing;
+}
+
+static void unload(void)
+{
+    ask_each(&fmus, UNLOAD);
+    for (size_t k = 0; k < fmus.count; k++)
+        if (fmus.components[k].process)
+            end_process_of(&fmus.components[k]);
+}
+
+void start_session(struct request *request)
+{
+    enum reuse how = (enum reuse)read_size(request);
     is_known = how != UNKNOWN;
     reuse = is_known ? how : BY_INSTANCE;
-    untrusted = not_to_try;
-    const char *wrong = made->load(made->self);
+    untrusted = (unsigned)read_size(request);
+    /* Which component is loaded is told there, if it can be mapped before the plan is known. */
+    fmus.header = map_room("");
+    read_components(request, &fmus);
+    const char *wrong = load();
     if (wrong)
         give_up("%s", wrong);
 }
 
+/* The memory of simulations begins with a header; then it is laid out as Room is: parameters, inputs, outputs. */
 static void prepare(void)
 {
-    subject->prepare(subject->self, plan);
+    struct request request = plan;
+    const char *place = read_text(&request);
+    fmus.header = map_room(place);
+    if (!fmus.header)
+        give_up("the memory of a simulation cannot be mapped%s%s", *place ? ": " : "", place);
+    for (size_t k = 0; k < fmus.count; k++)
+        if (fmus.components[k].process)
+            send_plan(&fmus.components[k], &request);
+    read_system_plan(&request, &fmus, fmus.header + HEADER);
+    ask_each(&fmus, TAKE_PLAN);
     if (trial)
-        *subject->recorded = trial;
+        fmus.recorded = trial;
 }
 
 void prepare_session(struct request request)
@@ -54,7 +84,7 @@ void prepare_session(struct request request)
 
 static void forget_saved(void)
 {
-    subject->forget_state(subject->self);
+    ask_each(&fmus, FORGET_STATES);
     is_taken = 0;
 }
 
@@ -65,12 +95,12 @@ static const char *renew(void)
     forget_saved();
     condition = BROKEN;
     if (reuse == BY_LIBRARY) {
-        subject->unload(subject->self);
-        wrong = subject->load(subject->self);
+        unload();
+        wrong = load();
         if (!wrong)
             prepare();
     } else {
-        wrong = subject->renew(subject->self);
+        wrong = ask_each(&fmus, NEW_INSTANCE).where == DONE ? NULL : failing;
     }
     if (!wrong)
         condition = NEW;
@@ -82,9 +112,9 @@ static int is_brought_back(void)
 {
     if (condition != FINISHED)
         return 0;
-    if (reuse == BY_RESET && subject->reset(subject->self))
+    if (reuse == BY_RESET && all_accept(&fmus, RESET_INSTANCE))
         return 1;
-    if (reuse == BY_STATE && is_taken && subject->restore_state(subject->self))
+    if (reuse == BY_STATE && is_taken && all_accept(&fmus, RESTORE_STATE))
         return 1;
     if (reuse == BY_RESET || (reuse == BY_STATE && is_taken))
         reuse = BY_INSTANCE;
@@ -93,25 +123,28 @@ static int is_brought_back(void)
 
 static struct outcome run(double limit, unsigned shares, double *reached)
 {
-    struct progress progress = {subject->header, limit, now() + limit, INFINITY, INFINITY, 0};
-    subject->header[SIMULATED] = 0.0;
+    struct progress progress = {fmus.header, limit, now() + limit, INFINITY, INFINITY, 0};
+    fmus.header[SIMULATED] = 0.0;
     if (shares)
-        progress.next = progress.share = subject->stop_time / shares;
+        progress.next = progress.share = fmus.stop_time / shares;
     *reached = 0.0;
     if (condition != NEW && !is_brought_back()) {
         failing = renew();
         if (failing)
             return (struct outcome){0, CANNOT_RENEW};
+        progress.header = fmus.header; /* it may have been mapped again */
     }
     if (condition == NEW && reuse == BY_STATE && !is_taken) {
-        is_taken = subject->take_state(subject->self);
-        if (!is_taken)
+        is_taken = all_accept(&fmus, TAKE_STATE);
+        if (!is_taken) {
+            forget_saved();
             reuse = BY_INSTANCE;
+        }
     }
     /* Stays so if anything below fails: such an instance cannot be reset reliably. */
     condition = BROKEN;
     failing = "";
-    struct outcome o = subject->simulate(subject->self, &progress);
+    struct outcome o = simulate_system(&fmus, &progress);
     *reached = progress.header[SIMULATED];
     if (o.where == DONE)
         condition = FINISHED;
@@ -145,7 +178,7 @@ static int succeeds(void)
 /* Whether a simulation that starts in this way gives the same outputs again. */
 static int gives_again(enum reuse way, const double *expected)
 {
-    size_t count = subject->recorded_count;
+    size_t count = fmus.recorded_count;
     reuse = way;
     /* The first of these saves the state from which the next ones start; the last shows that it can be restored
      * repeatedly. */
@@ -168,16 +201,16 @@ static int gives_again(enum reuse way, const double *expected)
  * The parent reads these meanwhile, so the tests write elsewhere. Each is announced before, since it may crash. */
 void find_reuse(void (*announce)(const char *way))
 {
-    double *outputs = *subject->recorded;
-    size_t count = subject->recorded_count;
+    double *outputs = fmus.recorded;
+    size_t count = fmus.recorded_count;
     double *expected = need(count, sizeof *expected);
     enum reuse found = BY_PROCESS;
     is_known = 1;
     trial = need(count, sizeof *trial);
     memcpy(expected, outputs, count * sizeof *expected);
-    *subject->recorded = trial;
+    fmus.recorded = trial;
     for (int way = BY_RESET; way < BY_PROCESS && found == BY_PROCESS; way++) {
-        if (untrusted & 1u << way || (way == BY_STATE && !subject->saves_state))
+        if (untrusted & 1u << way || (way == BY_STATE && !fmus.saves_state))
             continue;
         announce(WAYS[way]);
         if (gives_again(way, expected))
@@ -186,7 +219,7 @@ void find_reuse(void (*announce)(const char *way))
     free(trial);
     free(expected);
     trial = NULL;
-    *subject->recorded = outputs;
+    fmus.recorded = outputs;
     reuse = found;
 }
 
@@ -201,8 +234,8 @@ int is_spent(void)
     if (instances >= MOST_INSTANCES || reuse == BY_PROCESS)
         return 1;
     size_t size = most_memory_used();
-    if (subject->memory_elsewhere)
-        size += subject->memory_elsewhere(subject->self);
+    for (size_t k = 0; k < fmus.count; k++)
+        size += fmus.components[k].exchange->memory;
     if (!first_size)
         first_size = size;
     return first_size && size > first_size + MOST_GROWTH_KIB;

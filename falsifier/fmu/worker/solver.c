@@ -1,6 +1,6 @@
 /* Model exchange: the solver.
  *
- * Inputs are applied at every stage of every step. Steps end at output points, control points of the inputs and
+ * Inputs are applied at every stage of every step. Steps end at communication points, control points of the inputs and
  * time events. State events are located on the dense output, and the step is repeated up to the event; the state
  * at the event is then the result of a step and not interpolated. If stability rather than accuracy limits
  * explicit steps, the rest of the simulation uses implicit ones. */
@@ -79,7 +79,6 @@ static struct outcome start(struct solver *s)
     s->time = 0.0;
     s->next_step = s->plan->max_step;
     s->next_event = INFINITY;
-    s->column = 1;
     s->implicit = s->stiff_hits = s->other_hits = s->events = s->jacobian_known = 0;
     for (size_t i = 0; i < s->n; i++) {
         s->x[i] = s->new_x[i] = 0.0;
@@ -312,38 +311,20 @@ static struct outcome proceed(struct solver *s, double limit)
     return is_event ? pass_event(s) : done;
 }
 
-/* Proceed towards the next point of the output grid and record the outputs there. */
-static struct outcome advance(struct solver *s)
-{
-    struct plan *plan = s->plan;
-    double grid_time = plan->stop_time * (double)s->column / (double)(plan->samples - 1);
-    struct outcome o = proceed(s, grid_time);
-    if (o.where != DONE) {
-        /* A model that terminates at the stop time has finished: only the last sample is left. */
-        int is_last = s->column == plan->samples - 1 && plan->stop_time - s->time <= rounding(s->time);
-        if (o.where != TERMINATED || !is_last)
-            return o;
-        s->next_event = INFINITY;
-    }
-    if (grid_time <= s->time + rounding(s->time)) {
-        unsigned status = read_row(s->fmu, plan, s->column);
-        if (status > 1)
-            return (struct outcome){status, GETTING};
-        s->column++;
-        s->events = 0;
-    }
-    return done;
-}
-
-/* Integrate a component of a system over a step of its own, perhaps after an event at its start. */
-struct outcome solve_step(struct fmu *fmu, double start, double end, int has_event, int *ends)
+/* Integrate over a communication step, perhaps after an event at its start. Where the progress is known, it is told
+ * after each step of the solver, which may do many. */
+struct outcome solve_step(
+    struct fmu *fmu, double start, double end, int has_event, struct progress *progress, int *ends)
 {
     struct solver *s = fmu->solver;
     s->time = start;
     s->events = 0;
     struct outcome o = has_event ? pass_event(s) : done;
-    while (o.where == DONE && end - s->time > rounding(end))
+    while (o.where == DONE && end - s->time > rounding(end)) {
         o = proceed(s, end);
+        if (progress && is_late(progress, s->time) && o.where == DONE)
+            o = (struct outcome){0, TIMEOUT};
+    }
     *ends = o.where == TERMINATED;
     if (*ends && end - s->time <= rounding(end))
         o.where = DONE;
@@ -384,19 +365,4 @@ void bring_back_solver(struct fmu *fmu, void *kept)
     *s = *(const struct solver *)kept;
     move(s, (char *)kept + sizeof *s, 0);
     s->jacobian_known = 0;
-}
-
-/* Solve the differential equation up to the stop time. */
-struct outcome solve(struct fmu *fmu, const struct event_info_1 *first_events, struct progress *progress)
-{
-    struct solver *s = fmu->solver;
-    struct outcome o = begin_solving(fmu, first_events);
-    if (o.where == DONE)
-        o = checked(read_row(fmu, s->plan, 0));
-    while (o.where == DONE && s->column < s->plan->samples) {
-        o = advance(s);
-        if (is_late(progress, s->time) && o.where == DONE && s->column < s->plan->samples)
-            o = (struct outcome){0, TIMEOUT};
-    }
-    return o;
 }

@@ -1,4 +1,4 @@
-/* A system: connected FMUs that are simulated together. */
+/* A system: connected FMUs that are simulated together, or a single FMU. */
 
 #ifndef SYSTEM_H
 #define SYSTEM_H
@@ -69,7 +69,7 @@ struct system {
     struct copy *copies;
     int saves_state; /* all components declare it */
     int is_separate; /* each component has a process of its own */
-    int is_jacobi, is_solved;
+    int is_jacobi;
     size_t max_rounds;
     double tolerance; /* change, relative above 1, below which a value has converged */
     double stop_time;
@@ -78,7 +78,8 @@ struct system {
     size_t recorded_count;
     double *header; /* of the room */
     const double *parameters;
-    double *recorded;
+    double *recorded; /* one row per output, one column per sample */
+    struct progress *progress; /* of the simulation under way; NULL in the process of a component */
 };
 
 /* system.c */

@@ -22,7 +22,6 @@ void read_components(struct request *r, struct system *s)
         c->system = s;
         c->exchange = need(1, sizeof *c->exchange);
         read_fmu(r, &c->fmu);
-        s->is_solved = s->is_solved || c->fmu.is_model_exchange;
         s->saves_state = s->saves_state && c->fmu.saves_state;
     }
 }

@@ -1,7 +1,7 @@
 /* What the parts of the worker share: the FMU, the plan of its simulations, and the outcome of each request.
  *
- * The worker is the process that an FMU runs in; see main.c. Whatever belongs to one FMU is in its struct fmu,
- * because a system has several in one process. */
+ * The worker is the process that an FMU runs in; see main.c. What it simulates is always a system (system.h), of one
+ * component if it is a single FMU. Whatever belongs to one FMU is in its struct fmu. */
 
 #ifndef WORKER_H
 #define WORKER_H
@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Where a simulation stopped. The first eight are those of loop_numbers.py, the others are in wine_instance.py. */
+/* Where a simulation stopped, as Where in connection.py. */
 enum where {
     DONE, SETTING, STEPPING, GETTING, EVENT, TERMINATED, STUCK, TOO_SMALL,
     /* of systems; the texts have positions of connected outputs, and their changes */
@@ -98,7 +98,6 @@ struct inputs {
     const struct piece **rows;
     size_t pieces;
     size_t *current; /* the piece that each one is in */
-    double *values;  /* written last */
 };
 
 struct string {
@@ -109,13 +108,11 @@ struct string {
 struct plan {
     double stop_time, max_step, tolerance, solver_tolerance;
     int has_tolerance;
-    size_t samples, every, strings_count;
+    size_t strings_count;
     struct string *strings;
     struct ports parameters, outputs;
     struct inputs inputs, held; /* held: may change only at events */
     const double *parameter_values;
-    double *recorded; /* one row per output, one column per sample */
-    double *header;   /* of the shared memory */
 };
 
 /* Numbers at the start of the shared memory: which component of a system runs, and the time that is simulated. */
@@ -146,19 +143,16 @@ void *fmu_required(const struct fmu *fmu, const char *name); /* ends the request
 /* ports.c */
 unsigned exchange_values(const struct fmu *fmu, const struct ports *ports);
 unsigned read_values(const struct fmu *fmu, const struct ports *ports, double *numbers, size_t stride);
-unsigned read_row(const struct fmu *fmu, const struct plan *plan, size_t column);
 unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers);
 void put(const struct place *place, double number);
 double rounding(double time);
 double start_of(const struct inputs *inputs, size_t j, size_t piece);
 double piece_at(const struct piece *piece, double time);
 double value_at(const struct inputs *inputs, size_t j, size_t piece, double time);
-int put_inputs(struct inputs *inputs, double time); /* returns whether any has changed */
 
 /* lifecycle.c */
-struct outcome initialise(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events);
 struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan);
-struct outcome leave_initialisation(struct fmu *fmu);
+struct outcome leave_initialisation(struct fmu *fmu, struct plan *plan, struct event_info_1 *first_events);
 void terminate(struct fmu *fmu);
 int reset(struct fmu *fmu);
 int find_saving(struct fmu *fmu); /* returns whether the library has all functions for states */
@@ -171,15 +165,14 @@ void find_step_functions(struct fmu *fmu);
 struct outcome begin_steps(struct fmu *fmu); /* after the initialisation */
 struct outcome change_at_event(struct fmu *fmu, const struct ports *ports);
 struct outcome do_step(struct fmu *fmu, double start, double end, int *ends);
-struct outcome co_simulate(struct fmu *fmu, struct plan *plan, struct progress *progress);
 
 /* solver.c */
 void prepare_solver(struct fmu *fmu, struct plan *plan);
 struct outcome begin_solving(struct fmu *fmu, const struct event_info_1 *first_events);
-struct outcome solve_step(struct fmu *fmu, double start, double end, int has_event, int *ends);
+struct outcome solve_step(
+    struct fmu *fmu, double start, double end, int has_event, struct progress *progress, int *ends);
 void *keep_solver(const struct fmu *fmu, void *kept); /* what changes in a step; new memory if kept is NULL */
 void bring_back_solver(struct fmu *fmu, void *kept);
-struct outcome solve(struct fmu *fmu, const struct event_info_1 *first_events, struct progress *progress);
 
 /* request.c */
 struct request {
@@ -187,8 +180,6 @@ struct request {
 };
 size_t read_size(struct request *request);
 void read_fmu(struct request *request, struct fmu *fmu);
-void read_plan(struct request *request, const struct fmu *fmu, struct plan *plan);
-double *read_room(struct request *request);
 char *read_text(struct request *request);
 double read_number(struct request *request);
 void read_strings(struct request *request, struct plan *plan);

@@ -13,7 +13,7 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.process import FmuOrder
+from falsifier.fmu.process import Order
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from falsifier.fmu.process.runner import Runner
 from tests import patience
@@ -183,7 +183,7 @@ except KeyboardInterrupt:
         assert process.stdout.read() == "interrupted 10.0\n"
 
 
-def orders(number: int) -> list[FmuOrder]:
+def orders(number: int) -> list[Order]:
     return [replace(isolated("Lag_2").order, key=k) for k in range(number)]
 
 

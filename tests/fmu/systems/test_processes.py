@@ -68,6 +68,7 @@ def test_a_component_that_crashes_or_hangs_is_named_and_the_next_simulation_work
         run(model, "plant.y", parameters={"bad.misdeed": HANG}, time_limit=0.5)
 
 
-def test_a_component_that_cannot_be_loaded_is_named() -> None:
-    with pytest.raises(ModelError, match="first"):
-        run(system({"first": "NeedsTool_2", "pi": "Gain_2"}, {}, EACH), "pi.y")
+@pytest.mark.parametrize("coupling", [Coupling(), EACH])
+def test_a_component_that_cannot_be_loaded_is_named(coupling: Coupling) -> None:
+    with pytest.raises(ModelError, match=r"^system: second: instantiating the FMU failed"):
+        run(system({"pi": "Gain_2", "second": "NeedsTool_2"}, {}, coupling), "pi.y")

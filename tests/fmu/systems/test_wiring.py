@@ -8,7 +8,7 @@ from falsifier.core.model import Experiment, Variable
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Connection, Coupling, Frame, System
 from falsifier.fmu.description import libraries
-from falsifier.fmu.process import Reply, Where
+from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 from tests.fmu.small_systems import LOOP, solved, system

@@ -1,21 +1,18 @@
-"""A system of FMUs as its workers get it, with the description of the whole: all variables, by component."""
+"""What users state of a system: components, connections, frame; and the description of the whole from it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from math import gcd, lcm
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from falsifier.core.arguments import one_of, positive
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu.description import Description, Slot, file_hash
+from falsifier.fmu.process import SYSTEM, Extrapolation, Link, Member, Place, full_name
 
-Method = Literal["gauss-seidel", "jacobi"]
-Loops = Literal["refuse", "delay", "iterate"]
-Extrapolation = Literal["hold", "linear"]
-Isolation = Literal["together", "each"]
 # Maximum number of connections in the description that people and language models read.
 _SHOWN_LINKS = 40
 # Largest denominator of steps like 1/30 s, which are written with many digits.
@@ -70,36 +67,6 @@ class Connection:
 
 
 @dataclass(frozen=True, slots=True)
-class Coupling:
-    """How the components of a system exchange values.
-
-    Attributes:
-        method: ``gauss-seidel``: components step one after the other, and later ones get the new values of
-            earlier ones; ``jacobi``: all step from the values of the same communication point.
-        loops: what to do if outputs and inputs depend on each other without a delay: ``refuse`` the system,
-            ``delay`` the connection that closes the loop by one communication step, or ``iterate``: repeat
-            the steps of the components in the loop until their outputs no longer change.
-        extrapolation: value of an input during a step: ``hold`` the last value, or follow the ``linear``
-            course through the last two, for continuous real inputs.
-        tolerance: change, relative for values above 1, below which an initialisation or iteration has
-            converged.
-        max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
-        isolation: ``together``: all components run in one process; ``each``: each in one of its own.
-    """
-
-    method: Method = "gauss-seidel"
-    loops: Loops = "refuse"
-    extrapolation: Extrapolation = "hold"
-    tolerance: float = 1e-9
-    max_rounds: int = 100
-    isolation: Isolation = "together"
-
-
-# Position of the system itself in a Place: an input of the whole, which feeds inputs of components.
-SYSTEM = -1
-
-
-@dataclass(frozen=True, slots=True)
 class Frame:
     """What a system has as a whole, beyond its components; SSP packages have it.
 
@@ -116,94 +83,6 @@ class Frame:
     values: tuple[tuple[str, float | str], ...] = ()
     stop_time: float | None = None
     notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """One component.
-
-    Attributes:
-        name: its name.
-        path: path of its FMU.
-        sha256: hash of the FMU.
-        description: description of the FMU, with the component's name in place of the model's.
-        step: step of its own in s; None for the communication step.
-        interface: interface to simulate with.
-    """
-
-    name: str
-    path: Path
-    sha256: str
-    description: Description
-    step: float | None
-    interface: Interface
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a variable of a system is: position of the component, or SYSTEM, and its name there."""
-
-    member: int
-    name: str
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """A connection between two scalars: ``target = factor * source + offset``.
-
-    Attributes:
-        source: an output, or an input of the system.
-        target: an input.
-        factor: factor of the conversion.
-        offset: offset of the conversion.
-        start: value of the input before the source is known.
-        is_linear: whether the input follows the course of the last two values.
-    """
-
-    source: Place
-    target: Place
-    factor: float
-    offset: float
-    start: float
-    is_linear: bool
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Network:
-    """A checked system.
-
-    Attributes:
-        name: its name.
-        members: the components.
-        links: the connections.
-        order: positions of the components in the order in which they step.
-        loops: first position in the order, and the one after the last, of components that iterate together.
-        coupling: how they exchange values.
-        description: variables of all components, as ``component.variable``.
-        places: where each of these variables is.
-    """
-
-    name: str
-    members: tuple[Member, ...]
-    links: tuple[Link, ...]
-    order: tuple[int, ...]
-    loops: tuple[tuple[int, int], ...]
-    coupling: Coupling
-    description: Description
-    places: Mapping[str, Place]
-
-    def stepped(self, position: int) -> str:
-        """Return the name of the component at a position of the order; empty if there is none."""
-        return self.members[self.order[position]].name if 0 <= position < len(self.order) else ""
-
-    def title(self, place: Place) -> str:
-        """Return the name of a variable in the system."""
-        return full_name(self.members, place)
-
-
-def full_name(members: Sequence[Member], place: Place) -> str:
-    """Return the name of a variable in a system of these components."""
-    return place.name if place.member == SYSTEM else f"{members[place.member].name}.{place.name}"
 
 
 def merged(
