@@ -9,7 +9,7 @@
 """
 
 from falsifier.campaigns.published import COLUMNS, Published, Score, read_published
-from falsifier.campaigns.runs import Run, columns, frame, load, load_run, run_of
+from falsifier.campaigns.runs import Run, columns, frame, load, load_run
 from falsifier.campaigns.statistics import Statistics, group, statistics
 from falsifier.campaigns.tables import Table, ablation_table, llms_table, main_table
 
@@ -29,6 +29,5 @@ __all__ = [
     "load_run",
     "main_table",
     "read_published",
-    "run_of",
     "statistics",
 ]

@@ -1,8 +1,8 @@
 """Progress of a campaign, read from its directory: the same for the process that runs it and for others."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from falsifier.campaigns.directory import (
@@ -14,40 +14,25 @@ from falsifier.campaigns.directory import (
 )
 from falsifier.campaigns.request import Method, method_of, method_of_run
 from falsifier.record import manifest
-from falsifier.record.journal import JournalReader
-from falsifier.record.summary import FINISHED, RunStatus, Summary
+from falsifier.record.summary import RunFollower, RunStatus, Summary
 from falsifier.search.budget import Spent
-from falsifier.search.request import RunRequest
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunProgress:
-    """Progress of one run.
+@dataclass(kw_only=True)
+class RunProgress(Summary):
+    """Progress of one requirement in one run, which need not have started.
 
     Attributes:
-        name: name of its directory.
+        name: name of the run's directory.
         requirement: name of the requirement.
         method: how it searches.
         seed: seed of its engine.
-        status: ``waiting``, ``running`` or how it ended.
-        reason: why it ended.
-        best: smallest robustness so far, or None.
-        spent: what it has spent so far.
     """
 
     name: str
     requirement: str
     method: Method
     seed: int
-    status: RunStatus
-    reason: str
-    best: float | None
-    spent: Spent
-
-    @property
-    def finished(self) -> bool:
-        """Whether nothing is left to do; failed and interrupted runs are continued when resuming."""
-        return self.status in FINISHED
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,50 +72,10 @@ class Progress:
         return {name: Progress(tuple(runs)) for name, runs in groups.items()}
 
     @property
-    def best(self) -> float | None:
+    def best_robustness(self) -> float | None:
         """Smallest robustness of any run."""
-        return min((run.best for run in self.runs if run.best is not None), default=None)
-
-
-@dataclass(slots=True)
-class _Followed:
-    """One requirement in a run's journal, and the numbers read from it so far; None: the run has only one."""
-
-    name: str
-    request: RunRequest
-    directory: Path
-    method: Method
-    requirement: str | None = None
-    summary: Summary = field(init=False)
-    reader: JournalReader = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.begin()
-
-    def begin(self) -> None:
-        self.summary = Summary(self.requirement)
-        self.reader = JournalReader(self.directory, with_candidates=False)
-
-    def read(self) -> None:
-        if self.reader.shrank:  # an incomplete line was dropped, or the directory was replaced
-            self.begin()
-        for record in self.reader.new():
-            self.summary.add(record)
-        if self.reader.begun:
-            self.summary.begin()
-
-    def progress(self) -> RunProgress:
-        summary = self.summary
-        return RunProgress(
-            name=self.name,
-            requirement=self.requirement or self.request.problems[0].name,
-            method=self.method,
-            seed=self.request.seed,
-            status=summary.status,
-            reason=summary.reason,
-            best=summary.best_robustness,
-            spent=summary.spent,
-        )
+        found = [run.best_robustness for run in self.runs if run.best_robustness is not None]
+        return min(found, default=None)
 
 
 class Follower:
@@ -143,19 +88,8 @@ class Follower:
     """
 
     def __init__(self, directory: Path) -> None:
-        if is_campaign(directory):
-            runs = read_campaign(directory).runs
-            self._places = [directory]
-            self._runs = [_Followed(n, r, run_directory(directory, n), method_of(r)) for n, r in runs.items()]
-            return
-        self._places = run_directories(directory)
-        self._runs = []
-        for place in self._places:
-            described = manifest.read(place)
-            method = method_of_run(described)
-            self._runs += [
-                _Followed(str(place), described.request, place, method, n) for n in described.names
-            ]
+        self._places = [directory] if is_campaign(directory) else run_directories(directory)
+        self._runs = list(_followed(directory))
 
     @property
     def is_worked_on(self) -> bool:
@@ -163,10 +97,35 @@ class Follower:
         return any(map(is_worked_on, self._places))
 
     def look(self) -> Progress:
-        """Read what is new, and return the current progress."""
-        for run in self._runs:
-            run.read()
-        return Progress(tuple(run.progress() for run in self._runs))
+        """Read what is new, and return the current progress, whose runs change with the next look."""
+        return Progress(tuple(run for follower in self._runs for run in follower.look()))
+
+
+def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
+    """Yield a follower for each run of a campaign, or for each run directory."""
+    if is_campaign(directory):
+        for name, request in read_campaign(directory).runs.items():
+            run = RunProgress(
+                name=name,
+                requirement=request.problems[0].name,
+                method=method_of(request),
+                seed=request.seed,
+            )
+            yield RunFollower(run_directory(directory, name), [run])
+        return
+    for place in run_directories(directory):
+        described = manifest.read(place)
+        runs = [
+            RunProgress(
+                name=str(place),
+                requirement=name,
+                recorded_as=name,
+                method=method_of_run(described),
+                seed=described.request.seed,
+            )
+            for name in described.names
+        ]
+        yield RunFollower(place, runs)
 
 
 def total(spent: Iterable[Spent]) -> Spent:

@@ -26,7 +26,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import STOP, holds_run, open_journal
 from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, write
 from falsifier.record.records import EndedRecord
-from falsifier.record.summary import read_summary
+from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import check_names, told_problems
 from falsifier.search.request import RunRequest
@@ -238,7 +238,7 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
 
 def _record_failure(directory: Path, request: RunRequest, reason: str) -> None:
     """Record in a run's journal why it failed, if its worker could not do so."""
-    summary = read_summary(directory)
+    (summary,) = RunFollower(directory, [Summary()]).look()
     if summary.status not in ("waiting", "running"):
         return
     with open_journal(directory, keep=request.keep, patience=_PATIENCE) as journal:

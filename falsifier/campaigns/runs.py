@@ -4,12 +4,9 @@ A search shared by several requirements appears as one run per requirement.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.request import Method, method_of_run
@@ -19,55 +16,28 @@ from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
-from falsifier.record.summary import RunStatus, Summary, read_summary
-from falsifier.search.budget import Spent
-from falsifier.search.findings import Failure, Finding
+from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.result import Columns, evaluation_columns
 from falsifier.search.result import frame as as_frame
-from falsifier.stl.monitor import Verdict
 
 if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Run:
-    """One run, read from its directory.
+@dataclass(eq=False, kw_only=True)
+class Run(Summary):
+    """One requirement in one run, read from its directory: its numbers, and what was requested.
 
     Attributes:
         directory: run directory.
         manifest: its manifest, reduced to this requirement.
-        shared: whether several requirements shared this search.
         method: how it searched.
-        status: how it ended, or ``running``.
-        reason: why it ended.
-        robustness: robustness of each evaluation in order, shape (n,); NaN without a verdict.
-        best: index of the evaluation with the smallest robustness, or None.
-        verdict: verdict of the counterexample, otherwise of the best evaluation, or None.
-        counterexample: index of the confirmed violation, or None.
-        unconfirmed: outcome and reason of violations that were not confirmed, by index.
-        trajectories: names of kept trajectory files, by index.
-        spent: what it has spent.
-        findings: what the search could not show; empty before it has ended.
-        failures: why simulations failed, by cause.
         requirement: name of the requirement; numbered if another run has another formula of the same name.
     """
 
     directory: Path
     manifest: Manifest
-    shared: bool
     method: Method
-    status: RunStatus
-    reason: str
-    robustness: NDArray[np.float64]
-    best: int | None
-    verdict: Verdict | None
-    counterexample: int | None
-    unconfirmed: dict[int, str]
-    trajectories: dict[int, str]
-    spent: Spent
-    findings: tuple[Finding, ...] = ()
-    failures: tuple[Failure, ...] = ()
     requirement: str
 
     @property
@@ -75,6 +45,11 @@ class Run:
         """Whether the requirement is a formula to which nobody gave a name."""
         source = self.manifest.request.source
         return source is not None and source.stl is not None and source.stl_name == STL_NAME
+
+    @property
+    def shared(self) -> bool:
+        """Whether several requirements shared this search."""
+        return self.method.together
 
     @property
     def counterexample_file(self) -> Path:
@@ -85,16 +60,6 @@ class Run:
     def seed(self) -> int:
         """Seed of the engine."""
         return self.manifest.request.seed
-
-    @property
-    def falsified(self) -> bool:
-        """Whether a confirmed counterexample was found."""
-        return self.status == "falsified"
-
-    @property
-    def finished(self) -> bool:
-        """Whether it ended with a result: falsified, or budget used up."""
-        return self.status in ("falsified", "not falsified")
 
     @property
     def simulations(self) -> int:
@@ -128,10 +93,16 @@ def load(directory: Path) -> list[Run]:
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.
     """
-    described = ((path, manifests.read(path)) for path in run_directories(directory))
-    return _told_apart(
-        [_run(path, manifest, name) for path, manifest in described for name in manifest.names]
-    )
+    places = run_directories(directory)
+    runs = [run for place in places for run in RunFollower(place, unread_runs(place)).look()]
+    formulas: dict[str, list[str]] = {}
+    for run in runs:
+        known = formulas.setdefault(run.requirement, [])
+        known += [run.manifest.requirement.formula] if run.manifest.requirement.formula not in known else []
+    for run in runs:  # runs of --stl all have the same name
+        if len(known := formulas[run.requirement]) > 1:
+            run.requirement += f"-{known.index(run.manifest.requirement.formula) + 1}"
+    return runs
 
 
 def load_run(directory: Path, requirement: str | None = None) -> Run:
@@ -148,56 +119,24 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
     if requirement is None and manifest.shared:
         names = ", ".join(manifest.names)
         raise JournalError(f"{directory}: several requirements share this run; choose one of {names}")
-    return _run(directory, manifest, requirement or manifest.names[0])
+    name = manifest.of(requirement or manifest.names[0]).requirement.name  # which refuses an unknown one
+    (run,) = (run for run in RunFollower(directory, unread_runs(directory)).look() if run.requirement == name)
+    return run
 
 
-def _told_apart(runs: list[Run]) -> list[Run]:
-    """Number the names that stand for several formulas: runs of ``--stl`` all have the same name."""
-    formulas: dict[str, list[str]] = {}
-    for run in runs:
-        known = formulas.setdefault(run.requirement, [])
-        known += [run.manifest.requirement.formula] if run.manifest.requirement.formula not in known else []
+def unread_runs(directory: Path) -> list[Run]:
+    """Return the runs of a directory, one per requirement, before their journal is read."""
+    manifest = manifests.read(directory)
     return [
-        replace(run, requirement=f"{run.requirement}-{known.index(run.manifest.requirement.formula) + 1}")
-        if len(known := formulas[run.requirement]) > 1
-        else run
-        for run in runs
+        Run(
+            directory=directory,
+            manifest=manifest.of(name),
+            method=method_of_run(manifest),
+            requirement=name,
+            recorded_as=name,
+        )
+        for name in manifest.names
     ]
-
-
-def _run(directory: Path, manifest: Manifest, requirement: str) -> Run:
-    described = manifest.of(requirement)  # which refuses a requirement that the run does not have
-    return run_of(directory, described, read_summary(directory, requirement), shared=manifest.shared)
-
-
-def run_of(directory: Path, manifest: Manifest, summary: Summary, *, shared: bool) -> Run:
-    """Return a run whose journal has been read.
-
-    Args:
-        directory: run directory.
-        manifest: its manifest, reduced to one requirement.
-        summary: numbers of that requirement in its journal.
-        shared: whether several requirements share the search.
-    """
-    method = replace(method_of_run(manifest), together=shared)
-    return Run(
-        directory=directory,
-        manifest=manifest,
-        shared=shared,
-        method=method,
-        status=summary.status,
-        reason=summary.reason,
-        robustness=summary.robustness,
-        best=summary.best,
-        verdict=summary.verdict,
-        counterexample=summary.counterexample,
-        unconfirmed=summary.unconfirmed,
-        trajectories=summary.trajectories,
-        spent=summary.spent,
-        findings=summary.findings,
-        failures=summary.failures,
-        requirement=manifest.requirement.name,
-    )
 
 
 def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:

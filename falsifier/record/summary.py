@@ -1,8 +1,10 @@
 """A run's journal in numbers, updated record by record as it grows."""
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,6 @@ from numpy.typing import NDArray
 from falsifier.llm.messages import Exchange
 from falsifier.record.journal import JournalReader
 from falsifier.record.records import (
-    AskedRecord,
     ConfirmedRecord,
     EndedRecord,
     EvaluatedRecord,
@@ -24,18 +25,16 @@ from falsifier.search.result import ResultStatus
 from falsifier.stl.monitor import Verdict
 
 RunStatus = ResultStatus | Literal["waiting", "running"]
-FINISHED: tuple[RunStatus, ...] = ("falsified", "not falsified")
 
 
+@dataclass(kw_only=True)
 class Summary:
     """Numbers of one requirement in one run, updated by adding records in order.
 
     They stop at the requirement's counterexample: a shared search continues for the other requirements.
 
-    Args:
-        requirement: name of the requirement; None: the run has only one.
-
     Attributes:
+        recorded_as: name of the requirement in the journal; None: the run has only one.
         status: ``waiting`` before the first record; ``running`` until the run has ended.
         reason: why it ended, in words.
         best: index of the evaluation with the smallest robustness, or None.
@@ -43,34 +42,33 @@ class Summary:
         counterexample: index of the confirmed violation, or None.
         unconfirmed: outcome and reason of violations that were not confirmed, by index.
         trajectories: file names of kept trajectories, by index.
+        spent: what the run has spent.
         findings: what the search could not show; empty before it has ended.
     """
 
-    def __init__(self, requirement: str | None = None) -> None:
-        self.status: RunStatus = "waiting"
-        self.reason = ""
-        self.best: int | None = None
-        self.verdict: Verdict | None = None
-        self.counterexample: int | None = None
-        self.unconfirmed: dict[int, str] = {}
-        self.trajectories: dict[int, str] = {}
-        self.findings: tuple[Finding, ...] = ()
-        self._requirement = requirement
-        self._spent = Spent()
-        self._simulation_seconds = 0.0
-        self._failed: dict[int, str] = {}
-        self._robustness: list[float] = []
-        self._latest: Verdict | None = None
+    recorded_as: str | None = None
+    status: RunStatus = "waiting"
+    reason: str = ""
+    best: int | None = None
+    verdict: Verdict | None = None
+    counterexample: int | None = None
+    unconfirmed: dict[int, str] = field(default_factory=dict)
+    trajectories: dict[int, str] = field(default_factory=dict)
+    spent: Spent = field(default_factory=Spent)
+    findings: tuple[Finding, ...] = ()
+    _robustness: list[float] = field(default_factory=list)
+    _failed: dict[int, str] = field(default_factory=dict)
+    _latest: Verdict | None = None
 
     @property
-    def spent(self) -> Spent:
-        """What the run has spent."""
-        return replace(
-            self._spent,
-            simulations=len(self._robustness),
-            simulation_seconds=self._simulation_seconds,
-            failures=len(self._failed),
-        )
+    def falsified(self) -> bool:
+        """Whether a confirmed counterexample was found."""
+        return self.status == "falsified"
+
+    @property
+    def finished(self) -> bool:
+        """Whether it ended with a result: falsified, or budget used up. Other runs can be continued."""
+        return self.status in ("falsified", "not falsified")
 
     @property
     def failures(self) -> tuple[Failure, ...]:
@@ -87,46 +85,43 @@ class Summary:
         """Smallest robustness so far."""
         return None if self.best is None else self._robustness[self.best]
 
-    def begin(self) -> None:
-        """Set the status to running even if the first record was skipped by the reader."""
-        if self.status == "waiting":
-            self.status = "running"
+    @property
+    def shown(self) -> int | None:
+        """Index of the evaluation to show: the counterexample, otherwise the best one; None without any."""
+        return self.best if self.counterexample is None else self.counterexample
 
     def add(self, record: Record) -> None:
         """Update the numbers with one record."""
         if self.counterexample is not None:
             return
         self.status = "running"
-        self._spent = replace(self._spent, seconds=elapsed_at(record))
+        self.spent = replace(self.spent, seconds=elapsed_at(record))
         match record:
             case EvaluatedRecord():
                 self._evaluated(record)
-            case ConfirmedRecord() if self._requirement not in (None, record.requirement):
+            case ConfirmedRecord() if self.recorded_as not in (None, record.requirement):
                 pass
             case ConfirmedRecord(outcome="confirmed"):
                 self.counterexample = record.index
                 self.verdict = self._latest
                 self.status, self.reason = "falsified", record.reason
-                self._spent = record.spent
+                self.spent = record.spent
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
                 exchange = Exchange.model_validate(record.exchange)
-                self._spent = self._spent.plus_requests(exchange.requests, exchange.usage)
+                self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
             case EndedRecord():
-                self.status = record.status
-                self.reason = record.reason
-                self._spent = record.spent
-                own = [found for name, found in record.findings.items() if self._requirement in (None, name)]
+                self.status, self.reason, self.spent = record.status, record.reason, record.spent
+                own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
                 self.findings = tuple(each for found in own for each in found)
-            case AskedRecord():
+            case _:
                 pass
 
     def _evaluated(self, record: EvaluatedRecord) -> None:
         judged = record.verdicts
-        verdict = (
-            next(iter(judged.values()), None) if self._requirement is None else judged[self._requirement]
-        )
+        name = next(iter(judged)) if self.recorded_as is None else self.recorded_as
+        verdict = judged[name]
         self._latest = verdict
         smallest = self.best_robustness
         if verdict is not None and (smallest is None or verdict.robustness < smallest):
@@ -134,20 +129,60 @@ class Summary:
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory
         self._robustness.append(verdict.robustness if verdict else float("nan"))
-        self._simulation_seconds += record.seconds
-        if all(v is None for v in judged.values()):
+        failed = all(v is None for v in judged.values())
+        if failed:
             self._failed[record.index] = record.reason
+        self.spent = replace(
+            self.spent,
+            simulations=self.spent.simulations + 1,
+            simulation_seconds=self.spent.simulation_seconds + record.seconds,
+            failures=self.spent.failures + failed,
+        )
 
 
-def read_summary(directory: Path, requirement: str | None = None) -> Summary:
-    """Read the numbers of a run directory's complete journal; see Summary.
+S = TypeVar("S", bound=Summary)
 
-    Raises:
-        JournalError: if a line is invalid, unless it is an incomplete last line.
+
+class RunFollower(Generic[S]):
+    """Follows the journal of a run that may still be going on.
+
+    Args:
+        directory: run directory; the run need not have started.
+        empty: the summaries before the first record, one per requirement that is of interest.
+        with_candidates: see read_journal.
+
+    Attributes:
+        summaries: what was read so far.
     """
-    summary, reader = Summary(requirement), JournalReader(directory, with_candidates=False)
-    for record in reader.new():
-        summary.add(record)
-    if reader.begun:
-        summary.begin()
-    return summary
+
+    def __init__(self, directory: Path, empty: Sequence[S], *, with_candidates: bool = False) -> None:
+        self.directory = directory
+        self._empty, self._with_candidates = empty, with_candidates
+        self._begin()
+
+    def _begin(self) -> None:
+        self.summaries = deepcopy(list(self._empty))
+        self._reader = JournalReader(self.directory, with_candidates=self._with_candidates)
+
+    def read(self) -> Iterator[Record]:
+        """Yield the records that are new, after they were added to the summaries.
+
+        Raises:
+            JournalError: if a line is invalid, unless it is an incomplete last line.
+        """
+        if self._reader.shrank:  # the run was repaired, or the directory replaced
+            self._begin()
+        for record in self._reader.new():
+            for summary in self.summaries:
+                summary.add(record)
+            yield record
+        if self._reader.begun:  # even if the first record was skipped
+            for summary in self.summaries:
+                if summary.status == "waiting":
+                    summary.status = "running"
+
+    def look(self) -> list[S]:
+        """Read all that is new, and return the summaries."""
+        for _ in self.read():
+            pass
+        return self.summaries

@@ -88,7 +88,7 @@ class PlainScoreboard:
 
 def run_line(run: RunProgress) -> str:
     """Describe an ended run in one line."""
-    best = "" if run.best is None else f", best robustness {signed(run.best, 4)}"
+    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness, 4)}"
     count = run.spent.simulations_text
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
@@ -128,7 +128,7 @@ def _fitting(progress: Progress, rate: float | None, console: "Console") -> "Ren
             f"{part.finished}/{len(part.runs)}",
             str(part.counts["falsified"]),
             str(part.spent.simulations),
-            "" if part.best is None else signed(part.best, 4),
+            "" if part.best_robustness is None else signed(part.best_robustness, 4),
             "?" if cost is None else f"{cost:.4f}" if part.spent.calls else "",
         )
     return table

@@ -16,7 +16,8 @@ def run(name: str, seed: int, status: str, simulations: int = 0, best: float | N
         seed=seed,
         status=status,  # type: ignore[arg-type]
         reason="",
-        best=best,
+        best=None if best is None else 0,
+        _robustness=[] if best is None else [best],
         spent=spent,
     )
 

@@ -202,20 +202,13 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
 def _shown(run: Run) -> Shown:
     if (shrunk := _shrunk(run)) is not None:
         return _drawn(run, *shrunk, is_shrunk=True)
-    index = shown_index(run)
-    assert index is not None
-    return shown_of(run, recorded_candidates(read_journal(run.directory))[index])
-
-
-def shown_index(run: Run) -> int | None:
-    """Return the index of the counterexample, otherwise of the best evaluation; None if there is none."""
-    return run.best if run.counterexample is None else run.counterexample
+    assert run.shown is not None
+    return shown_of(run, recorded_candidates(read_journal(run.directory))[run.shown])
 
 
 def shown_of(run: Run, candidate: Candidate) -> Shown:
     """Return a run's counterexample or best simulation, given its candidate."""
-    index = shown_index(run)
-    name = None if index is None else run.trajectories.get(index)
+    name = None if run.shown is None else run.trajectories.get(run.shown)
     trajectory = recorded_trajectory(run.directory, name)
     is_lost = trajectory is None and name is not None
     return _drawn(run, candidate, trajectory, run.verdict, run.reason, is_lost=is_lost)

@@ -9,7 +9,7 @@ journals for a moment only, so that the page of a long run opens at once and com
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
@@ -20,22 +20,21 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from falsifier.analyses.coverage import coverage_of
-from falsifier.campaigns.analysis import Run, run_of
+from falsifier.campaigns.analysis import Run
 from falsifier.campaigns.directory import is_campaign, is_worked_on, run_directories
 from falsifier.campaigns.progress import Follower, RunProgress
+from falsifier.campaigns.runs import unread_runs
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.llm.messages import Exchange
-from falsifier.record import manifest as manifests
-from falsifier.record.journal import STOP, JournalReader
-from falsifier.record.manifest import Manifest
+from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
-from falsifier.record.summary import Summary
+from falsifier.record.summary import RunFollower
 from falsifier.stl.margins import signed
 from falsifier.views.campaign_progress import overall_line
 from falsifier.views.exchanges import exchange_html
 from falsifier.views.html import Html, el, join, table
-from falsifier.views.report.content import section_of, shown_index, shown_of
+from falsifier.views.report.content import section_of, shown_of
 from falsifier.views.report.page import card_html, document, drawn, facts_html
 from falsifier.views.text import Fact, llm_use, seconds_text
 
@@ -55,31 +54,16 @@ _MOST_RUNS = 200
 class _Watched:
     """One run directory, and what was read of it so far."""
 
-    directory: Path
-    described: Manifest
-    reader: JournalReader = field(init=False)
-    summaries: dict[str, Summary] = field(init=False)
-    candidates: dict[int, dict[str, Any]] = field(init=False)
+    run: RunFollower[Run]
+    candidates: dict[int, dict[str, Any]] = field(default_factory=dict)
     exchange: Exchange | None = None
     is_behind: bool = False
     _every: int = 1
 
-    def __post_init__(self) -> None:
-        self._begin()
-
-    def _begin(self) -> None:
-        self.reader = JournalReader(self.directory)
-        self.summaries = {name: Summary(name) for name in self.described.names}
-        self.candidates = {}
-
     def read(self, until: float) -> None:
         """Read on until there is nothing new, or the clock (in s) says that it is enough."""
-        if self.reader.shrank:
-            self._begin()
         self.is_behind = False
-        for record in self.reader.new():
-            for summary in self.summaries.values():
-                summary.add(record)
+        for record in self.run.read():
             if isinstance(record, AskedRecord):
                 self.candidates |= dict(enumerate(record.candidates, start=record.first))
                 self._thin()
@@ -94,21 +78,13 @@ class _Watched:
         if len(self.candidates) <= 2 * _MOST_KEPT:
             return
         self._every *= 2
-        needed = {
-            s.counterexample if s.counterexample is not None else s.best for s in self.summaries.values()
-        }
+        needed = {run.shown for run in self.run.summaries}
         first = max(self.candidates) - _MOST_KEPT // 2
         self.candidates = {
             index: candidate
             for index, candidate in self.candidates.items()
             if index % self._every == 0 or index in needed or index > first
         }
-
-    def runs(self) -> Iterator[Run]:
-        """Yield its runs, one per requirement."""
-        shared = self.described.shared
-        for name, summary in self.summaries.items():
-            yield run_of(self.directory, self.described.of(name), summary, shared=shared)
 
 
 class Watch:
@@ -152,11 +128,12 @@ class Watch:
             seconds = _READING_ON
             if place not in self._watched:
                 seconds = _READING
-                self._watched = {place: _Watched(place, manifests.read(place))}  # one at a time is in memory
+                run = RunFollower(place, unread_runs(place), with_candidates=True)
+                self._watched = {place: _Watched(run)}  # one at a time is in memory
             watched = self._watched[place]
             watched.read(monotonic() + seconds)
             behind = watched.is_behind
-            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.runs())]
+            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.run.summaries)]
         return join(*parts), behind
 
     def stop(self) -> None:
@@ -164,12 +141,12 @@ class Watch:
         (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
 
     def _state(self, watched: _Watched) -> Html:
-        working = is_worked_on(self.directory) or is_worked_on(watched.directory)
+        working = is_worked_on(self.directory) or is_worked_on(watched.run.directory)
         text = "reading the journal" if watched.is_behind else "running" if working else "not running"
         button = (
             el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
         )
-        return el("p", f"{watched.directory.name}: {text}. ", button, class_="result", id="state")
+        return el("p", f"{watched.run.directory.name}: {text}. ", button, class_="result", id="state")
 
 
 def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
@@ -184,7 +161,7 @@ def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Ht
             f"{run.method.label}, seed {run.seed}",
             f"{run.status}{' (shown below)' if run.name == chosen else ''}",
             run.spent.simulations_text,
-            "" if run.best is None else signed(run.best, 4),
+            "" if run.best_robustness is None else signed(run.best_robustness, 4),
         )
         for run in order[:_MOST_RUNS]
     ]
@@ -201,8 +178,7 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     """One requirement of a run: the card of the report, then how the search goes."""
     from falsifier.views.plotting import plot_coverage, plot_history
 
-    index = shown_index(run)
-    best = watched.candidates.get(-1 if index is None else index)
+    best = None if run.shown is None else watched.candidates.get(run.shown)
     shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
     tried = [
         (Candidate.from_json(candidate), None)
@@ -210,7 +186,7 @@ def _run_html(run: Run, watched: _Watched) -> Html:
         if i < len(run.robustness)
     ]
     history = drawn(partial(plot_history, run), "Robustness over simulations")
-    covered = drawn(lambda: plot_coverage(coverage_of(watched.described, tried)), "What was tried")
+    covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
     facts: list[Fact] = [("time", seconds_text(run.spent))]
     facts += [("language model", llm_use(run.spent))] if run.spent.calls else []
     of = "" if len(tried) == len(run.robustness) else f" ({len(tried)} of {len(run.robustness)} simulations)"
