@@ -12,6 +12,7 @@ from falsifier.campaigns.published import COLUMNS, Published, Score, read_publis
 from falsifier.campaigns.runs import Run, columns, frame, load, load_run
 from falsifier.campaigns.statistics import Statistics, group, statistics
 from falsifier.campaigns.tables import Table, ablation_table, llms_table, main_table
+from falsifier.record.summary import Summary
 
 __all__ = [
     "COLUMNS",
@@ -19,6 +20,7 @@ __all__ = [
     "Run",
     "Score",
     "Statistics",
+    "Summary",
     "Table",
     "ablation_table",
     "columns",

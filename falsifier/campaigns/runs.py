@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False, kw_only=True)
 class Run(Summary):
-    """One requirement in one run, read from its directory: its numbers, and what was requested.
+    """One requirement in one run, read from its directory: its numbers (see Summary) and what was requested.
 
     Attributes:
         directory: run directory.
