@@ -3,6 +3,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.engines.coverage.explorer import describe
 from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.testing import lag_problem
 from tests.engines.coverage.support import lock_problem
@@ -66,3 +67,15 @@ def test_any_numbers_have_marks(values: list[float]) -> None:
     marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
     times = np.linspace(0.0, 1.0, len(values))
     marker.marks(Trajectory(times, {"x": np.array(values), "u": np.zeros(len(values))}))
+
+
+def test_marks_are_said_in_words() -> None:
+    assert describe(Mark("gear", ("is", 3.0))) == "gear = 3"
+    assert describe(Mark("gear", ("changes", 1.0, 2.0, 2))) == "gear change from 1 to 2 2 times"
+    assert (
+        describe(Mark("x", ("after", 0.0, 1.0, "y", 1.0, 0.0, 3)))
+        == "x change from 0 to 1 after y from 1 to 0"
+    )
+    assert describe(Mark("x > 3", ("near", 2))) == "x > 3 come close to its threshold"
+    assert describe(Mark("x", ("up", -2))) == "x go up"
+    assert describe(Mark(MODES, ("gear = 1", "brake = 0"))) == "gear = 1 and brake = 0"

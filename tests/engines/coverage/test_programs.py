@@ -47,36 +47,6 @@ def test_discrete_inputs_take_their_values_only() -> None:
         assert point * 5 == pytest.approx(np.round(point * 5))
 
 
-def test_a_span_is_repeated_after_a_pause() -> None:
-    layout = layout_of(inputs=1)
-    programs, source = Programs(layout), np.zeros(layout.dimension)
-    source[5:10] = 1.0
-    found = programs.repeated(drawn(3), np.zeros(layout.dimension), 2.0, source, (1.0, 2.0))
-    assert np.count_nonzero(found[11:50] == 1.0) >= 5
-
-
-def test_what_was_done_before_a_time_is_done_again_until_the_end() -> None:
-    programs = Programs(layout_of(inputs=2))
-    point = np.tile(np.arange(50) / 50, 2)
-    point = np.concatenate([point, [0.5]])[: layout_of(inputs=2).dimension]
-    # The cells are 0.2 s long; from 4 s on, the five cells from 3 s on follow again and again.
-    found = programs.again(drawn(0), point, 3.9, 1.0)
-    for start in (0, 50):
-        own = found[start : start + 50]
-        assert (own[:20] == point[start : start + 20]).all()
-        assert (own[20:] == np.resize(own[15:20], 30)).all()
-
-
-def test_without_a_stretch_what_follows_comes_sooner() -> None:
-    programs, point = Programs(layout_of(inputs=1)), np.arange(layout_of(inputs=1).dimension) / 100
-    for seed in range(20):
-        found, time = programs.sooner(drawn(seed), point, 5.0)
-        assert 0.0 <= time <= 5.0
-        assert programs.another_end(drawn(seed), found, 10.0).shape == point.shape
-        moved = round((5.0 - time) / 0.2)
-        assert abs(found[25 - moved] - point[25]) <= 0.011, "what was there from 5 s on"
-
-
 def test_values_are_drawn_between_levels_that_are_known() -> None:
     layout = layout_of(inputs=1)
     (ranged,) = layout.space.inputs
@@ -105,11 +75,3 @@ def test_values_at_which_something_happened_are_used_again() -> None:
         assert np.mean(fresh[:, first] == value) > 0.15, "before and after the change that may have caused it"
     assert np.mean(fresh[:, second] == 0.7) == 0.0
     assert np.mean(fresh[:, second] == 1.0) < 0.5, "bounds are drawn often enough"
-
-
-def test_of_interpolated_inputs_nothing_is_remembered() -> None:
-    problem = lag_problem("G[0,10] (x <= 99)", points=3)
-    programs = Programs(planning_layout(problem.space, GRID))
-    programs.remember(np.array([0.3, 0.4, 0.3]), 2.0, 0.1)
-    fresh = np.array([programs.fresh(drawn(seed)) for seed in range(40)])
-    assert not np.isin(fresh, (0.3, 0.4)).any()

@@ -5,9 +5,9 @@ import pytest
 
 from falsifier.core.space import SearchSpace
 from falsifier.engines.layout import TimeGrid, planning_layout
-from falsifier.engines.surrogate.dynamics import Forecaster, LinearDynamics
+from falsifier.engines.surrogate.dynamics import LinearDynamics
 from falsifier.engines.surrogate.history import trace_of
-from falsifier.engines.surrogate.predicted_cost import PredictedCost, inner_windows, needs_several
+from falsifier.engines.surrogate.predicted_cost import PredictedCost
 from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import Monitor, parse
@@ -54,45 +54,6 @@ def test_windows_between_grid_points_are_rounded(text: str) -> None:
     assert 1.0 <= cost.cost(cost.margins(states, np.zeros((1, CELLS, 0))))[0] <= 2.0
 
 
-def test_margins_are_scaled_by_their_spread_and_discrete_ones_cut() -> None:
-    problem = lag_problem("G[0,10] (x <= 3) and G[0,10] (u <= 2)", free=FREE)
-    history = history_of(problem, simulations=4)
-    scaled = history.scaled_cost()
-    spread = [float(np.std([s.margins[i] for s in history.samples])) for i in range(2)]
-    assert scaled.scales == pytest.approx(spread)
-    assert scaled.plain().scales == (1.0, 1.0)
-    order = history.by_scaled_cost()
-    costs = [float(scaled.cost(history.samples[i].margins)[0]) for i in order]
-    assert costs == sorted(costs)
-    grid, names = TimeGrid(1.0, 2, 2), frozenset({"gear"})
-    gears = PredictedCost.of(
-        parse("G[0,2] (gear <= 3)"), problem.space, grid, ("gear",), discrete=names, constants={}
-    )
-    states = np.array([[[1.0], [3.4], [6.0]]])
-    assert gears.margins(states, np.zeros((1, 2, 1)))[0].tolist() == [[0.5, pytest.approx(-0.4), -0.5]]
-
-
-@pytest.mark.parametrize(
-    ("text", "several", "windows"),
-    [
-        ("G[0,10] (x <= 1)", False, []),
-        ("F[0,10] (x <= 1 and y <= 2)", False, []),
-        ("G[0,10] (x <= 1 or y <= 2)", True, []),
-        ("(G[0,10] (x <= 1)) -> (G[0,4] (y <= 0.5))", True, []),
-        ("not (x <= 1 and y <= 2)", True, []),
-        ("not (x <= 1 or y <= 2)", False, []),
-        ("not (x <= 1 -> y <= 2)", False, []),
-        ("G[0,10] F[1,4] (x > 0)", False, [3.0]),
-        ("(x > 0) U[0,3] (y > 0)", True, []),
-    ],
-)
-def test_the_form_of_a_formula_decides_what_comes_first(
-    text: str, several: bool, windows: list[float]
-) -> None:
-    assert needs_several(parse(text)) == several
-    assert inner_windows(parse(text)) == windows
-
-
 def test_dynamics_predict_an_unseen_input_from_a_few_trajectories() -> None:
     history = history_of(lag_problem(free=FREE, inputs=2, parameters=[START]), simulations=12)
     traces = [s.trace for s in history.samples]
@@ -101,28 +62,6 @@ def test_dynamics_predict_an_unseen_input_from_a_few_trajectories() -> None:
         predicted = fitted.predict(trace.inputs[None, :50])[0, :, 0]
         true = trace.states[:51, 0]
         assert np.abs(predicted - true).max() < 0.05 * np.ptp(true)
-
-
-def test_forecasts_are_judged_by_what_came_of_them() -> None:
-    problem = lag_problem("G[0,10] (x <= 0.5)", free=FREE)
-    history = history_of(problem, simulations=6)
-    forecaster = Forecaster(SETTINGS, history.layout)
-    assert not forecaster.is_trusted and forecaster.recent_error == np.inf and forecaster.misses == 0
-    fitted = forecaster.fitted([s.trace for s in history.samples], 0, np.random.default_rng(0))
-    cost, high = history.scaled_cost(), np.ones(history.layout.dimension)
-    forecast = fitted.forecast(cost, high)
-    assert forecast.cost < 0 and fitted.predictor(cost)(high[None])[0] == pytest.approx(forecast.cost)
-    (verdict,) = fitted.verdicts(cost, high[None])
-    candidate = history.layout.candidate(high, origin="t", rationale="t")
-    evaluation = evaluate(problem, candidate)
-    assert evaluation.robustness is not None
-    assert verdict.robustness == pytest.approx(evaluation.robustness, abs=0.05)
-    sample = history.add(evaluation, high)
-    assert sample is not None
-    fitted.judge(forecast, sample.margins, cost, violated=True)
-    assert fitted.is_trusted and fitted.recent_error < 0.1 and fitted.misses == 0
-    fitted.judge(forecast, sample.margins, cost, violated=False)
-    assert fitted.misses == 1
 
 
 def test_inputs_on_the_grid_are_those_of_the_point_and_times_beyond_the_horizon_teach_too() -> None:
