@@ -8,7 +8,6 @@ import shlex
 import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -45,6 +44,7 @@ from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
 from tests.counterexamples.export.support import exported
 from tests.hostile.names import HOSTILE, names
+from tests.pages import parse as parse_page
 
 PLAIN = "plain"
 # Those of one line without control characters; a requirement may not have any other name.
@@ -126,21 +126,9 @@ def recorded(name: str, directory: Path) -> Result:
     return falsify(named(name), "corners", budget=3, directory=directory)
 
 
-class _Tags(HTMLParser):
-    """Elements and the names of their attributes, in order."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.seen: list[tuple[str, tuple[str, ...]]] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.seen.append((tag, tuple(key for key, _ in attrs)))
-
-
 def tags(page: str) -> list[tuple[str, tuple[str, ...]]]:
-    parser = _Tags()
-    parser.feed(page)
-    return parser.seen
+    """Elements and the names of their attributes, in order."""
+    return [(element.tag, tuple(element.attrib)) for element in parse_page(page).iter()]
 
 
 def form(directory: Path, result: Result) -> list[object]:
