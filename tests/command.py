@@ -8,10 +8,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import NamedTemporaryFile
 from typing import Any
 
-from tests.forking import forker
+from tests.forking import run
 from tests.patience import HANG
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -63,11 +63,6 @@ def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fre
 
 def forked(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Done:
     """Run ``falsifier`` or ``pytest`` in a copy of a process that has imported what is slow to import."""
-    with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open() as nothing:
-        with forker().lock:
-            code = forker().run(command, folder, environment, nothing, out, err)
-        texts = []
-        for stream in (out, err):
-            stream.seek(0)
-            texts.append(stream.read().decode())
-    return Done(code, *texts)
+    with NamedTemporaryFile() as out, NamedTemporaryFile() as err:
+        code = run(command, folder, environment, (os.devnull, out.name, err.name))
+        return Done(code, out.read().decode(), err.read().decode())

@@ -9,18 +9,17 @@ import gc
 import importlib
 import json
 import os
-import select
-import socket
+import signal
 import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from pkgutil import walk_packages
-from typing import IO, Any, NoReturn
+from typing import NoReturn
 
 from tests.patience import HANG
 
@@ -43,56 +42,43 @@ _NEVER = (
     "falsifier.core.windows",
     "falsifier.engines.optimisers.botorch_gp",
 )
-_PROGRAM = """
-import sys
-from tests.forking import serve
-serve(int(sys.argv.pop()))
-"""
-_REQUEST_BYTES = 1_000_000
+_ONE_AT_A_TIME = threading.Lock()
 
 
-class Forker:
-    """The process that forks; one command at a time."""
+def run(
+    command: Sequence[str], folder: Path, environment: Mapping[str, str], streams: tuple[str, str, str]
+) -> int:
+    """Run ``falsifier`` or ``pytest``; return its exit code.
 
-    def __init__(self, environment: Mapping[str, str]) -> None:
-        self.lock = threading.Lock()
-        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM, str(theirs.fileno())],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
-            )
-
-    def run(
-        self, command: Sequence[str], folder: Path, environment: Mapping[str, str], *streams: IO[Any]
-    ) -> int:
-        """Run ``falsifier`` or ``pytest`` with these three standard streams; return its exit code."""
-        request = {"command": command, "folder": str(folder), "environment": dict(environment)}
-        socket.send_fds(self._socket, [json.dumps(request).encode()], [s.fileno() for s in streams])
-        pid = self._receive()
-        try:
-            return self._receive()
-        except TimeoutError:
-            os.kill(pid, 9)
-            raise
-
-    def _receive(self) -> int:
-        if not select.select([self._socket], [], [], HANG)[0]:
-            raise TimeoutError("the command does not end")
-        return int(self._socket.recv(100))
+    Args:
+        command: the program and its arguments.
+        folder: where it runs.
+        environment: its variables.
+        streams: files for its three standard streams.
+    """
+    with _ONE_AT_A_TIME:
+        requests, codes = _server().stdin, _server().stdout
+        assert requests is not None and codes is not None
+        requests.write(json.dumps([list(command), str(folder), dict(environment), streams]) + "\n")
+        requests.flush()
+        return int(codes.readline())
 
 
 @cache
-def forker() -> Forker:
+def _server() -> "subprocess.Popen[str]":
     """The one of this process, started when it is first needed; it ends with this process."""
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
-    return Forker(clean | {"PYTHONPATH": os.pathsep.join(sys.path)})
+    return subprocess.Popen(
+        [sys.executable, "-c", "from tests.forking import serve; serve()"],
+        env=clean | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
 
 
-def serve(descriptor: int) -> None:
-    """Fork for each request; the copies run it and end."""
+def serve() -> None:
+    """Fork for each line of standard input; the copies run the command that stands there, and end."""
     from falsifier.llm.usage import count_tokens
 
     importlib.import_module("falsifier.llm.litellm_adapter").load_litellm()
@@ -103,54 +89,38 @@ def serve(descriptor: int) -> None:
             importlib.import_module(name)
     count_tokens("")
     gc.freeze()
-    requests = socket.socket(fileno=descriptor)
-    while True:
-        data, streams, _, _ = socket.recv_fds(requests, _REQUEST_BYTES, 3)
-        if not data:
-            sys.exit()
+    for line in sys.stdin:
         pid = os.fork()
         if not pid:
-            requests.close()
-            _become(json.loads(data), streams)
+            signal.alarm(int(HANG))
+            _become(*json.loads(line))
             _run_and_end()
-        for stream in streams:
-            os.close(stream)
-        requests.send(str(pid).encode())
         _, status = os.waitpid(pid, 0)
-        requests.send(str(os.waitstatus_to_exitcode(status)).encode())
+        print(os.waitstatus_to_exitcode(status), flush=True)
 
 
-def _become(request: dict[str, Any], streams: list[int]) -> None:
-    for number, stream in enumerate(streams):
-        os.dup2(stream, number)
-        os.close(stream)
-    os.chdir(request["folder"])
+def _become(command: list[str], folder: str, environment: dict[str, str], streams: list[str]) -> None:
+    for number, name in enumerate(streams):
+        opened = os.open(name, os.O_RDWR)
+        os.dup2(opened, number)
+        os.close(opened)
+    os.chdir(folder)
     os.environ.clear()
-    os.environ.update(request["environment"])
-    sys.argv = request["command"]
-
-
-def _falsifier() -> NoReturn:
-    from falsifier.cli import main
-
-    main()
-    sys.exit()
-
-
-def _pytest() -> NoReturn:
-    import pytest
-
-    sys.exit(pytest.main())
-
-
-_PROGRAMS: dict[str, Callable[[], NoReturn]] = {"falsifier": _falsifier, "pytest": _pytest}
+    os.environ.update(environment)
+    sys.argv = command
 
 
 def _run_and_end() -> NoReturn:
     """Run the command and end as an interpreter does, except that it does not take all modules apart."""
     code = 0
     try:
-        _PROGRAMS[sys.argv[0]]()
+        if sys.argv[0] == "pytest":
+            import pytest
+
+            sys.exit(pytest.main())
+        from falsifier.cli import main
+
+        main()
     except SystemExit as ending:
         code = ending.code if isinstance(ending.code, int) else int(ending.code is not None)
     except BaseException:
