@@ -44,6 +44,8 @@ _SAMPLES = 201
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.intp]
+# Small numbers: those of a whole run are in memory at the same time.
+Cells = NDArray[np.uint16]
 Tried = Iterable[tuple[Candidate, Trajectory | None]]
 
 
@@ -262,7 +264,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
 
 def _of_range(
     r: InputRecord, tried: Sequence[ArrayLike], paces: Mapping[str, int]
-) -> tuple[RangeCoverage, Counts]:
+) -> tuple[RangeCoverage, Cells]:
     """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
     Args:
@@ -280,12 +282,12 @@ def _of_range(
     return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells
 
 
-def _had(cells: Counts, count: int) -> Counts:
+def _had(cells: Cells, count: int) -> Counts:
     """Return in how many simulations, the rows of cells, each of so many parts occurs."""
     return np.array([(cells == part).any(axis=1).sum() for part in range(count)], np.intp)
 
 
-def _together(one: RangeCoverage, cells: Counts, other: RangeCoverage, others: Counts) -> PairCoverage:
+def _together(one: RangeCoverage, cells: Cells, other: RangeCoverage, others: Cells) -> PairCoverage:
     tried = np.zeros((len(one.parts), len(other.parts)), np.bool_)
     tried[cells, others] = True
     return PairCoverage(one.searched.name, other.searched.name, tried)
@@ -351,11 +353,11 @@ def edges_of(r: InputRecord) -> list[tuple[float, float]]:
     return list(pairwise(np.linspace(r.low, r.high, PARTS + 1).tolist()))
 
 
-def cells_of(r: InputRecord, values: Array) -> Counts:
+def cells_of(r: InputRecord, values: Array) -> Cells:
     """Return the part of the range in which each value is, in the shape of the values."""
     edges = np.array(edges_of(r))
     between = (edges[1:, 0] + edges[:-1, 1]) / 2
-    return np.searchsorted(between, values, side="right")
+    return np.searchsorted(between, values, side="right").astype(np.uint16)
 
 
 def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:

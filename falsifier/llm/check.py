@@ -158,7 +158,7 @@ def _on_effort(chat: Chat, reply: ChatReply) -> tuple[bool, str]:
 
 def _on_tools(reply: ChatReply) -> tuple[bool, str]:
     if not reply.parameters.get("tools"):
-        return False, "refused by the server; the hybrid engine tells predictions afterwards"
+        return False, "refused by the server; the hybrid engine asks without predictions"
     if not reply.tool_calls:
         return False, "offered, but not called"
     try:

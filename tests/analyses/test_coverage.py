@@ -1,5 +1,6 @@
 """Small records whose coverage is known."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,17 @@ def test_combinations_are_of_values_at_the_same_time() -> None:
     assert np.argwhere(pairs["u", "v"]).tolist() == [[0, 0], [9, 9]]
     assert np.argwhere(pairs["u", "p"]).tolist() == [[0, 5], [9, 5]]
     assert found.pairs[0].count == 2
+
+
+def test_many_simulations_of_many_inputs_take_little_memory() -> None:
+    names = [f"u{k}" for k in range(12)]
+    ranges = [InputRecord(name=name, low=0.0, high=1.0) for name in names]
+    candidate = Candidate(dict.fromkeys(names, Signal((0.0,), (0.5,))))
+    tracemalloc.start()
+    coverage_of(described(*ranges), [(candidate, None)] * 500)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8e6
 
 
 def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
