@@ -11,39 +11,38 @@ typedef unsigned (*step_1)(void *, double, double, char);
 typedef unsigned (*step_2)(void *, double, double, int);
 typedef unsigned (*step_3)(void *, double, double, uint8_t, uint8_t *, uint8_t *, uint8_t *, double *);
 
-static const struct outcome done = {0, DONE};
-
 /* Iterate events in FMI 3's event mode until nothing changes any more. */
 static struct outcome settle(struct fmu *fmu)
 {
     for (int round = 0; round < MOST_ROUNDS; round++) {
         uint8_t again = 0, end = 0, nominals = 0, states = 0, defined = 0;
         double next_time = 0.0;
-        unsigned status = fmu->step.update(fmu->instance, &again, &end, &nominals, &states, &defined, &next_time);
-        if (status > 1)
-            return (struct outcome){status, EVENT};
-        if (end)
-            return (struct outcome){status, TERMINATED};
-        if (!again)
-            return (struct outcome){status, DONE};
+        struct outcome o = checked(
+            fmu->step.update(fmu->instance, &again, &end, &nominals, &states, &defined, &next_time), EVENT);
+        if (o.where == DONE && end)
+            o.where = TERMINATED;
+        if (o.where != DONE || !again)
+            return o;
     }
     return (struct outcome){0, STUCK};
+}
+
+/* Leave the event mode, in which initialisation ends too, if the FMU has one. */
+struct outcome begin_steps(struct fmu *fmu)
+{
+    if (!fmu->event_mode)
+        return done;
+    struct outcome o = settle(fmu);
+    return o.where == DONE ? checked(fmu->step.enter_step_mode(fmu->instance), EVENT) : o;
 }
 
 /* Enter event mode, set inputs if there are any, update the discrete states, return to step mode. */
 struct outcome change_at_event(struct fmu *fmu, const struct ports *ports)
 {
-    unsigned status = fmu->step.enter_event_mode(fmu->instance);
-    if (status > 1)
-        return (struct outcome){status, EVENT};
-    status = ports ? exchange_values(fmu, ports) : 0;
-    if (status > 1)
-        return (struct outcome){status, SETTING};
-    struct outcome o = settle(fmu);
-    if (o.where != DONE)
-        return o;
-    status = fmu->step.enter_step_mode(fmu->instance);
-    return (struct outcome){status, status > 1 ? EVENT : DONE};
+    struct outcome o = checked(fmu->step.enter_event_mode(fmu->instance), EVENT);
+    if (o.where == DONE && ports)
+        o = checked(exchange_values(fmu, ports), SETTING);
+    return o.where == DONE ? begin_steps(fmu) : o;
 }
 
 /* Do one communication step of FMI 3, in several calls if the FMU returns early. */
@@ -90,7 +89,7 @@ struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
     unsigned status = fmu->major == 2
                           ? ((step_2)fmu->step.do_step)(fmu->instance, start, end - start, 1)
                           : ((step_1)fmu->step.do_step)(fmu->instance, start, end - start, 1);
-    return (struct outcome){status, status > 1 ? STEPPING : DONE};
+    return checked(status, STEPPING);
 }
 
 /* Look up what is called in every step. */
@@ -102,14 +101,4 @@ void find_step_functions(struct fmu *fmu)
         fmu->step.enter_step_mode = (without_arguments)fmu_required(fmu, "EnterStepMode");
         fmu->step.update = (update_discrete_states_3)fmu_required(fmu, "UpdateDiscreteStates");
     }
-}
-
-/* Leave the event mode in which initialisation ends, if it does. */
-struct outcome begin_steps(struct fmu *fmu)
-{
-    struct outcome o = fmu->event_mode ? settle(fmu) : done;
-    if (o.where != DONE || !fmu->event_mode)
-        return o;
-    unsigned status = fmu->step.enter_step_mode(fmu->instance);
-    return (struct outcome){status, status > 1 ? EVENT : DONE};
 }

@@ -4,11 +4,6 @@
 
 #include "system.h"
 
-static struct outcome checked(unsigned status, enum where where)
-{
-    return (struct outcome){status, status > 1 ? where : DONE};
-}
-
 static struct outcome made(const char *wrong)
 {
     failing = wrong ? wrong : "";
@@ -140,7 +135,7 @@ struct outcome carry_out(struct component *c)
         fmu_unload(&c->fmu);
         break;
     }
-    return (struct outcome){0, DONE};
+    return done;
 }
 
 struct outcome ask(struct component *c, enum task task)

@@ -175,30 +175,25 @@ struct outcome settle_events(struct solver *s)
     for (int round = 0; u.again; round++) {
         if (round == MOST_ROUNDS)
             return (struct outcome){0, STUCK};
-        unsigned status = update(s, &u);
-        if (status > 1)
-            return (struct outcome){status, EVENT};
-        if (u.terminate)
-            return (struct outcome){status, TERMINATED};
+        struct outcome o = checked(update(s, &u), EVENT);
+        if (o.where == DONE && u.terminate)
+            o.where = TERMINATED;
+        if (o.where != DONE)
+            return o;
         any_change = any_change || u.states_changed;
     }
     unsigned status = s->fmu->major > 1 ? s->f.enter_continuous_time_mode(s->fmu->instance) : 0;
     if (status <= 1 && any_change)
         status = get_states(s);
-    if (status > 1)
-        return (struct outcome){status, EVENT};
-    return refresh(s);
+    return status > 1 ? checked(status, EVENT) : refresh(s);
 }
 
 /* Get derivatives and indicators at the current time and state. */
 struct outcome refresh(struct solver *s)
 {
-    unsigned status = derive(s, s->time, s->x, s->stages[0]);
-    if (status > 1)
-        return (struct outcome){status, STEPPING};
-    status = get_indicators(s, s->z);
+    struct outcome o = checked(derive(s, s->time, s->x, s->stages[0]), STEPPING);
     s->jacobian_known = 0;
-    return (struct outcome){status, status > 1 ? EVENT : DONE};
+    return o.where == DONE ? checked(get_indicators(s, s->z), EVENT) : o;
 }
 
 /* Set all inputs to their values at the current time. */
@@ -214,13 +209,10 @@ static unsigned set_event_inputs(struct solver *s)
 /* Handle an event at the current time and state. */
 struct outcome handle_event(struct solver *s)
 {
-    unsigned status = s->fmu->major > 1 ? s->f.enter_event_mode(s->fmu->instance) : 0;
-    if (status > 1)
-        return (struct outcome){status, EVENT};
-    status = set_event_inputs(s);
-    if (status > 1)
-        return (struct outcome){status, SETTING};
-    return settle_events(s);
+    struct outcome o = checked(s->fmu->major > 1 ? s->f.enter_event_mode(s->fmu->instance) : 0, EVENT);
+    if (o.where == DONE)
+        o = checked(set_event_inputs(s), SETTING);
+    return o.where == DONE ? settle_events(s) : o;
 }
 
 static double nearest_start(const struct inputs *inputs, double nearest)

@@ -231,7 +231,7 @@ static void end_descendants(pid_t worker, int *status)
     }
 }
 
-static void end_like(int status)
+void end_like(int status)
 {
     if (WIFSIGNALED(status)) {
         limit(RLIMIT_CORE, 0);

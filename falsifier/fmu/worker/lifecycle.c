@@ -15,12 +15,10 @@ typedef unsigned (*enter_3)(void *, uint8_t, double, double, uint8_t, double);
 typedef unsigned (*string_2)(void *, const uint32_t *, size_t, char *const *);
 typedef unsigned (*string_3)(void *, const uint32_t *, size_t, char *const *, size_t);
 
-static const struct outcome done = {0, DONE};
-
 static struct outcome called(const char *name, unsigned status)
 {
     failing = name;
-    return (struct outcome){status, status > 1 ? CALLING : DONE};
+    return checked(status, CALLING);
 }
 
 static struct outcome call(struct fmu *fmu, const char *name)
@@ -61,7 +59,7 @@ static struct outcome set_parameters(struct fmu *fmu, const struct plan *plan)
         return o;
     unsigned status = write_row(fmu, &plan->parameters, plan->parameter_values);
     failing = "parameters";
-    return (struct outcome){status, status > 1 ? WRITING : DONE};
+    return checked(status, WRITING);
 }
 
 /* Set the parameters and enter initialisation mode, which FMI 1 does not have. */

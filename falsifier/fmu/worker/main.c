@@ -96,7 +96,7 @@ static void report_crash(unsigned code)
 
 static void announce(const char *way)
 {
-    reply((struct outcome){0, DONE}, MORE, -1.0, way);
+    reply(done, MORE, -1.0, way);
 }
 
 static void connect(struct request *r)
@@ -117,7 +117,7 @@ static int simulate(struct request *r)
     if (is_tested) {
         find_reuse(announce);
         ends = is_spent();
-        reply((struct outcome){0, DONE}, ends ? LEAVING : 0, -1.0, way_to_start());
+        reply(done, ends ? LEAVING : 0, -1.0, way_to_start());
     }
     if (is_quick && !ends)
         watch_requests(QUICK_SECONDS);
@@ -134,7 +134,7 @@ static int answer(enum kind kind, struct request *r)
     case SIMULATE: return simulate(r);
     default: give_up("request %d is unknown", (int)kind);
     }
-    reply((struct outcome){0, DONE}, 0, -1.0, "");
+    reply(done, 0, -1.0, "");
     return 1;
 }
 

@@ -28,16 +28,7 @@ double *map_room(const char *place);
 /* Zeroed memory that ends where accessible memory ends; NULL if there is not enough. */
 void *guarded_memory(size_t bytes);
 
-/* Processes that share memory, for the components of a system; not on Windows. */
-void *shared_memory(size_t bytes); /* zeroed; NULL if there is not enough */
-void release_memory(void *memory, size_t bytes);
-long own_process(void);
-long split_process(void);             /* returns 0 in the new process, -1 if there is none */
-int has_ended(long process);          /* of one that split_process has started */
-int has_other_parent(long parent);    /* the parent has ended */
-void end_like(long process) __attribute__((noreturn)); /* end as it has ended */
-void nap(long nanoseconds);
-void yield_processor(void);
+long split_process(void); /* without the connection; returns 0 in the new process, -1 if there is none */
 
 /* Load a library with those beside it; says what is wrong if that fails. */
 void *load_library(const char *path, const char **wrong);

@@ -177,22 +177,6 @@ void *guarded_memory(size_t bytes)
     return memory + usable - bytes;
 }
 
-void *shared_memory(size_t bytes)
-{
-    void *memory = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-    return memory == MAP_FAILED ? NULL : memory;
-}
-
-void release_memory(void *memory, size_t bytes)
-{
-    munmap(memory, bytes);
-}
-
-long own_process(void)
-{
-    return getpid();
-}
-
 /* The new process has the FMU's output, but neither the requests nor the replies and the memory for others. */
 long split_process(void)
 {
@@ -205,38 +189,6 @@ long split_process(void)
     if (room.memory)
         munmap(room.memory, room.bytes);
     return 0;
-}
-
-static int last_end;
-
-int has_ended(long process)
-{
-    return waitpid((pid_t)process, &last_end, WNOHANG) != 0;
-}
-
-int has_other_parent(long parent)
-{
-    return getppid() != parent;
-}
-
-void end_like(long process)
-{
-    (void)process;
-    if (WIFSIGNALED(last_end)) {
-        signal(WTERMSIG(last_end), SIG_DFL);
-        raise(WTERMSIG(last_end));
-    }
-    _exit(WIFEXITED(last_end) ? WEXITSTATUS(last_end) : 1);
-}
-
-void nap(long nanoseconds)
-{
-    nanosleep(&(struct timespec){0, nanoseconds}, NULL);
-}
-
-void yield_processor(void)
-{
-    sched_yield();
 }
 
 void *load_library(const char *path, const char **wrong)

@@ -7,6 +7,7 @@
 #include <psapi.h>
 
 #include "platform.h"
+#include "system.h"
 
 #define LONGEST_PATH 4096
 
@@ -52,16 +53,11 @@ static int widen(const char *path, wchar_t wide[LONGEST_PATH])
     return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, LONGEST_PATH);
 }
 
-/* Replies go to a handle that the process got, by its number, or to a pipe or file. */
 int settle(const char *place)
 {
     wchar_t path[LONGEST_PATH];
     if (!GetCurrentDirectoryW(LONGEST_PATH, working_folder))
         return 0;
-    if (*place >= '0' && *place <= '9') {
-        replies = (HANDLE)(uintptr_t)strtoull(place, NULL, 10);
-        return 1;
-    }
     if (!widen(place, path))
         return 0;
     replies = CreateFileW(path, GENERIC_WRITE, FILE_SHARE_READ | FILE_SHARE_WRITE, NULL, OPEN_EXISTING, 0, NULL);
@@ -149,53 +145,33 @@ void *guarded_memory(size_t bytes)
     return memory + usable - bytes;
 }
 
-void *shared_memory(size_t bytes)
+/* Components of a system do not run here: there are no processes for them. */
+void start_process(struct component *c)
 {
-    (void)bytes;
+    (void)c;
+    give_up("components cannot have processes of their own here");
+}
+
+struct outcome ask_process(struct component *c)
+{
+    (void)c;
+    return done;
+}
+
+void end_process_of(struct component *c)
+{
+    (void)c;
+}
+
+void send_plan(struct component *c, const struct request *r)
+{
+    (void)c, (void)r;
+}
+
+double *shared_numbers(struct component *c, size_t count)
+{
+    (void)c, (void)count;
     return NULL;
-}
-
-void release_memory(void *memory, size_t bytes)
-{
-    (void)memory, (void)bytes;
-}
-
-long own_process(void)
-{
-    return (long)GetCurrentProcessId();
-}
-
-long split_process(void)
-{
-    return -1;
-}
-
-int has_ended(long process)
-{
-    (void)process;
-    return 1;
-}
-
-int has_other_parent(long parent)
-{
-    (void)parent;
-    return 0;
-}
-
-void end_like(long process)
-{
-    (void)process;
-    ExitProcess(1);
-}
-
-void nap(long nanoseconds)
-{
-    Sleep((DWORD)(nanoseconds / 1000000));
-}
-
-void yield_processor(void)
-{
-    SwitchToThread();
 }
 
 void *load_library(const char *path, const char **wrong)

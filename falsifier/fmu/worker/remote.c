@@ -5,12 +5,21 @@
  * the answers. Both wait awake for a short time and sleep then. If the process ends by itself, that of the
  * master ends in the same way: whoever waits for it then knows how, and which component ran. */
 
+#define _DEFAULT_SOURCE
+#define _DARWIN_C_SOURCE
+
+#include <sched.h>
 #include <setjmp.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "platform.h"
+#include "sandbox.h"
 #include "system.h"
 
 /* Pages that nobody writes to take no memory. */
@@ -26,7 +35,8 @@
 
 struct process {
     _Atomic uint64_t asked, answered;
-    long parent, id;
+    pid_t parent, id;
+    int status; /* with which it has ended */
     size_t plan_bytes; /* of a request behind this structure */
     struct exchange exchange;
     double numbers[];
@@ -35,9 +45,9 @@ struct process {
 /* The part of the memory that is not the structure, in bytes. */
 #define ROOM_BYTES (SHARED_BYTES - sizeof(struct process))
 
-static int is_over(const struct process *p, int is_master)
+static void nap(long nanoseconds)
 {
-    return is_master ? has_ended(p->id) : has_other_parent(p->parent);
+    nanosleep(&(struct timespec){0, nanoseconds}, NULL);
 }
 
 /* Wait until a counter reaches a number; return 0 if the process that counts has ended. */
@@ -48,12 +58,12 @@ static int await(struct process *p, _Atomic uint64_t *counter, uint64_t number)
         if (atomic_load_explicit(counter, memory_order_acquire) == number)
             return 1;
         if (k % LOOKS_PER_YIELD == 0)
-            yield_processor();
+            sched_yield();
     }
     for (long length = FIRST_NAP; atomic_load_explicit(counter, memory_order_acquire) != number;) {
         nap(length);
         length = length + length / 32 < LONGEST_NAP ? length + length / 32 : LONGEST_NAP;
-        if (is_over(p, is_master))
+        if (is_master ? waitpid(p->id, &p->status, WNOHANG) != 0 : getppid() != p->parent)
             return atomic_load_explicit(counter, memory_order_acquire) == number;
     }
     return 1;
@@ -107,12 +117,14 @@ static void serve(struct component *c)
 /* Fork the process of a component, which has nothing of the others and of the master but this memory. */
 void start_process(struct component *c)
 {
-    struct process *p = c->process = shared_memory(SHARED_BYTES);
-    if (!p)
+    struct process *p =
+        mmap(NULL, SHARED_BYTES, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (p == MAP_FAILED)
         give_up("not enough memory for the processes of the components");
+    c->process = p;
     c->exchange = &p->exchange;
-    p->parent = own_process();
-    p->id = split_process();
+    p->parent = getpid();
+    p->id = (pid_t)split_process();
     if (p->id < 0)
         give_up("components cannot have processes of their own here; use isolation = \"together\"");
     if (p->id)
@@ -120,7 +132,7 @@ void start_process(struct component *c)
     for (size_t k = 0; k < c->system->count; k++) {
         struct component *other = &c->system->components[k];
         if (other != c && other->process) {
-            release_memory(other->process, SHARED_BYTES);
+            munmap(other->process, SHARED_BYTES);
             other->process = NULL;
         }
     }
@@ -130,9 +142,8 @@ void start_process(struct component *c)
 /* Wait for the end of a process that was asked to unload its library. */
 void end_process_of(struct component *c)
 {
-    while (!has_ended(c->process->id))
-        nap(FIRST_NAP);
-    release_memory(c->process, SHARED_BYTES);
+    waitpid(c->process->id, NULL, 0);
+    munmap(c->process, SHARED_BYTES);
     c->process = NULL;
 }
 
@@ -141,7 +152,7 @@ struct outcome ask_process(struct component *c)
 {
     struct process *p = c->process;
     if (!await(p, &p->answered, count_up(&p->asked)))
-        end_like(p->id);
+        end_like(p->status);
     struct exchange *x = c->exchange;
     x->text[sizeof x->text - 1] = '\0'; /* the FMU may have written there */
     failing = x->text;
@@ -160,11 +171,8 @@ void send_plan(struct component *c, const struct request *r)
     memcpy(p->numbers, r->at, p->plan_bytes);
 }
 
-/* Memory for the numbers that a component is given and that are read from it. */
-double *exchanged_numbers(struct component *c, size_t count)
+double *shared_numbers(struct component *c, size_t count)
 {
-    if (!c->process)
-        return need(count, sizeof(double));
     if (count > ROOM_BYTES / sizeof(double))
         give_up("its variables are too many for a process of its own; use isolation = \"together\"");
     return c->process->numbers;

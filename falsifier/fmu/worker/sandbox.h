@@ -55,5 +55,6 @@ uint64_t memory_used(pid_t worker, unsigned enforced);
 /* guard.c: returns in the process that is to run the FMU; the one that has called it watches that process. */
 void start_guarded(void);
 int read_exactly(int from, void *target, size_t count); /* returns 0 at the end of what is read */
+void end_like(int status) __attribute__((noreturn)); /* as a process that has ended with this status */
 
 #endif

@@ -24,8 +24,6 @@
 /* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
 #define ABSOLUTE_SHARE 0.01
 
-static const struct outcome done = {0, DONE};
-
 /* Numbers that the FMU writes end where accessible memory ends: an FMU that writes past them crashes there. */
 static double *guarded(size_t count)
 {
@@ -65,11 +63,6 @@ void prepare_solver(struct fmu *fmu, struct plan *plan)
         *z[i] = guarded(s->indicators);
 }
 
-static struct outcome checked(unsigned status)
-{
-    return (struct outcome){status, status > 1 ? GETTING : DONE};
-}
-
 static struct outcome start(struct solver *s)
 {
     struct inputs *both[] = {&s->plan->inputs, &s->plan->held};
@@ -86,12 +79,12 @@ static struct outcome start(struct solver *s)
     }
     for (size_t i = 0; i < s->indicators; i++)
         s->z[i] = s->new_z[i] = 0.0;
-    struct outcome o = checked(get_nominals(s, s->weights));
+    struct outcome o = checked(get_nominals(s, s->weights), GETTING);
     for (size_t i = 0; i < s->n; i++) {
         double nominal = s->weights[i] > 0.0 ? s->weights[i] : 1.0;
         s->weights[i] = ABSOLUTE_SHARE * s->plan->solver_tolerance * nominal;
     }
-    return o.where == DONE ? checked(get_states(s)) : o;
+    return o.where == DONE ? checked(get_states(s), GETTING) : o;
 }
 
 /* Get from initialisation to continuous time, handling the events at time 0. */
@@ -111,7 +104,7 @@ struct outcome begin_solving(struct fmu *fmu, const struct event_info_1 *first)
     }
     if (o.where == DONE && s->fmu->major > 1) {
         /* Event mode may have changed the states, whether the FMU reports it or not. */
-        o = checked(get_states(s));
+        o = checked(get_states(s), GETTING);
         if (o.where == DONE)
             o = refresh(s);
     }
@@ -258,17 +251,13 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
 {
     double h = step_size(s, target);
     struct outcome o = accepted_step(s, &h);
+    if (o.where == DONE)
+        o = checked(get_indicators(s, s->new_z), EVENT);
+    *wants_event = o.where == DONE && changes_sign(s, s->new_z);
+    if (*wants_event)
+        o = stop_at_event(s, &h);
     if (o.where != DONE)
         return o;
-    unsigned status = get_indicators(s, s->new_z);
-    if (status > 1)
-        return (struct outcome){status, EVENT};
-    *wants_event = changes_sign(s, s->new_z);
-    if (*wants_event) {
-        o = stop_at_event(s, &h);
-        if (o.where != DONE)
-            return o;
-    }
     double end = s->time + h;
     s->time = target - end <= rounding(target) ? target : end;
     memcpy(s->x, s->new_x, s->n * sizeof(double));
@@ -279,11 +268,11 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
         s->jacobian_known = 0;
     }
     int asks, ends;
-    status = complete_step(s, &asks, &ends);
-    if (status > 1)
-        return (struct outcome){status, STEPPING};
+    o = checked(complete_step(s, &asks, &ends), STEPPING);
     *wants_event = *wants_event || asks;
-    return (struct outcome){status, ends ? TERMINATED : DONE};
+    if (o.where == DONE && ends)
+        o.where = TERMINATED;
+    return o;
 }
 
 /* Handle an event, unless there were too many since the last output. */

@@ -9,7 +9,6 @@
 /* Connected outputs that the error of a system that does not converge names. */
 #define MOST_NAMED 6
 
-static const struct outcome done = {0, DONE};
 /* The position of an output takes up to 20 characters, a change up to 25. */
 static char named[48 * (MOST_NAMED + 1)];
 

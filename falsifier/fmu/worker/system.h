@@ -107,7 +107,7 @@ void start_process(struct component *c);
 struct outcome ask_process(struct component *c);
 void end_process_of(struct component *c);
 void send_plan(struct component *c, const struct request *r);
-double *exchanged_numbers(struct component *c, size_t count);
+double *shared_numbers(struct component *c, size_t count); /* that it is given, or that are read from it */
 
 /* system_request.c */
 void read_components(struct request *r, struct system *s);

@@ -53,7 +53,8 @@ static void make_exchange(struct component *c)
     size_t inputs = plan->inputs.ports.count + plan->held.ports.count;
     size_t in = larger(inputs, plan->parameters.count), out = larger(c->connected.count, plan->outputs.count);
     size_t lines = c->fmu.is_model_exchange ? inputs * plan->inputs.pieces : 0;
-    double *numbers = exchanged_numbers(c, in + out + 5 * lines);
+    size_t count = in + out + 5 * lines;
+    double *numbers = c->process ? shared_numbers(c, count) : need(count, sizeof(double));
     c->in = numbers;
     c->out = numbers + in;
     struct piece *line = (struct piece *)(numbers + in + out);

@@ -30,6 +30,14 @@ struct outcome {
     enum where where;
 };
 
+static const struct outcome done = {0, DONE};
+
+/* Whether a simulation stops here for a status, which is the case if it is worse than a warning. */
+static inline struct outcome checked(unsigned status, enum where where)
+{
+    return (struct outcome){status, status > 1 ? where : DONE};
+}
+
 typedef unsigned (*without_arguments)(void *);
 typedef unsigned (*update_discrete_states_3)(
     void *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, uint8_t *, double *);
@@ -162,7 +170,7 @@ void forget_state(struct fmu *fmu);
 
 /* co_simulation.c */
 void find_step_functions(struct fmu *fmu);
-struct outcome begin_steps(struct fmu *fmu); /* after the initialisation */
+struct outcome begin_steps(struct fmu *fmu); /* after the initialisation or an event */
 struct outcome change_at_event(struct fmu *fmu, const struct ports *ports);
 struct outcome do_step(struct fmu *fmu, double start, double end, int *ends);
 
