@@ -52,13 +52,11 @@ class Shortfall:
         quantity: what it compares, the side that is not a plain number.
         value: its value at ``time``.
         limit: value of the other side at ``time``.
-        unit: unit of both; empty if unknown.
         start: start of the violating interval in s; of what was never reached, of its window.
         end: end of that interval in s.
         time: when it was farthest from holding, in s; of what was never reached, when it was nearest.
         never: whether it had to hold at some time of the interval only, and never did.
-        reading: the value in words.
-        sought: what held at no time of a window, if this is what it lacked where it came nearest, in words.
+        what: the comparison, the interval and the value in words.
         context: what made it necessary, such as conditions that held, in words.
     """
 
@@ -66,25 +64,12 @@ class Shortfall:
     quantity: str
     value: float
     limit: float
-    unit: str
     start: float
     end: float
     time: float
     never: bool
-    reading: str
-    sought: str = ""
+    what: str
     context: tuple[str, ...] = ()
-
-    @property
-    def what(self) -> str:
-        """The comparison, the interval and the value, without the context."""
-        over, sought = _over(self.start, self.end), self.sought and f"{self.sought}, but there "
-        at = "" if self.start == self.end else f" at {seconds(self.time)}"
-        limit = ", exactly on its limit" if self.value == self.limit else ""
-        if self.never and at:
-            nearest = f"; nearest was {self.reading}{at}{limit}" if " = " in self.reading else ""
-            return f"{sought}{self.part} held at no time {over}{nearest}"
-        return f"{sought}{self.part} was violated {over}: {self.reading}{at}{limit}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,24 +301,29 @@ class _Search:
         quantity, other = compared_sides(predicate)
         value, limit = (float(side.evaluate(values)) for side in (quantity, other))
         unit = unit_of(quantity, units) or unit_of(other, units)
-        if isinstance(predicate, Flag) and not unit and value in (0.0, 1.0):
+        is_truth = isinstance(predicate, Flag) and not unit and value in (0.0, 1.0)
+        reading = valued(quantity, values, value - limit, unit)
+        if is_truth:
             reading = f"{quantity} was {'true' if value else 'false'}"
+        elif not isinstance(other, Number):
+            reading += f", {valued(other, values, value - limit, unit_of(other, units) or unit)}"
+        reading += "" if first == last else f" at {seconds(self._time(sample))}"
+        reading += ", exactly on its limit" if value == limit else ""
+        over = _over(self._time(first), self._time(last))
+        if window and first != last:
+            what = f"{demand.text} held at no time {over}" + ("" if is_truth else f"; nearest was {reading}")
         else:
-            reading = valued(quantity, values, value - limit, unit)
-            if not isinstance(other, Number):
-                reading += f", {valued(other, values, value - limit, unit_of(other, units) or unit)}"
+            what = f"{demand.text} was violated {over}: {reading}"
         return Shortfall(
             part=demand.text,
             quantity=str(quantity),
             value=value,
             limit=limit,
-            unit=unit,
             start=self._time(first),
             end=self._time(last),
             time=self._time(sample),
             never=window is not None,
-            reading=reading,
-            sought=spot.sought,
+            what=f"{spot.sought}, but there {what}" if spot.sought else what,
             context=(*spot.notes, *(f"while {self._held(d, sample, now=True)}" for d in spot.held)),
         )
 

@@ -28,7 +28,7 @@ def test_of_an_implication_the_consequence_is_told_while_the_condition_held() ->
     )
     found = breach.main
     assert (found.part, found.quantity, found.value, found.limit) == ("error <= 3", "error", 9.4, 3.0)
-    assert (found.unit, found.start, found.end, found.time) == ("mm", 2.0, 4.0, 4.0)
+    assert (found.start, found.end, found.time) == (2.0, 4.0, 4.0)
     assert not found.never
 
 

@@ -76,7 +76,8 @@ def _found(shown: Shown) -> list[str]:
         parts.append(markdown_text(one_line(shown.explanation)))
     if shown.confirmed:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
-    parts.append(_facts(margin_facts(shown.verdict, shown.units)))
+    if shown.run.falsified:
+        parts.append(_facts(margin_facts(shown.verdict, shown.units)))
     if advice(shown):
         parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
     return parts

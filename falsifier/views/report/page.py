@@ -276,7 +276,8 @@ def _seconds(run: Run) -> str:
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     run, rationale = shown.run, shown.candidate.rationale
-    facts = [*margin_facts(shown.verdict, shown.units), *level_facts(run)]
+    facts = margin_facts(shown.verdict, shown.units) if run.falsified else []
+    facts += level_facts(run)
     facts += [("rationale", rationale)] if rationale else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:

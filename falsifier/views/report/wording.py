@@ -18,11 +18,10 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.search.refine_levels import level_results
 from falsifier.search.request import LLMSettings, RunRequest
-from falsifier.stl import Verdict, parse
-from falsifier.stl.margins import is_on_limit, margin_words
+from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
 from falsifier.views.report.content import Content, Section, Shown, searches
-from falsifier.views.text import Fact
+from falsifier.views.text import Fact, broken_facts, margin_facts
 
 _BETWEEN = {
     "constant": "held until the next row",
@@ -79,34 +78,13 @@ def result_text(section: Section) -> str:
 
 
 def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
-    """Return the limit, the value reached and when; without a violation, how near it came.
+    """Return what broke; without a violation, how near it came.
 
     Args:
         verdict: robustness, and what decided it.
         units: units of the signals, by name.
     """
-    if verdict.breach is not None:
-        main, never = verdict.breach.main, verdict.breach.main.never
-        unit = f" {main.unit}" if main.unit and main.part[-1].isdigit() else ""
-        span = f"from {main.start:.6g} s to {main.end:.6g} s" if main.start != main.end else ""
-        return [
-            ("required", f"{main.part}{unit}" + (" at some time" if never else "")),
-            ("nearest" if never else "reached", main.reading),
-            ("never held" if never else "violated", span or f"at {main.time:.6g} s"),
-            *([("worst", f"at {main.time:.6g} s")] if span and not never else []),
-            *(("", line) for line in verdict.breach.lines[1:]),
-        ]
-    signals = parse(verdict.predicate).signals
-    read = (f"{n} = {v:.6g} {units.get(n, '')}".strip() for n, v in verdict.values.items() if n in signals)
-    values = ", ".join(read)
-    robustness = f"{verdict.robustness:.6g} away from a violation"
-    if is_on_limit(verdict.robustness):
-        robustness = margin_words(verdict.robustness, verdict.predicate)
-    return [
-        ("decided by", verdict.predicate),
-        ("nearest", f"{robustness}: {values}" if values else robustness),
-        ("when", f"at {verdict.critical_time:.6g} s"),
-    ]
+    return broken_facts(verdict) or margin_facts(verdict, units)
 
 
 def input_table(shown: Shown) -> Table:

@@ -57,7 +57,7 @@ def test_a_run_is_shown_as_in_its_report_with_how_the_search_goes(tmp_path: Path
     falsify(hard(), "uniform", budget=20, directory=tmp_path / "run")
     text, behind = Watch(tmp_path / "run").look()
     assert not behind
-    assert 'class="card violated"' in text and "reached" in text
+    assert 'class="card violated"' in text and "was violated" in text
     for title in ("Robustness over simulations", "What was tried", "What it costs"):
         assert f"<h3>{title}</h3>" in text
     assert text.count("data:image/svg+xml") == 3
