@@ -11,7 +11,7 @@
 
 import shutil
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -35,7 +35,6 @@ from falsifier.counterexamples.export.tables import (
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.problem import Problem
-from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.stl.lexer import name_text
 
 _NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -228,43 +227,18 @@ def _spec(member: Member, seen: Seen, problem: Problem) -> str:
         "deny": list(getattr(problem.model, "deny", ())) or None,
     }
     document["model"] = {key: value for key, value in model.items() if value is not None}
-    document["inputs"] = dict(_inputs(member, seen))
     document["parameters"] = dict(seen.start)
+    bounds = []
+    for name, column in seen.outputs.columns.items():
+        low, high = float(column.min()), float(column.max())
+        low, high = low - _MARGIN * max(1.0, abs(low)), high + _MARGIN * max(1.0, abs(high))
+        bounds.append(f"{name_text(name)} >= {low!r} and {name_text(name)} <= {high!r}")
     requirement = {
-        "formula": f"G ({' and '.join(_bounds(seen.outputs))})",
+        "formula": f"G ({' and '.join(bounds)})",
         "description": "The outputs stay in the range that they had in the system.",
     }
     document["requirements"] = {"as_in_the_system": requirement}
     return tomlkit.dumps(document)
-
-
-def _bounds(outputs: InputTable) -> Iterator[str]:
-    for name, column in outputs.columns.items():
-        low, high = _around(column)
-        yield f"{name_text(name)} >= {low!r} and {name_text(name)} <= {high!r}"
-
-
-def _inputs(member: Member, seen: Seen) -> Iterator[tuple[str, dict[str, object]]]:
-    for name, column in seen.inputs.columns.items():
-        low, high = _range(column, member.description.info[name])
-        if low < high:
-            yield name, {"range": [low, high], "control_points": DEFAULT_POINTS}
-
-
-def _range(column: Floats, variable: Variable) -> tuple[float, float]:
-    """Return the range of an input; of a constant real one some range that the FMU allows."""
-    low, high = float(column.min()), float(column.max())
-    if low == high and variable.kind == "real":
-        high = low + 1.0
-        if variable.high is not None and high > variable.high:
-            low, high = low - 1.0, low
-    least = low if variable.low is None else max(low, variable.low)
-    return least, high if variable.high is None else min(high, variable.high)
-
-
-def _around(column: Floats) -> tuple[float, float]:
-    low, high = float(column.min()), float(column.max())
-    return low - _MARGIN * max(1.0, abs(low)), high + _MARGIN * max(1.0, abs(high))
 
 
 def write_package(system: System, stop_time: float, resources: Mapping[str, Path], path: Path) -> Path:
