@@ -1,14 +1,10 @@
 import json
 import os
 import shutil
-import sys
-from contextlib import chdir, redirect_stderr, redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import pytest
 
-from falsifier.cli import main
 from falsifier.core.files import bundled
 from tests.command import Done, falsifier
 from tests.llm.server import Step, serving
@@ -16,18 +12,7 @@ from tests.pictures import CRITICAL, OUTPUT, colours
 
 
 def run(folder: Path, *arguments: str) -> Done:
-    """Run ``falsifier`` in this process, in a folder."""
-    out, err = StringIO(), StringIO()
-    with (
-        chdir(folder),
-        redirect_stdout(out),
-        redirect_stderr(err),
-        pytest.MonkeyPatch.context() as patch,
-        pytest.raises(SystemExit) as ended,
-    ):
-        patch.setattr(sys, "argv", ["falsifier", *arguments])
-        main()
-    return Done(int(ended.value.code or 0), out.getvalue(), err.getvalue())
+    return falsifier(*arguments, cwd=folder)
 
 
 @pytest.fixture(scope="module")
