@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 from graphlib import TopologicalSorter
-from importlib import import_module
 from pathlib import Path
 
 import falsifier
@@ -69,36 +68,6 @@ def test_imports_point_upwards_in_the_list() -> None:
 def module_name(path: Path) -> str:
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-FMU = PACKAGE / "fmu"
-# What few commands need is a room of one file, which the door of fmu does not import.
-ROOMS_OF_FMU = (FMU, *(p.parent for p in FMU.glob("*/__init__.py")), FMU / "build")
-DOORS = {module_name(room): room for room in ROOMS_OF_FMU}
-
-
-def past_a_door(path: Path) -> list[str]:
-    """Imports of what a room does not export, from outside; and through the room's own door, from inside."""
-    wrong = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        found = {alias.name: set[str]() for alias in node.names} if isinstance(node, ast.Import) else {}
-        if isinstance(node, ast.ImportFrom) and node.module:
-            found = {node.module: {alias.name for alias in node.names}}
-        for source, names in found.items():
-            door = max((d for d in DOORS if f"{source}.".startswith(f"{d}.")), key=len, default="")
-            if not door:
-                continue
-            inside = DOORS[door] in path.parents
-            allowed = {p.stem for p in DOORS[door].iterdir()} if inside else set(import_module(door).__all__)
-            if (source == door and names - allowed) or (source != door and not inside):
-                wrong.append(f"{path.relative_to(PACKAGE)} imports {sorted(names) or ''} of {source}")
-    return wrong
-
-
-def test_nothing_imports_past_a_door_of_fmu() -> None:
-    assert len(DOORS) == 6
-    wrong = [said for p in sources() for said in past_a_door(p)]
-    assert not wrong, "\n".join(wrong)
 
 
 def test_there_is_no_circle() -> None:

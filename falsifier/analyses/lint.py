@@ -13,7 +13,7 @@ from falsifier.core.words import counted, listed
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import read_structure
+from falsifier.fmu.description.structure import read_structure
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.source import ProblemSource

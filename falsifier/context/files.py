@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 
 from falsifier.core.secrets import line_of_held_secret, line_of_secret
 from falsifier.errors import SpecError
-from falsifier.fmu.description import UNREADABLE, open_archive
+from falsifier.fmu.description.archive import UNREADABLE, open_archive
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
 _RESOURCES = (".txt", ".md", ".json")

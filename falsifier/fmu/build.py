@@ -12,7 +12,9 @@ from xml.etree.ElementTree import Element
 
 from falsifier.core.compiler import compile_c
 from falsifier.errors import ModelError
-from falsifier.fmu.description import extract, library_file, read_description, read_xml, this_platform
+from falsifier.fmu.description.archive import extract, library_file, this_platform
+from falsifier.fmu.description.model_description import read_description
+from falsifier.fmu.description.xml import read_xml
 from falsifier.fmu.model import FmuModel
 
 __all__ = ["compile_sources"]

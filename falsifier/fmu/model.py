@@ -14,9 +14,12 @@ from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
-from falsifier.fmu.description import WINDOWS, Description, describe, file_hash, needed_tool_text
-from falsifier.fmu.process import Coupling, Isolated, Member, Network, Order, Place, load, simulate
-from falsifier.fmu.systems import System
+from falsifier.fmu.description.archive import WINDOWS, file_hash
+from falsifier.fmu.description.model_description import Description, describe, needed_tool_text
+from falsifier.fmu.process.network import Coupling, Member, Network, Place
+from falsifier.fmu.process.order import Order
+from falsifier.fmu.process.registry import Isolated, load, simulate
+from falsifier.fmu.systems.system import System
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from pydantic import (
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
-from falsifier.fmu.systems import Extrapolation, Isolation, Loops, Method
+from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
-from falsifier.fmu.ssp import SUFFIXES as PACKAGES
+from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import ModelChanges
 
 # Name of the requirement that a formula makes if it is given without a name.

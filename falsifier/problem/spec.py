@@ -19,7 +19,7 @@ from pydantic.fields import FieldInfo
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, rejected
-from falsifier.fmu.ssp import SUFFIXES as PACKAGES
+from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
     Components,
     Connections,

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from falsifier.core.literals import toml_string
 from falsifier.core.model import ModelInfo
-from falsifier.fmu.description import Units
+from falsifier.fmu.description.structure import Units
 from falsifier.problem.template_arguments import tidy
 from falsifier.problem.templates import TEMPLATES
 from falsifier.problem.unit_check import factor_and_offset, spelled

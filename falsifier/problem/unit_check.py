@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from falsifier.core.model import Model, ModelInfo
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import Units, conversion, is_known, read_structure
+from falsifier.fmu.description.structure import Units, conversion, is_known, read_structure
 from falsifier.stl import Formula
 from falsifier.stl.expression import Arithmetic, Call, Expression, Number, unit_of
 from falsifier.stl.formula import Predicate

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import counted
 from falsifier.fmu import System
-from falsifier.fmu.systems import SYSTEM, Link, Place, late_links
+from falsifier.fmu.process.network import SYSTEM, Link, Place
+from falsifier.fmu.systems.step_order import late_links
 from falsifier.views.text import aligned
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from falsifier.core import posix_files
 from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.description.archive import this_platform
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 from tests.command import ROOT, falsifier
 from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel, System
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.worker import Worker
 from tests.patience import HANG

@@ -7,7 +7,7 @@ import pytest
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 from tests.fmu.fixtures import isolated, path, run
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")

@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description import Unit
+from falsifier.fmu.description.structure import Unit
 from falsifier.problem.unit_check import defined_units, factor_and_offset, unit_conflicts
 from falsifier.stl import parse
 from falsifier.testing import lag_problem

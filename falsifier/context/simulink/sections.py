@@ -7,7 +7,8 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.description import UNREADABLE, open_archive, read_xml
+from falsifier.fmu.description.archive import UNREADABLE, open_archive
+from falsifier.fmu.description.xml import read_xml
 
 _MAX_DEPTH = 200
 _OPENING = re.compile(r"([\w.$:/+-]++)\s*+\{$")

@@ -33,7 +33,7 @@ from falsifier.counterexamples.export.tables import (
     write_json,
 )
 from falsifier.fmu import FmuModel, System
-from falsifier.fmu.systems import SYSTEM, Link, Member, Network, Place
+from falsifier.fmu.process.network import SYSTEM, Link, Member, Network, Place
 from falsifier.problem.problem import Problem
 from falsifier.stl.lexer import name_text
 

@@ -11,7 +11,8 @@ from urllib.parse import quote
 import numpy as np
 
 from falsifier.errors import ModelError
-from falsifier.fmu.description import Description, windows_path
+from falsifier.fmu.description.libraries import windows_path
+from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process.network import Member
 
 # Storage types of values; their position is the number that request.c reads.

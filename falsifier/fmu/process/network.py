@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from falsifier.core.model import Interface
-from falsifier.fmu.description import Description
+from falsifier.fmu.description.model_description import Description
 
 Method = Literal["gauss-seidel", "jacobi"]
 Loops = Literal["refuse", "delay", "iterate"]

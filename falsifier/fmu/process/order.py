@@ -9,7 +9,7 @@ from pathlib import Path
 
 from falsifier.core.model import GRID_ROUNDING, Interface
 from falsifier.errors import FalsifierError, SimulationError, SpecError
-from falsifier.fmu.description import Description
+from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process import encoding, outcome
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.network import SYSTEM, Member, Network, Place

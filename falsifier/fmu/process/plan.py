@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
 from falsifier.errors import ModelError, SimulationError, SpecError, did_you_mean
-from falsifier.fmu.description import Description
+from falsifier.fmu.description.model_description import Description
 
 _DEFAULT_TOLERANCE = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
 from falsifier.errors import ModelError
-from falsifier.fmu.description import HOW_TO_INSTALL, find_wine, windows_path
+from falsifier.fmu.description.libraries import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 from falsifier.core.posix import exit_text
 from falsifier.errors import ModelError
-from falsifier.fmu.description import HOW_TO_INSTALL
+from falsifier.fmu.description.libraries import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import (
     QUICK_SECONDS,
     Closed,

@@ -20,7 +20,7 @@ from falsifier.core.compiler import compile_c
 from falsifier.core.files import cache_directory, checksum, private_folder
 from falsifier.core.secrets import holds_secrets, scrubbed
 from falsifier.errors import ModelError
-from falsifier.fmu.description import WINDOWS, extract, file_hash, this_platform
+from falsifier.fmu.description.archive import WINDOWS, extract, file_hash, this_platform
 
 _PREFIX = "falsifier-fmu-"
 _LOCK_SUFFIX = ".lock"

@@ -11,7 +11,9 @@ from typing import TypeVar
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.description import Unit, is_true, read_units, read_xml
+from falsifier.fmu.description.structure import Unit, read_units
+from falsifier.fmu.description.variables import is_true
+from falsifier.fmu.description.xml import read_xml
 
 T = TypeVar("T")
 _NAMESPACE = "{http://ssp-standard.org/SSP"

@@ -14,8 +14,9 @@ from urllib.parse import unquote, urlsplit
 
 from falsifier.core.model import Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
-from falsifier.fmu.description import Unit, conversion, extract, file_hash
-from falsifier.fmu.process import WorkFolder
+from falsifier.fmu.description.archive import extract, file_hash
+from falsifier.fmu.description.structure import Unit, conversion
+from falsifier.fmu.process.workplace import WorkFolder
 from falsifier.fmu.ssp.markup import Binding, Transformation, Value, parse_mappings, parse_values
 
 SUFFIXES = (".ssp", ".ssd")

@@ -10,17 +10,14 @@ from pathlib import Path
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
-from falsifier.fmu.description import (
-    Description,
-    Unit,
-    conversion,
-    file_hash,
-    read_description,
-    read_structure,
-)
+from falsifier.fmu.description.archive import file_hash
+from falsifier.fmu.description.model_description import Description, read_description
+from falsifier.fmu.description.structure import Unit, conversion, read_structure
+from falsifier.fmu.process.network import Coupling
 from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, Wire, parse_structure
 from falsifier.fmu.ssp.package import SUFFIXES, Given, Package, bound_values
-from falsifier.fmu.systems import Component, Connection, Coupling, Frame, System
+from falsifier.fmu.systems.components import Component, Connection, Frame
+from falsifier.fmu.systems.system import System
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
 _INTERFACES: Mapping[str, Interface | None] = {

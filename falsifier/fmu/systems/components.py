@@ -10,8 +10,10 @@ from typing import get_args
 from falsifier.core.arguments import one_of, positive
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
-from falsifier.fmu.description import Description, Slot, file_hash
-from falsifier.fmu.process import SYSTEM, Extrapolation, Link, Member, Place, full_name
+from falsifier.fmu.description.archive import file_hash
+from falsifier.fmu.description.model_description import Description
+from falsifier.fmu.description.variables import Slot
+from falsifier.fmu.process.network import SYSTEM, Extrapolation, Link, Member, Place, full_name
 
 # Maximum number of connections in the description that people and language models read.
 _SHOWN_LINKS = 40

@@ -8,8 +8,8 @@ are late by one communication step.
 from collections.abc import Iterable, Iterator, Sequence
 from graphlib import CycleError, TopologicalSorter
 
-from falsifier.fmu.description import Structure
-from falsifier.fmu.process import SYSTEM, Link, Member, Place
+from falsifier.fmu.description.structure import Structure
+from falsifier.fmu.process.network import SYSTEM, Link, Member, Place
 
 
 class Dependencies:

@@ -12,18 +12,9 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.process import (
-    Coupling,
-    Extrapolation,
-    Isolated,
-    Isolation,
-    Loops,
-    Method,
-    Network,
-    Order,
-    own_steps,
-    simulate,
-)
+from falsifier.fmu.process.network import Coupling, Extrapolation, Isolation, Loops, Method, Network
+from falsifier.fmu.process.order import Order, own_steps
+from falsifier.fmu.process.registry import Isolated, simulate
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.wiring import make_network
 

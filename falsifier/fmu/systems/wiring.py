@@ -7,8 +7,18 @@ from typing import get_args
 from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
-from falsifier.fmu.description import Structure, conversion, describe, read_structure
-from falsifier.fmu.process import SYSTEM, Coupling, Extrapolation, Link, Member, Network, Place, full_name
+from falsifier.fmu.description.model_description import describe
+from falsifier.fmu.description.structure import Structure, conversion, read_structure
+from falsifier.fmu.process.network import (
+    SYSTEM,
+    Coupling,
+    Extrapolation,
+    Link,
+    Member,
+    Network,
+    Place,
+    full_name,
+)
 from falsifier.fmu.systems.components import Component, Connection, Frame, merged
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 

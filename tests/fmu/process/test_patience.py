@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import SimulationError
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.process.plan import make_plan
 from falsifier.fmu.process.worker import Patience
 from tests.fmu import fixtures

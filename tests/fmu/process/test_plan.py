@@ -4,7 +4,7 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu.description import read_description
+from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 

@@ -13,8 +13,9 @@ import pytest
 
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import this_platform
-from falsifier.fmu.process import REGISTRY, workplace
+from falsifier.fmu.process import workplace
 from falsifier.fmu.process.connection import Request, Where
+from falsifier.fmu.process.registry import REGISTRY
 from falsifier.fmu.process.worker import REUSES
 from falsifier.fmu.process.workplace import WORKER
 from tests.fmu import fixtures

@@ -4,7 +4,8 @@ import struct
 from pathlib import Path
 
 from falsifier.core.model import ModelInfo
-from falsifier.fmu.description import Description, Slot
+from falsifier.fmu.description.model_description import Description
+from falsifier.fmu.description.variables import Slot
 from falsifier.fmu.process import encoding
 from falsifier.fmu.process.rights import Rights, described, encoded, hidden_places, read_told
 from falsifier.fmu.process.workplace import MORE, worker_environment

@@ -13,7 +13,7 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
-from falsifier.fmu.process import Order
+from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
 from falsifier.fmu.process.runner import Runner
 from tests import patience

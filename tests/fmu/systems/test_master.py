@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import Component, Coupling
-from falsifier.fmu.systems import Method
+from falsifier.fmu.process.network import Method
 from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, STEP, loop, run, sampled_loop, solved, system
 from tests.fmu.support import ERROR, NAN
