@@ -87,15 +87,6 @@ def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
         falsify(lag_problem(), budget=2, directory="a")
 
 
-def test_an_fmu_that_is_none_is_said_plainly(tmp_path: Path) -> None:
-    (tmp_path / "bad.fmu").write_bytes(b"this is no archive")
-    done = falsifier("run", "bad.fmu", "--stl", "G (x >= 0)", cwd=tmp_path)
-    assert "no requirement to check; add --template" in falsifier("check", "bad.fmu", cwd=tmp_path).err
-    assert done.code == 2
-    assert "bad.fmu" in done.err
-    assert "Traceback" not in done.err
-
-
 def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from falsifier.cli import main; main()", "run", "AT1"]
     options = ["--engine", "uniform", "--budget", "1000000", "--out", "run"]
@@ -135,28 +126,6 @@ def test_parameters_alone_cannot_be_refined(tmp_path: Path) -> None:
     done = falsifier("run", str(fixture("CheapLag_2")), *stl, "--refine", cwd=tmp_path)
     assert done.code == 0, done.err
     assert "--refine: no input is searched" in done.err
-
-
-def test_a_run_directory_is_new_and_can_be_written(tmp_path: Path) -> None:
-    options = ("run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "run", "--quiet")
-    assert falsifier(*options, cwd=tmp_path).code == 0
-    again = falsifier(*options, cwd=tmp_path)
-    assert again.code == 2
-    assert "falsifier resume run" in again.err
-    (tmp_path / "file").write_text("")
-    nowhere = falsifier(
-        "run", "AT1", "--engine", "uniform", "--budget", "1", "--out", "file/run", cwd=tmp_path
-    )
-    assert nowhere.code == 2
-    assert "file/run" in nowhere.err and "Traceback" not in nowhere.err
-
-
-def test_an_input_of_the_formula_need_not_be_searched(tmp_path: Path) -> None:
-    stl = ("--stl", "G[0,20] (brake > 10 or speed <= 120)")
-    arguments = (*stl, "--search", "throttle=0:100:7", "--budget", "9")
-    done = falsifier("run", str(bundled("fmus") / "AT.fmu"), *arguments, "--quiet", cwd=tmp_path)
-    assert done.code == 1, done.err
-    assert "falsified after" in done.out
 
 
 def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:

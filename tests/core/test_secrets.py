@@ -89,6 +89,10 @@ def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         "ASIAABCDEFGHIJKLMNOP",
         f"npm_{'a1' * 18}",
         '{"client_secret": "abcdefgh"}',
+        "-----BEGIN RSA PRIVATE KEY-----",
+        "db_password = 'hunter22x'",
+        "https://me:secret1@example.org/a",
+        "Authorization: Bearer abcdefgh",
         *(f"limit = {key}" for key in KEYS),
     ],
 )

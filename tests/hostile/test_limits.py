@@ -3,7 +3,6 @@
 import math
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,7 +22,6 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
-from tests.command import falsifier
 from tests.hostile.servers import Behaviour, answers, misbehaving
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="a question of some words"),))
@@ -39,17 +37,12 @@ ANYTHING = st.one_of(
 
 
 @pytest.mark.parametrize("price", WRONG_PRICES)
-def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str, tmp_path: Path) -> None:
+def test_a_price_that_lifts_the_limit_on_the_cost_is_refused(price: str) -> None:
     sent, received = map(float, price.split(":"))
     with pytest.raises(SpecError, match="finite, non-negative"):
         Price(sent, received)
     with pytest.raises(ValidationError):
         LLMSettings(name="openai/m", price=(sent, received))
-    result = falsifier(
-        "run", "AT1", "--llm", "openai/m", "--budget", "1", "--llm-option", f"price={price}", cwd=tmp_path
-    )
-    assert result.code == 2
-    assert f"price={price}: expected SENT:RECEIVED, finite numbers from 0 on" in result.err
 
 
 @given(st.sampled_from(["simulations", "tokens"]), st.one_of(st.integers(), st.floats()))
