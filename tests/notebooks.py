@@ -3,13 +3,12 @@
 import asyncio
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import nbformat
+import pytest
 from jupyter_client.kernelspec import KernelSpec
 from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
@@ -43,7 +42,11 @@ def execute(notebook: Any, folder: Path) -> None:
     Raises:
         CellExecutionError: for the first cell that fails.
     """
-    with _own_settings(folder):
+    with pytest.MonkeyPatch.context() as patch:
+        # Kernels find this checkout, and leave nothing in the user's home.
+        patch.setenv("PYTHONPATH", str(ROOT), prepend=os.pathsep)
+        for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR"):
+            patch.setenv(name, str(folder / name.lower()))
         resources = {"metadata": {"path": str(folder)}}
         client = NotebookClient(
             notebook,
@@ -72,27 +75,6 @@ def store(notebook: Any, path: Path) -> None:
                 data["text/plain"] = data["text/plain"].partition("(")[0]
     nbformat.validate(notebook)
     nbformat.write(notebook, path)  # type: ignore[no-untyped-call]
-
-
-@contextmanager
-def _own_settings(folder: Path) -> Iterator[None]:
-    """Have kernels find this checkout, and leave nothing in the user's home."""
-    own = {
-        name: str(folder / name.lower())
-        for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_DATA_DIR", "JUPYTER_RUNTIME_DIR")
-    }
-    inherited = [p for p in [os.environ.get("PYTHONPATH", "")] if p]
-    own["PYTHONPATH"] = os.pathsep.join([str(ROOT), *inherited])
-    before = {name: os.environ.get(name) for name in own}
-    os.environ.update(own)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 if __name__ == "__main__":

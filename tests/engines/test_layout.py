@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.engines.box import BoxEngine, Proposal, Vector
@@ -73,27 +72,8 @@ def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolati
             assert grid.middles[np.abs(after - before) > 1e-9][0] < start + 2.0
 
 
-def test_a_point_near_a_constant_extreme_is_known_as_one() -> None:
-    problem = lag_problem(free=FREE, inputs=2, parameters=[START])
-    layout = planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05))
-    assert layout.nearest_extreme(layout.constant((0.05, 0.95, 1.0)), within=0.1) == (0, 1, 1)
-    assert layout.nearest_extreme(layout.constant((0.05, 0.8, 1.0)), within=0.1) is None
-    stepping_in_time = layout.constant((0.0, 0.0, 0.0))
-    stepping_in_time[50:100] = 1.0
-    assert layout.nearest_extreme(stepping_in_time, within=0.1) is None
-
-
 PROBLEM = lag_problem(inputs=2, limit=2.0, free=FREE, parameters=[START])
 BOX = fixed_layout(PROBLEM.space)
-
-
-def test_a_free_signal_is_read_at_the_fixed_control_points_and_does_not_represent_a_point() -> None:
-    step = Candidate(
-        {"u": Signal((0.0, 5.0), (-2.0, 2.0), "constant"), "v": Signal((0.0,), (0.0,), "constant")},
-        {"x0": -1.0},
-    )
-    assert not BOX.represents(step)
-    assert BOX.point(step).tolist() == [0, 0, 1, 1, 0.5, 0.5, 0.5, 0.5, 0]
 
 
 class Noting(BoxEngine):

@@ -162,16 +162,6 @@ def test_log_improvement_is_the_logarithm_and_finite_where_that_underflows() -> 
     assert np.isfinite(far).all() and (np.diff(far) < 0).all()
 
 
-def test_a_process_interpolates_and_is_unsure_far_away() -> None:
-    points = np.linspace(0, 1, 9)[:, None]
-    targets = np.sin(5 * points[:, 0])
-    process = fit_lengths(points, targets, np.array([0.3]), np.random.default_rng(0), noise=1e-6)
-    mean, deviation = process.predict(np.array([[0.5], [0.44], [3.0]]))
-    assert mean[0] == pytest.approx(np.sin(2.5), abs=1e-3)
-    assert mean[1] == pytest.approx(np.sin(2.2), abs=0.05)
-    assert deviation[0] < 0.01 and deviation[2] > 0.5
-
-
 def test_one_huge_cost_does_not_hide_small_differences_and_equal_ones_are_no_trouble() -> None:
     assert np.diff(standardised(np.array([1.0, 1.1, 1.2, 1e9]))).min() > 0.1
     assert np.isfinite(standardised(np.full(5, 3.0))).all()

@@ -75,12 +75,6 @@ class TestContract(EngineContract):
         )
 
 
-def test_each_level_has_its_share_of_the_simulations() -> None:
-    stages = [Stage(listening(s), s, first) for s, first in zip(spaces(free=False), (0, 3, 5), strict=True)]
-    asked = drive(Refining(stages), judge, rounds=5, n=2)
-    assert [len(c.signals["u"].times) for c in asked] == [3, 3, 3, 4, 4, 8, 8, 8, 8]
-
-
 def test_a_level_is_told_the_samples_before_it_that_it_can_express() -> None:
     coarse, fine, whole = spaces(free=True)
     second, third = listening(fine), listening(whole)

@@ -9,9 +9,7 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl import Monitor, Verdict, parse
-from falsifier.stl.compiler import compile_formula
 from falsifier.stl.margins import ON_LIMIT, is_on_limit
-from falsifier.stl.program import Program
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_case, random_trajectory
 
@@ -358,27 +356,3 @@ def test_one_monitor_serves_many_threads() -> None:
     with ThreadPoolExecutor(8) as pool:
         found = list(pool.map(monitor.evaluate, trajectories * 5))
     assert [v.robustness for v in found] == [min(-float(i), i - 1.0) for i in range(40)] * 5
-
-
-def compiled(text: str) -> Program:
-    return compile_formula(parse(text), step=0.1, samples=101)
-
-
-def computed(program: Program) -> int:
-    """Number of values beside the signals."""
-    return program.size - len(program.signals) * program.samples
-
-
-def test_nothing_outside_the_windows_is_computed() -> None:
-    program = compiled("G[2,5] F[1,2] (x * y <= 1)")
-    assert computed(program) == 2 * 41 + 31 + 1, "products and margins from 3 to 7 s, then the windows"
-    assert program.root.place.first == program.root.place.last == 0
-
-
-def test_a_part_that_stands_twice_is_computed_once_where_either_needs_it() -> None:
-    program = compiled("G[0,2] (x*y <= 1) and G[4,5] (x*y <= 1)")
-    assert computed(program) == 2 * 51 + 3
-    assert (
-        compiled("G[0,2] (x <= 1) and G[0,2] (x <= 1)").size
-        < compiled("G[0,2] (x <= 1) and G[0,2] (x <= 2)").size
-    )
