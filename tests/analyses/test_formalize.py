@@ -18,24 +18,10 @@ from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.formula import Not
 from falsifier.stl.tell_apart import tell_apart
+from tests.analyses.test_lint import SPEC as FINE
 from tests.llm.server import Server, Step, serving
-from tests.problem.support import AT
 
-SPEC = f"""# kept
-[model]
-fmu = "{AT.as_posix()}"
-interface = "co-simulation"
-stop_time = 50.0
-output_interval = 0.1
-[inputs.throttle]
-range = [0, 100]
-control_points = 3
-[inputs.brake]
-range = [0, 325]
-control_points = 3
-[requirements.R1]
-formula = 'G[0,20] (speed <= 120)'
-"""
+SPEC = FINE.replace("0.01", "0.1") + "[requirements.R1]\nformula = 'G[0,20] (speed <= 120)'\n"
 UNITS = {"speed": "mph", "rpm": "rev/min", "throttle": "%"}
 
 # Sentences about an automatic transmission, and what engineers mean by them.
