@@ -47,6 +47,13 @@ class Shown:
     is_lost: bool = False
 
     @property
+    def what(self) -> str:
+        """What it is, in words."""
+        if not self.run.falsified:
+            return "simulation nearest to a violation"
+        return "shrunk counterexample" if self.is_shrunk else "counterexample"
+
+    @property
     def explanation(self) -> str:
         """What ``falsifier explain`` has found out; empty if nobody asked, or if the run went on since."""
         file = beside(self.run.counterexample_file, EXPLANATION)

@@ -58,8 +58,8 @@ def _verdict(section: Section, where: str) -> list[str]:
     parts += _listed("Incomplete runs and unconfirmed violations", trouble_lines(section))
     parts.append(markdown_code(section.formula))
     if section.shown:
-        run = section.shown[0].run
-        commands = [replay_command(run)] if run.falsified else []
+        run, shrunk = section.shown[0].run, section.shown[0].is_shrunk
+        commands = [replay_command(run, shrunk=shrunk)] if run.falsified else []
         commands.append(run_command(run.manifest.request, shared=run.shared))
         listing = "\n".join(map(one_line, commands))
         parts.append(f"```sh\n{listing}\n```")
@@ -67,7 +67,9 @@ def _verdict(section: Section, where: str) -> list[str]:
 
 
 def _found(shown: Shown) -> list[str]:
-    parts = [_facts(limit_facts(shown.verdict, shown.units))] if shown.verdict else []
+    parts = [f"The {shown.what}:"]
+    if shown.verdict:
+        parts.append(_facts(limit_facts(shown.verdict, shown.units)))
     if shown.candidate.signals:
         parts.append(input_table(shown).markdown().rstrip())
     if shown.candidate.parameters:

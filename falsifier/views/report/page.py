@@ -189,9 +189,7 @@ def _verdicts(content: Content, name: str, sections: Sequence[Section | None], m
 
 def _found(shown: Shown) -> list[str]:
     """What violates, or came nearest: limit and value, picture, inputs, why, and whether it is confirmed."""
-    run, verdict = shown.run, shown.verdict
-    what = "counterexample" if run.falsified else "simulation nearest to a violation"
-    named = f"The shrunk {what}" if shown.is_shrunk else f"The {what}"
+    verdict, named = shown.verdict, f"The {shown.what}"
     if shown.panels:
         names = ", ".join(panel.title for panel in shown.panels)
         seen = drawn(lambda: plot_panels(shown.panels, shown.verdict), f"over time: {names}")
@@ -281,7 +279,7 @@ def _shown_details(shown: Shown) -> Html:
     facts += [("rationale", rationale)] if rationale else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:
-        commands.insert(0, ("replay it", replay_command(run)))
+        commands.insert(0, ("replay it", replay_command(run, shrunk=shown.is_shrunk)))
     coded = el("dl", *(join(el("dt", name), el("dd", el("code", text))) for name, text in commands))
     return join(facts_html(facts), coded)
 

@@ -11,6 +11,7 @@ from falsifier.campaigns.analysis import Run, Table
 from falsifier.campaigns.progress import total
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted, listed
+from falsifier.counterexamples.store import shrunk_file
 from falsifier.problem.problem import held_text
 from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
@@ -183,9 +184,11 @@ def advice(shown: Shown) -> str:
     return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
 
 
-def replay_command(run: Run) -> str:
-    """Shell command that replays a run's counterexample."""
+def replay_command(run: Run, *, shrunk: bool = False) -> str:
+    """Shell command that replays a run's counterexample, or what it was shrunk to."""
     place = run.counterexample_file if run.shared else run.directory
+    if shrunk:
+        place = shrunk_file(run.counterexample_file)
     return shlex.join(["falsifier", "replay", str(place)])
 
 

@@ -79,6 +79,9 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     page = html_report(tmp_path)
     assert "The shrunk counterexample" in page and "Because of u." in page
     assert "falsifier explain" not in page
+    text = markdown_report(tmp_path)
+    assert "The shrunk counterexample:" in text
+    assert all(f"falsifier replay {tmp_path / 'shrunk.json'}" in report for report in (page, text))
     os.utime(tmp_path / "explanation.txt", (0, 0))
     assert not gather(tmp_path).sides[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
