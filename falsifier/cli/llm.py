@@ -91,10 +91,9 @@ def prompt(
 def _lessons(records: Sequence["Record"]) -> str:
     """What the language model wrote down last in a run."""
     from falsifier.llm.candidate_text import lessons_in
-    from falsifier.llm.messages import Exchange
     from falsifier.record.records import ExchangeRecord
 
-    exchanges = [Exchange.model_validate(r.exchange) for r in records if isinstance(r, ExchangeRecord)]
+    exchanges = [r.exchange for r in records if isinstance(r, ExchangeRecord)]
     told = (lessons_in(e.reply.text) for e in reversed(exchanges) if e.reply is not None and not e.problem)
     return next((lessons for lessons in told if lessons), "")
 

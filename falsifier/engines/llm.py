@@ -172,7 +172,15 @@ class LLMEngine:
             raise
         except ChatError as error:
             if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
-                self._on_exchange(_unanswered(self._chat, request, error))
+                self._on_exchange(
+                    Exchange(
+                        llm=self._chat.llm,
+                        messages=messages,
+                        reply=None,
+                        lost=error.lost,
+                        problem=str(error),
+                    )
+                )
             raise
         briefing.rationales |= {c.key: c.rationale for c in found}
         briefing.pending += found
@@ -251,14 +259,3 @@ def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int
 
 def _named(engine: Engine) -> str:
     return f"the engine {engine.name!r}"
-
-
-def _unanswered(chat: Chat, request: ChatRequest, error: ChatError) -> Exchange:
-    return Exchange(
-        llm=chat.llm,
-        messages=request.messages,
-        parameters=dict(chat.parameters),
-        reply=None,
-        lost=error.lost,
-        problem=str(error),
-    )

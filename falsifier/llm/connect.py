@@ -5,7 +5,7 @@ Valid replies are kept on disk, keyed by the content of the request.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -74,7 +74,7 @@ def connect(
     own = served(llm) if is_model_file(llm) else None
     if own is not None:
         llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
-    chat: Chat = LiteLLMChat(
+    chat = LiteLLMChat(
         llm=llm,
         effort=effort,
         api_base=api_base,
@@ -86,7 +86,7 @@ def connect(
         gate=gate or Gate(),
         attempts=attempts,
     )
-    return chat if cache is None else CachedChat(chat, cache)
+    return chat if cache is None else CachedChat(chat, cache, chat.parameters)
 
 
 @dataclass(frozen=True)
@@ -96,20 +96,17 @@ class CachedChat:
     Attributes:
         inner: chat to ask if there is no stored reply.
         directory: one file per reply; created with the first one.
+        parameters: what the inner chat sends in addition to the messages.
     """
 
     inner: Chat
     directory: Path
+    parameters: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def llm(self) -> str:
         """Name of the inner chat's LLM."""
         return self.inner.llm
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """What the inner chat sends in addition to the messages."""
-        return self.inner.parameters
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the stored reply, at no cost, or ask."""

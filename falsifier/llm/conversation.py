@@ -97,9 +97,10 @@ def converse(
                 following = _asked_again(request, reply, problem or "")
         except Exception as error:
             # A defect, but the reply has been paid for: it is recorded first.
-            on_exchange(_exchange(chat, request, reply, f"{type(error).__name__}: {error}"))
+            defect = f"{type(error).__name__}: {error}"
+            on_exchange(Exchange(llm=chat.llm, messages=request.messages, reply=reply, problem=defect))
             raise
-        on_exchange(_exchange(chat, request, reply, problem))
+        on_exchange(Exchange(llm=chat.llm, messages=request.messages, reply=reply, problem=problem))
         if problem is None:
             chat.accepted(request, reply)
             if values:
@@ -115,16 +116,6 @@ def converse(
         text += f"; allow longer replies (--llm-option max_tokens={_MOST_TOKENS}), or less "
         text += "effort (--llm NAME@low)"
     raise NoValidReplyError(text)
-
-
-def _exchange(chat: Chat, request: ChatRequest, reply: ChatReply, problem: str | None) -> Exchange:
-    return Exchange(
-        llm=chat.llm,
-        messages=request.messages,
-        parameters=reply.parameters or dict(chat.parameters),
-        reply=reply,
-        problem=problem,
-    )
 
 
 def _called(request: ChatRequest, reply: ChatReply, respond: Respond) -> tuple[ChatRequest, str | None]:

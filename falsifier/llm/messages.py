@@ -1,7 +1,7 @@
 """What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
@@ -118,8 +118,8 @@ class Usage(_Value):
 class ChatRequest(_Sparse):
     """One request.
 
-    Everything that influences the reply is either here or among the chat's parameters: together they are the
-    key of the cache.
+    Everything that influences the reply is either here or among the parameters of ``LiteLLMChat``: together
+    they are the key of the cache.
     """
 
     messages: tuple[Message, ...]
@@ -173,7 +173,6 @@ class Exchange(_Value):
 
     llm: str
     messages: tuple[Message, ...]
-    parameters: dict[str, Any] = Field(default_factory=dict)
     reply: ChatReply | None = Field(description="None if there was no reply.")
     lost: Usage | None = Field(
         default=None, description="Requests that timed out, if there was no reply in the end."
@@ -239,11 +238,6 @@ class Chat(Protocol):
     @property
     def llm(self) -> str:
         """Name of the LLM, such as ``openai/gpt-5-mini``."""
-        ...
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """What is sent in addition to the messages, without secrets."""
         ...
 
     def complete(self, request: ChatRequest) -> ChatReply:

@@ -4,9 +4,8 @@ Resumed runs pay for nothing twice; tests, tutorials and dry runs need no key.
 """
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
@@ -16,52 +15,25 @@ Line = str | ChatReply | Exception
 Script = Iterable[Line] | Callable[[ChatRequest], Line]
 
 
-class Recording:
-    """Recorded exchanges, each played once; several chats may share a recording.
-
-    Args:
-        exchanges: what was recorded, in order.
-    """
-
-    def __init__(self, exchanges: Iterable[Exchange]) -> None:
-        self._exchanges = list(exchanges)
-        self._rest = iter(self._exchanges)
-        self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._exchanges)
-
-    @property
-    def llm(self) -> str:
-        """The name to show for this recording: which LLM was recorded."""
-        return f"recording of {self._exchanges[0].llm}" if self._exchanges else "empty recording"
-
-    def next(self) -> Exchange | None:
-        """Play the next exchange; None at the end."""
-        with self._lock:
-            return next(self._rest, None)
-
-
 class RecordedChat:
     """Answers with recorded replies in their order, then asks an inner chat.
 
     Args:
-        recording: what was recorded.
+        exchanges: what was recorded, in order; chats that are given one iterator play each of them once.
         inner: chat to ask after that; None: the end of the recording is an error.
+
+    Attributes:
+        llm: name of the inner chat's LLM; without an inner chat, the recording's.
     """
 
-    def __init__(self, recording: Recording | Iterable[Exchange], inner: Chat | None = None) -> None:
-        self.recording = recording if isinstance(recording, Recording) else Recording(recording)
+    def __init__(self, exchanges: Iterable[Exchange], inner: Chat | None = None) -> None:
+        if inner is None:
+            exchanges = list(exchanges)
+            self.llm = f"recording of {exchanges[0].llm}" if exchanges else "empty recording"
+        else:
+            self.llm = inner.llm
+        self._rest = iter(exchanges)
         self._inner = inner
-
-    @property
-    def llm(self) -> str:
-        """Name of the inner chat's LLM; without an inner chat, the recording's."""
-        return self.recording.llm if self._inner is None else self._inner.llm
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        return {} if self._inner is None else self._inner.parameters
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next recorded reply.
@@ -69,16 +41,17 @@ class RecordedChat:
         Raises:
             ChatError: if a failure was recorded, or the recording has ended and there is no inner chat.
         """
-        recorded = self.recording.next()
+        recorded = next(self._rest, None)
         if recorded is not None:
             if recorded.reply is None:
                 raise ChatError(recorded.problem or "there was no reply")
             return recorded.reply.model_copy(update={"source": "recording"})
         if self._inner is None:
-            raise ChatError(f"the {self.llm} ends after {counted(len(self.recording), 'exchange')}")
+            raise ChatError(f"the {self.llm} has no further exchange")
         return self._inner.complete(request)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
+        """Tell the inner chat."""
         if self._inner is not None:
             self._inner.accepted(request, reply)
 
@@ -100,11 +73,6 @@ class ScriptedChat:
     def __post_init__(self) -> None:
         self._lines: Iterator[Line] = iter(() if callable(self.script) else self.script)
         self._lock = threading.Lock()
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """Empty: nothing is sent."""
-        return {}
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next line of the script.

@@ -107,8 +107,7 @@ class Journal:
                     )
                 )
             case Exchanged():
-                exchange = event.exchange.model_dump(mode="json")
-                self._add(ExchangeRecord(exchange=exchange, elapsed=event.spent.seconds))
+                self._add(ExchangeRecord(exchange=event.exchange, elapsed=event.spent.seconds))
             case Evaluated():
                 self._evaluated(event)
             case Confirmed():

@@ -58,24 +58,20 @@ def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
 
     Exchanges after the last call are a call of their own, without candidates: the run ended during it.
     """
-    told, asked = _results(records := list(records), requirement), list[ExchangeRecord]()
+    told, asked = _results(records := list(records), requirement), list[Exchange]()
     found = []
     for record in records:
         if isinstance(record, ExchangeRecord):
-            asked.append(record)
+            asked.append(record.exchange)
         elif isinstance(record, AskedRecord):
             if record.requirement == requirement:
                 samples = [
                     Sample(i, Candidate.from_json(c), told.get(i, ""))
                     for i, c in enumerate(record.candidates, start=record.first)
                 ]
-                found.append(Iteration(_exchanges(asked), tuple(samples)))
+                found.append(Iteration(tuple(asked), tuple(samples)))
             asked = []
-    return [*found, Iteration(_exchanges(asked), ())] if asked else found
-
-
-def _exchanges(records: Iterable[ExchangeRecord]) -> tuple[Exchange, ...]:
-    return tuple(Exchange.model_validate(record.exchange) for record in records)
+    return [*found, Iteration(tuple(asked), ())] if asked else found
 
 
 def _results(records: Iterable[Record], requirement: str) -> dict[int, str]:
@@ -100,12 +96,12 @@ def exchange_before(records: Iterable[Record], index: int) -> Exchange | None:
     Raises:
         JournalError: if the journal contains no such evaluation.
     """
-    last: ExchangeRecord | None = None
+    last: Exchange | None = None
     for record in records:
         if isinstance(record, ExchangeRecord):
-            last = record
+            last = record.exchange
         elif isinstance(record, AskedRecord) and 0 <= index - record.first < len(record.candidates):
-            return None if last is None else Exchange.model_validate(last.exchange)
+            return last
     raise JournalError(f"the run has no sample {index + 1}")
 
 

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from falsifier.core.files import seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
+from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
@@ -57,7 +58,7 @@ class ExchangeRecord(_Record):
     """A request was sent to a language model and answered."""
 
     kind: Literal["exchange"] = "exchange"
-    exchange: dict[str, Any]
+    exchange: Exchange
     elapsed: float = _ELAPSED
 
 

@@ -15,8 +15,7 @@ from falsifier.errors import JournalError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import MAX_REASKS
-from falsifier.llm.messages import Chat, Exchange
-from falsifier.llm.replay import RecordedChat, Recording
+from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import recorded_evaluations
 from falsifier.record.records import (
@@ -39,13 +38,11 @@ class Replayed(Steps):
         asked: what engines suggested, by the index of the first candidate's evaluation.
         evaluations: recorded evaluations by index.
         confirmed: recorded confirmations by evaluation index and requirement.
-        recording: recorded replies of a language model.
     """
 
     asked: dict[int, AskedRecord]
     evaluations: dict[int, Evaluation]
     confirmed: dict[tuple[int, str], ConfirmedRecord]
-    recording: Recording
     _next: int = 0
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -89,10 +86,6 @@ class Replayed(Steps):
             return super().confirm(problem, evaluation, index)
         return record.confirmation(problem, evaluation)
 
-    def chat(self, inner: Chat) -> Chat:
-        """Return a chat that plays the recorded replies first."""
-        return RecordedChat(self.recording, inner)
-
 
 def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     """Return steps that replay a journal; with an empty journal, the live ones."""
@@ -108,7 +101,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         asked={r.first: r for r in records if isinstance(r, AskedRecord)},
         evaluations=evaluations,
         confirmed={(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
-        recording=Recording(exchanges),
+        exchanges=iter(exchanges),
     )
 
 
@@ -122,7 +115,7 @@ def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
     unrepeated, answered = Spent(), 0
     for record in records:
         if isinstance(record, ExchangeRecord):
-            kept.append(Exchange.model_validate(record.exchange))
+            kept.append(record.exchange)
         elif isinstance(record, AskedRecord):
             answered = len(kept)
         elif isinstance(record, EndedRecord):

@@ -9,7 +9,6 @@ from typing import Generic, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.llm.messages import Exchange
 from falsifier.record.journal import JournalReader
 from falsifier.record.records import (
     ConfirmedRecord,
@@ -109,7 +108,7 @@ class Summary:
             case ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case ExchangeRecord():
-                exchange = Exchange.model_validate(record.exchange)
+                exchange = record.exchange
                 self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
             case EndedRecord():
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent

@@ -1,9 +1,8 @@
 """What a run may spend, what it has spent, and a chat that keeps to it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import monotonic
-from typing import Any
 
 from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
@@ -150,11 +149,6 @@ class BoundedChat:
     def llm(self) -> str:
         """Name of the inner chat's LLM."""
         return self.inner.llm
-
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """Parameters of the inner chat."""
-        return self.inner.parameters
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Ask, with the seconds that are left as a deadline.

@@ -14,6 +14,7 @@ from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
+from falsifier.llm.replay import RecordedChat
 from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 from falsifier.search.events import (
@@ -202,7 +203,7 @@ class _Loop:
         """Connect to the engines that ask a language model, to count and record every exchange."""
 
         def wrap(chat: Chat) -> Chat:
-            return self.steps.chat(BoundedChat(chat, self.budget, self.clock))
+            return RecordedChat(self.steps.exchanges, BoundedChat(chat, self.budget, self.clock))
 
         for state in self.states:
             if isinstance(state.engine, AsksLLM):

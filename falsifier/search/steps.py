@@ -1,6 +1,6 @@
 """The steps of the loop that touch the world: asking engines, simulating, confirming."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -12,7 +12,7 @@ from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.workers import start
-from falsifier.llm.messages import Chat
+from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 
@@ -25,12 +25,14 @@ class Steps:
         executor: runs the simulations; None: this process.
         replayed: number of evaluations taken from a record.
         seconds: wall-clock seconds of the recorded part of the run.
+        exchanges: recorded exchanges with a language model, which are played back first.
         unrepeated: what the recorded part spent on questions to a language model that are not played back.
     """
 
     executor: Executor | None = None
     replayed: int = 0
     seconds: float = 0.0
+    exchanges: Iterator[Exchange] = field(default_factory=lambda: iter(()))
     unrepeated: Spent = field(default_factory=Spent)
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -52,10 +54,6 @@ class Steps:
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Check a violation with a fresh instance; the index of its evaluation is for replay only."""
         return confirm(problem, evaluation)
-
-    def chat(self, inner: Chat) -> Chat:
-        """Return the chat that an engine should ask instead of its own."""
-        return inner
 
 
 def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate]:

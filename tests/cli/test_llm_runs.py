@@ -27,8 +27,8 @@ def test_two_replies_falsify_at1(tmp_path: Path) -> None:
     for part in ("robustness 0.419", "82.5", "81.5", "20.0 s", "119.6"):
         assert part in second, part
     records = [r for r in read_journal(tmp_path / "run") if isinstance(r, ExchangeRecord)]
-    assert records[1].exchange["messages"][-1]["content"] == second
-    assert "full throttle throughout" in records[1].exchange["reply"]["text"]
+    assert records[1].exchange.messages[-1].content == second
+    assert "full throttle throughout" in str(records[1].exchange.reply)
     everything = b"".join(p.read_bytes() for p in (tmp_path / "run").rglob("*") if p.is_file())
     assert b"sk-test-not-a-key" not in everything + done.err.encode() + done.out.encode()
 

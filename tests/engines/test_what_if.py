@@ -27,8 +27,7 @@ Line = str | ChatReply | Exception
 
 def exchanges_in(directory: Path) -> list[Exchange]:
     """What a run has recorded of its language model."""
-    records = (record for record in read_journal(directory) if isinstance(record, ExchangeRecord))
-    return [Exchange.model_validate(record.exchange) for record in records]
+    return [r.exchange for r in read_journal(directory) if isinstance(r, ExchangeRecord)]
 
 
 def candidates(*levels: float, name: str = "u", told: str = "a guess") -> str:

@@ -22,7 +22,7 @@ def test_a_recording_alone_ends() -> None:
     chat = RecordedChat([exchange("one")])
     assert chat.llm == "recording of openai/m"
     chat.complete(QUESTION)
-    with pytest.raises(ChatError, match="ends after 1 exchange"):
+    with pytest.raises(ChatError, match="recording of openai/m has no further exchange"):
         chat.complete(QUESTION)
 
 

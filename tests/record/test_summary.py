@@ -66,5 +66,5 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     )
     unanswered = exchange.model_copy(update={"reply": None, "problem": "timeout"})
     for each in (exchange, unanswered, exchange):
-        summary.add(ExchangeRecord(exchange=each.model_dump(mode="json"), elapsed=1.0))
+        summary.add(ExchangeRecord(exchange=each, elapsed=1.0))
     assert (summary.spent.tokens, summary.spent.reasoning_tokens, summary.spent.cost) == (240, 10, 0.5)

@@ -68,7 +68,7 @@ class _Watched:
                 self.candidates |= dict(enumerate(record.candidates, start=record.first))
                 self._thin()
             elif isinstance(record, ExchangeRecord):
-                self.exchange = Exchange.model_validate(record.exchange)
+                self.exchange = record.exchange
             if monotonic() > until:
                 self.is_behind = True
                 return
