@@ -100,9 +100,15 @@ def margin(
     if low >= high:
         raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
-    bisection = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None))
-    easy, hard = bisection.directed(low, high)
-    return bisection.run(easy, hard)
+    state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None))
+    easy, hard = state.directed(low, high)
+    complete = interrupted = False
+    try:
+        complete = state.narrowed(easy, hard)
+    except KeyboardInterrupt:
+        interrupted = True
+    searches, count = tuple(state.searches), len(state.history)
+    return Margin(state.falsified, state.unfalsified, count, searches, complete, interrupted)
 
 
 def at_threshold(problem: Problem, vary: str, threshold: float) -> Problem:
@@ -138,47 +144,37 @@ class _Bisection:
             raise SpecError(f"vary: the robustness is the same for {LIMIT} = {low:g} and {high:g}")
         return (low, high) if values[0] < values[-1] else (high, low)
 
-    def run(self, easy: float, hard: float) -> Margin:
-        """Search at both ends, then between the hardest falsified threshold and the easiest other one."""
-        complete = interrupted = False
-        try:
-            complete = self._bisected(easy, hard)
-        except KeyboardInterrupt:
-            interrupted = True
-        searches, count = tuple(self.searches), len(self.history)
-        return Margin(self.falsified, self.unfalsified, count, searches, complete, interrupted)
+    def narrowed(self, easy: float, hard: float) -> bool:
+        """Search at both ends, then between the hardest falsified threshold and the easiest other one.
 
-    def _bisected(self, easy: float, hard: float) -> bool:
-        """Narrow what is known, as far as the budget goes; return whether it is close enough."""
-        width = abs(hard - easy)
+        Returns:
+            Whether that is all there is to know; False: the budget is used up before.
+        """
+        close = RESOLUTION * abs(hard - easy)
         steps = 2 + ceil(log2(1 / RESOLUTION))
         if self._falsified(hard, steps):
-            self.falsified = hard
             return True
-        self.unfalsified, self.falsified = hard, self._confirmed(easy, hard)
-        if self.falsified is None:
+        reached = self._reached(easy, hard)
+        if reached is None:
             if not self._falsified(easy, steps - 1):
-                self.unfalsified = easy
                 return True
-            self.falsified = easy
-            self.falsified = self._confirmed(easy, hard) or easy
-        while abs(self.unfalsified - self.falsified) > RESOLUTION * width and self._left > 0:
-            remaining = ceil(log2(abs(self.unfalsified - self.falsified) / (RESOLUTION * width)))
-            middle = (self.falsified + self.unfalsified) / 2
-            if self._falsified(middle, remaining):
-                self.falsified = middle
-                self.falsified = self._confirmed(middle, self.unfalsified) or middle
+            reached = self._reached(easy, hard) or easy
+        easy = self.falsified = reached
+        while abs(hard - easy) > close and len(self.history) < self.budget:
+            middle = (easy + hard) / 2
+            if self._falsified(middle, ceil(log2(abs(hard - easy) / close))):
+                easy = self.falsified = self._reached(middle, hard) or middle
             else:
-                self.unfalsified = middle
-        return abs(self.unfalsified - self.falsified) <= RESOLUTION * width
-
-    @property
-    def _left(self) -> int:
-        return self.budget - len(self.history)
+                hard = middle
+        return abs(hard - easy) <= close
 
     def _falsified(self, threshold: float, searches: int) -> bool:
-        """Search at a threshold with its share of what is left of the budget."""
-        found = self._search(threshold, max(1, self._left // max(searches, 1))) if self._left > 0 else False
+        """Search at a threshold with its share of what is left of the budget; keep what that says."""
+        found = self._search(threshold, max(1, (self.budget - len(self.history)) // max(searches, 1)))
+        if found:
+            self.falsified = threshold
+        else:
+            self.unfalsified = threshold
         self.searched(threshold, found, len(self.history))
         return found
 
@@ -187,7 +183,12 @@ class _Bisection:
         engine = make_engine(self.engine, problem, seed=self.seed + len(self.searches))
         if self.history:
             engine.tell(self._judged(threshold))
-        (result,) = search([problem], [engine], Budget(budget), listeners=[self._remember])
+
+        def remember(event: Event) -> None:
+            if isinstance(event, Evaluated):
+                self.history.append(event.evaluation)
+
+        (result,) = search([problem], [engine], Budget(budget), listeners=[remember])
         if result.status == "interrupted":
             raise KeyboardInterrupt
         if result.status == "failed":
@@ -195,21 +196,17 @@ class _Bisection:
         self.searches.append((threshold, result.falsified))
         return result.falsified
 
-    def _remember(self, event: Event) -> None:
-        if isinstance(event, Evaluated):
-            self.history.append(event.evaluation)
-
     def _judged(self, threshold: float) -> list[Evaluation]:
         problem = at_threshold(self.problem, self.vary, threshold)
         return [judge(problem, evaluation) for evaluation in self.history]
 
-    def _confirmed(self, easy: float, hard: float) -> float | None:
+    def _reached(self, easy: float, hard: float) -> float | None:
         """Return the hardest threshold that something simulated already violates, if that is confirmed."""
         found, threshold = None, easy
         for _ in range(_JUDGED_STEPS + 1):
             violating = [e for e in self._judged(threshold) if e.violated]
             if violating:
-                easy, found = threshold, min(violating, key=_robustness)
+                easy, found = threshold, min(violating, key=lambda e: e.robustness or 0.0)
             elif found is None:
                 return None
             else:
@@ -218,8 +215,3 @@ class _Bisection:
         assert found is not None, "there is at least one step"
         confirmation = confirm(at_threshold(self.problem, self.vary, easy), found)
         return easy if confirmation.outcome == "confirmed" else None
-
-
-def _robustness(evaluation: Evaluation) -> float:
-    assert evaluation.robustness is not None, "only violations are compared"
-    return evaluation.robustness
