@@ -10,6 +10,8 @@ A test module for your own engine::
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +21,7 @@ from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines.protocol import Engine
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
@@ -106,23 +108,6 @@ def _input(r: InputRange) -> Variable:
     )
 
 
-def simulated(problem: Problem, margin: Callable[[Array], float]) -> Judge:
-    """Return a function that evaluates candidates of a lag problem by simulation.
-
-    Args:
-        problem: a lag problem.
-        margin: maps the samples of x, shape (n,), to the robustness.
-    """
-
-    def judge(candidate: Candidate) -> Evaluation:
-        trajectory = problem.model.simulate(candidate.signals, candidate.parameters, problem.experiment)
-        inputs = {name: s.sample(trajectory.times) for name, s in candidate.signals.items()}
-        verdict = Verdict(margin(trajectory["x"]), critical_time=0.0, predicate="x <= 0.9")
-        return Evaluation(candidate, verdict=verdict, trajectory=trajectory.with_columns(inputs))
-
-    return judge
-
-
 def drive(engine: Engine, judge: Judge, *, rounds: int, n: int = 1) -> list[Candidate]:
     """Ask for n candidates and tell their evaluations, ``rounds`` times; return all candidates in order."""
     asked: list[Candidate] = []
@@ -155,7 +140,7 @@ class EngineContract:
         """Candidates are within their ranges and allowed parameterizations, with origin and rationale."""
         for problem in self.problems():
             engine = self.make(problem, seed=1)
-            for candidate in drive(engine, simulated(problem, _margin), rounds=self.rounds):
+            for candidate in drive(engine, partial(evaluate, problem), rounds=self.rounds):
                 admitted = problem.space.admit(candidate)
                 assert admitted.key == candidate.key
                 assert candidate.origin and candidate.rationale
@@ -163,7 +148,7 @@ class EngineContract:
     def test_deterministic_for_a_seed(self) -> None:
         """The same seed and calls give the same candidates; another seed gives others."""
         for problem in self.problems():
-            judge = simulated(problem, _margin)
+            judge = partial(evaluate, problem)
             runs = [drive(self.make(problem, seed), judge, rounds=self.rounds) for seed in (3, 3, 4)]
             keys = [[c.key for c in run] for run in runs]
             assert keys[0] == keys[1]
@@ -173,7 +158,7 @@ class EngineContract:
         """``ask(n)`` returns n candidates, even if nothing has been told since the last call."""
         problem = lag_problem(free=FREE, parameters=[START])
         engine = self.make(problem, seed=5)
-        judge = simulated(problem, _margin)
+        judge = partial(evaluate, problem)
         for _ in range(3):
             batch = engine.ask(4)
             assert len(batch) == 4
@@ -184,7 +169,7 @@ class EngineContract:
     def test_accepts_foreign_evaluations(self) -> None:
         """``tell`` accepts candidates that the engine did not propose, with other control points."""
         problem = lag_problem(free=FREE, parameters=[START])
-        judge = simulated(problem, _margin)
+        judge = partial(evaluate, problem)
         foreign = [
             Candidate(
                 {"u": Signal((0.0, 2.5, 7.0), (0.5, -1.0, 0.25), "constant")}, {"x0": 0.25}, "somebody"
@@ -198,7 +183,7 @@ class EngineContract:
     def test_survives_failures(self) -> None:
         """The engine continues after evaluations without verdict or trajectory."""
         problem = lag_problem(parameters=[START])
-        judge = simulated(problem, _margin)
+        judge = partial(evaluate, problem)
         count = 0
 
         def half_failing(candidate: Candidate) -> Evaluation:
@@ -213,19 +198,19 @@ class EngineContract:
     def test_survives_a_plateau(self) -> None:
         """If every candidate has the same robustness, the engine does not repeat one candidate."""
         problem = lag_problem(parameters=[START])
-        engine = self.make(problem, seed=8)
-        asked = drive(engine, simulated(problem, lambda y: 0.5), rounds=self.rounds)
+        level = Verdict(0.5, critical_time=0.0, predicate="x <= 0.9")
+        asked = drive(
+            self.make(problem, seed=8),
+            lambda candidate: replace(evaluate(problem, candidate), verdict=level),
+            rounds=self.rounds,
+        )
         assert len({c.key for c in asked}) > self.rounds / 2
 
     def test_resumes_by_replay(self) -> None:
         """After the same calls, a new instance continues with the same candidates."""
         problem = lag_problem(free=FREE, parameters=[START])
-        judge = simulated(problem, _margin)
+        judge = partial(evaluate, problem)
         first, second = self.make(problem, seed=9), self.make(problem, seed=9)
         drive(first, judge, rounds=self.rounds, n=2)
         drive(second, judge, rounds=self.rounds, n=2)
         assert [c.key for c in first.ask(2)] == [c.key for c in second.ask(2)]
-
-
-def _margin(x: Array) -> float:
-    return float(np.min(0.9 - x))

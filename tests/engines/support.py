@@ -1,5 +1,7 @@
 """What engines are tested on: the contract by name, and a bowl over the box of a small problem."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,8 +10,9 @@ from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 from falsifier.testing import FREE, START, EngineContract, lag_problem
 
 # Neither the contract nor who proposes when depends on how thorough a plan is.
@@ -41,10 +44,13 @@ def wide_problem(formula: str = "G[0,10] (x <= 9)", *, inputs: int = 1) -> Probl
     return lag_problem(formula, limit=2.0, free=FREE, inputs=inputs)
 
 
+def level(problem: Problem, candidate: Candidate, robustness: float = 0.5) -> Evaluation:
+    """A simulation that is judged by another margin than its trajectory shows."""
+    return replace(evaluate(problem, candidate), verdict=Verdict(robustness, 0.0, "x <= 9"))
+
+
 def bowl(problem: Problem, candidate: Candidate) -> Evaluation:
     """Judge by the distance from a point of the box; the least robustness is 1."""
-    from falsifier.stl import Verdict
-
     distance = problem.space.encode(candidate) - TARGET
     return Evaluation(candidate, verdict=Verdict(1.0 + 4.0 * float(distance @ distance), 0.0, "bowl"))
 

@@ -1,6 +1,7 @@
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,13 @@ from falsifier.engines.hybrid import Hybrid, Turns, helps
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
 from falsifier.llm.replay import ScriptedChat
 from falsifier.problem.problem import Problem
-from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem, simulated
-from tests.engines.support import HASTY, wide_problem
+from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem
+from tests.engines.support import HASTY, level, wide_problem
 
 # Nor does it depend on how many of the first simulations are the surrogate's own.
 SETTINGS = replace(HASTY, pauses=0, bangs=1, probes=1)
@@ -109,14 +110,14 @@ class TestContract(EngineContract):
 
     def test_survives_a_plateau(self) -> None:
         problem = lag_problem(free=FREE, parameters=[START])
-        asked = drive(self.make(problem, 1), simulated(problem, lambda x: 0.5), rounds=self.rounds)
+        asked = drive(self.make(problem, 1), partial(level, problem), rounds=self.rounds)
         assert len({c.key for c in asked}) > self.rounds / 2
 
 
 def test_the_model_opens_and_both_hear_everything() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[0.5, -0.5], [0.0]])
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=5)
+    asked = drive(engine, partial(evaluate, problem), rounds=5)
     assert [c.origin for c in asked[:2]] == ["scripted", "hybrid"]
     assert asked[1].rationale.startswith("surrogate: ")
     assert len(script.heard) == 5
@@ -128,7 +129,7 @@ def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
     # Higher inputs give a higher x: the surrogate, once trained, must put 1.5 first.
     script = Script([[-1.5, 0.0, 1.5, -0.5, 0.5]], problem)
     engine = Hybrid(problem, seed=0, adviser=script, promising=-1.0, surrogate_settings=SETTINGS)
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=25)
+    asked = drive(engine, partial(evaluate, problem), rounds=25)
     later = [c for c in asked if c.origin == "scripted" and "predicted robustness" in c.rationale]
     assert later, "no answer was ranked"
     assert later[0].signals["u"].values[0] == pytest.approx(1.5, abs=0.01)
@@ -141,7 +142,7 @@ def course(asked: Sequence[Candidate]) -> str:
 def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_dropped() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [0.0], [-0.5]])
-    judge = simulated(problem, lambda x: float(9 - x.max()))
+    judge = partial(evaluate, problem)
     asked = drive(engine, judge, rounds=40)
     assert course(asked) == "LSL" + 37 * "S"
     assert len(script.notes) > 2, "it was asked again"
@@ -150,7 +151,7 @@ def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_d
 def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
-    judge = simulated(problem, lambda x: float(9 - x.max()))
+    judge = partial(evaluate, problem)
     asked = drive(engine, judge, rounds=3)
     assert not engine.turns.is_llm_next, "an answer that was not simulated has not helped"
     asked += drive(engine, judge, rounds=37)
@@ -178,7 +179,7 @@ def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> No
             return [replace(told, signals=signals, origin=self.name)]
 
     engine.adviser = Agrees([[0.1]], problem)
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=8)
+    asked = drive(engine, partial(evaluate, problem), rounds=8)
     assert course(asked)[:3] == "LSL"
     points = np.array([engine.surrogate.layout.point(c) for c in asked])
     distances = np.abs(points[:, None] - points).max(axis=2)[np.triu_indices(len(asked), 1)]
@@ -188,7 +189,7 @@ def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> No
 def test_the_model_is_told_of_a_stall_and_is_asked_ever_more_rarely() -> None:
     problem = wide_problem()
     engine, script = hybrid(problem, [[0.1, 0.2], [0.3, 0.4, 0.5]])
-    drive(engine, simulated(problem, lambda x: 0.5), rounds=60)
+    drive(engine, partial(level, problem), rounds=60)
     assert any("brought no new best" in note for note in script.notes[1])
     assert len(script.notes) <= 6
 
@@ -196,7 +197,7 @@ def test_the_model_is_told_of_a_stall_and_is_asked_ever_more_rarely() -> None:
 def test_the_model_is_told_why_the_surrogate_chose_its_samples() -> None:
     problem = wide_problem("G[0,10] (x <= 9 or u <= 1)")
     engine, script = hybrid(problem, [[0.1], [0.3]])
-    drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=4)
+    drive(engine, partial(evaluate, problem), rounds=4)
     (reasons,) = (note for note in script.notes[1] if "numerical optimiser that shares this search" in note)
     assert "Sample 2: surrogate: steps through many levels of each input" in reasons
     assert any(note.startswith("The optimiser would simulate this next") for note in script.notes[1])
@@ -207,7 +208,7 @@ def test_the_model_is_told_when_the_surrogate_errs() -> None:
     engine, script = hybrid(problem, [[-1.0, 0.5], [0.0]])
     rng = np.random.default_rng(0)
     # The requirement is judged by another margin than the trajectories show.
-    drive(engine, simulated(problem, lambda x: 0.5 + float(rng.random())), rounds=40)
+    drive(engine, lambda c: level(problem, c, 0.5 + float(rng.random())), rounds=40)
     told = [line for notes in script.notes for line in notes]
     assert any("was wrong each time" in line for line in told)
 
@@ -218,7 +219,7 @@ def test_without_an_opening_answer_the_run_fails_and_later_it_goes_on() -> None:
     with pytest.raises(ChatError, match="no key"):
         engine.ask()
     engine, script = hybrid(problem, [[0.1, 0.2], ChatError("timeout")])
-    asked = drive(engine, simulated(problem, lambda x: 0.5), rounds=20)
+    asked = drive(engine, partial(level, problem), rounds=20)
     assert len(script.notes) > 1
     assert {c.origin for c in asked[1:]} == {"hybrid"}
     (remark,) = engine.remarks([])
@@ -235,7 +236,7 @@ def test_a_scripted_chat_leads_through_the_real_prompts() -> None:
     chat = ScriptedChat([answer(0.1, 0.2), answer(0.3, 0.4, 0.5, 0.6, 0.7), answer(1.5)])
     adviser = LLMEngine(problem, chat)
     engine = Hybrid(problem, seed=0, adviser=adviser, surrogate_settings=SETTINGS)
-    asked = drive(engine, simulated(problem, lambda x: float(9 - x.max())), rounds=10)
+    asked = drive(engine, partial(evaluate, problem), rounds=10)
     assert [c.origin for c in asked[:2]] == [adviser.name, "hybrid"]
     assert {c.origin for c in asked} == {adviser.name, "hybrid"}
     assert len(chat.requests) >= 2

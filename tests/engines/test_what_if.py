@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, ToolCall, Usage
 from falsifier.llm.replay import ScriptedChat
 from falsifier.record.journal import holds_run, read_journal
@@ -18,7 +20,7 @@ from falsifier.record.records import ExchangeRecord
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
-from falsifier.testing import drive, simulated
+from falsifier.testing import drive
 from tests.engines.support import wide_problem
 from tests.engines.test_hybrid import SETTINGS
 
@@ -52,7 +54,7 @@ def hybrid(chat: Chat, *, anonymous: bool = False) -> Hybrid:
 
 def run(engine: Engine, rounds: int = 14) -> list[str]:
     """Rationales of the candidates in order."""
-    judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
+    judge = partial(evaluate, wide_problem())
     return [c.rationale for c in drive(engine, judge, rounds=rounds)]
 
 
@@ -95,7 +97,7 @@ def test_neutral_names_hold_in_calls_and_answers() -> None:
 
     chat = ScriptedChat(script)
     engine = hybrid(chat, anonymous=True)
-    judge = simulated(wide_problem(), lambda x: float(9 - x.max()))
+    judge = partial(evaluate, wide_problem())
     asked = drive(engine, judge, rounds=14)
     sent = [r for r in chat.requests if r.tools]
     assert "by y1 <= 73.0769231" in answers(sent[1])[0]
