@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from falsifier.campaigns import CampaignRequest, Method, cross, suite
+from falsifier.campaigns import CampaignRequest, cross, suite
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.campaigns.directory import CampaignRecord, run_directory, write_campaign
 from falsifier.core.candidate import Candidate
@@ -67,7 +67,7 @@ def overhead(target: str, directory: Path) -> str:
 
     "Monitor" includes sampling the inputs; "record and loop" is the remainder.
     """
-    request = cross(suite_of(target), [Method("uniform")], seeds=[0], budget=Budget(SIMULATIONS))[0]
+    request = cross(suite_of(target), ["uniform"], seeds=[0], budget=Budget(SIMULATIONS))[0]
     problem = load_source(request.problems[0])
     falsify(problem, "uniform", budget=10)
     write(directory, describe(request, [problem], "uniform"))
@@ -144,7 +144,7 @@ def full_report(folder: Path) -> tuple[float, int, int]:
     Returns:
         Time in s, number of runs, size of the report in bytes.
     """
-    runs = cross(suite("arch-comp"), [Method("uniform")], seeds=range(10), budget=Budget(BUDGET))
+    runs = cross(suite("arch-comp"), ["uniform"], seeds=range(10), budget=Budget(BUDGET))
     request = CampaignRequest(runs=runs, suite="arch-comp")
     directory = folder / "suite"
     write_campaign(directory, CampaignRecord(**environment(), request=request, hashes={}))

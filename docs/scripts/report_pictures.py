@@ -16,7 +16,6 @@ from threading import Thread
 from falsifier import (
     Budget,
     CampaignRequest,
-    Method,
     ProblemSource,
     analysis,
     coverage,
@@ -99,8 +98,8 @@ def main() -> None:
         plotting.save_figure(plotting.plot_robustness_map(around, "AT1"), PICTURES / "robustness-map.png")
 
         runs = cross(
-            [ProblemSource(target=name) for name in ("AT1", "AT6a", "CC3")],
-            [Method(engine=engine) for engine in ("uniform", "corners", "surrogate")],
+            [ProblemSource(target=name, parameterization="fixed") for name in ("AT1", "AT6a", "CC3")],
+            ("uniform", "corners", "surrogate"),
             seeds=range(5),
             budget=Budget(60),
         )

@@ -2,7 +2,7 @@
 
 ::
 
-    request = CampaignRequest(runs=cross(problems, methods, seeds=range(10), budget=Budget(1500)))
+    request = CampaignRequest(runs=cross(problems, ["surrogate"], seeds=range(10), budget=Budget(1500)))
     run_campaign(request, Path("runs/nightly"), jobs=4)
 
 A campaign is a directory with one run directory per run. These run directories are the only record of what is

@@ -128,11 +128,11 @@ PROTOCOL_PARAMETERIZATION: Parameterization = "fixed"
 
 
 def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]:
-    """Requirements of a suite.
+    """Requirements of a suite, with the parameterization that published results have.
 
     Args:
         name: ``arch-comp``: the requirements in ``published.toml``, in that order.
-        profile: omit requirements whose spec does not offer this profile.
+        profile: profile of the specs; requirements whose spec does not offer it are omitted.
 
     Raises:
         SpecError: for an unknown name.
@@ -140,7 +140,11 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]
     if name not in SUITES:
         raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
     targets = [bundled_target(requirement) for requirement in read_published().columns["best"]]
-    return tuple(ProblemSource(target=t) for t in targets if profile is None or _offers(t, profile))
+    return tuple(
+        ProblemSource(target=target, profile=profile, parameterization=PROTOCOL_PARAMETERIZATION)
+        for target in targets
+        if profile is None or _offers(target, profile)
+    )
 
 
 def bundled_target(requirement: str) -> str:

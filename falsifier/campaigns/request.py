@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from itertools import product
 from math import inf
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -97,41 +98,37 @@ class CampaignRequest(BaseModel):
         return runs
 
 
+# Who suggests candidates: an engine, a language model, or an engine that one advises.
+Searcher = str | LLMSettings | tuple[str, LLMSettings]
+
+
 def cross(
     problems: Iterable[ProblemSource],
-    methods: Iterable[Method],
+    searchers: Iterable[Searcher],
     *,
     seeds: Iterable[int],
     budget: Budget,
-    asking: LLMSettings | None = None,
 ) -> tuple[RunRequest, ...]:
-    """Make the runs of problems x methods x seeds, in this order.
+    """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
     Args:
-        problems: what is searched; the method determines their parameterization and profile.
-        methods: how to search.
+        problems: what is searched; for engines that choose no control points, with fixed parameterizations.
+        searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
         budget: limits of each run.
-        asking: address, options, price and cache of language models; the method determines the rest.
     """
-    seeds, methods = tuple(seeds), tuple(methods)
-    return tuple(
-        RunRequest(
-            problems=(
-                problem.model_copy(
-                    update={"parameterization": method.parameterization, "profile": method.profile or None}
-                ),
-            ),
-            engine=method.engine or None,
-            llm=_llm_settings(method, asking),
-            seed=seed,
-            budget=budget,
-            keep="best",
-        )
-        for problem in problems
-        for method in methods
-        for seed in seeds
-    )
+    runs: dict[str, RunRequest] = {}
+    for problem, searcher, seed in product(problems, searchers, seeds):
+        engine = searcher if isinstance(searcher, str) else None
+        llm = searcher if isinstance(searcher, LLMSettings) else None
+        if isinstance(searcher, tuple):
+            engine, llm = searcher
+        used = problem
+        if problem.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
+            used = problem.model_copy(update={"parameterization": "fixed"})
+        run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=budget, keep="best")
+        runs[run_name(run)] = run
+    return tuple(runs.values())
 
 
 def method_of(request: RunRequest) -> Method:
@@ -159,13 +156,6 @@ def method_of_run(described: Manifest) -> Method:
     )
 
 
-def as_searched(method: Method) -> Method:
-    """Return the method with the parameterization that its engine really searches."""
-    llm = _llm_settings(method, None)
-    used = engine_parameterization(method.engine or None, llm)
-    return method if used == "free" else replace(method, parameterization="fixed")
-
-
 def run_name(request: RunRequest) -> str:
     """Name of a run's directory: readable, and unique by a hash of the request."""
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
@@ -173,67 +163,35 @@ def run_name(request: RunRequest) -> str:
     return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable)[:_READABLE_LENGTH].strip('-.')}-{digest}"
 
 
-def _llm_settings(method: Method, asking: LLMSettings | None) -> LLMSettings | None:
-    if not method.llm:
-        return None
-    decided = {
-        "name": method.llm,
-        "effort": method.effort or None,
-        "variant": method.variant or None,
-        "anonymous": method.anonymous,
-        "fallback": method.fallback or None,
-    }
-    return LLMSettings.model_validate((asking.model_dump() if asking else {}) | decided)
-
-
 @dataclass(frozen=True, slots=True)
 class Ceiling:
     """What is asked of language models if nothing is found early.
 
     Attributes:
-        questions: number of questions if each simulation takes one, and each of these is asked again as often
-            as after replies that are not valid; calls of tools come on top.
-        cost: US dollars for sending these with prompts at their longest; None if a price is unknown.
-        limit: US dollars to which the campaign's own limits hold the cost of everything; inf without any.
+        cost: US dollars for sending all questions with prompts at their longest; None if a price is unknown.
+        text: number of questions and cost in a sentence.
     """
 
-    questions: int
     cost: float | None
-    limit: float
-
-    @property
-    def text(self) -> str:
-        """The estimate in a sentence."""
-        asked = f"up to {counted(self.questions, 'question')} to language models"
-        if self.limit < inf:
-            return f"{asked}; the cost is limited to {self.limit:.4g} US dollars"
-        if self.cost is None:
-            return (
-                f"{asked}; the price is unknown (--llm-option price=SENT:RECEIVED), so the cost is too: "
-                "--total tokens=N limits it"
-            )
-        if not self.cost:
-            return f"{asked}, free of charge"
-        return (
-            f"{asked}, which cost about {self.cost:.4g} US dollars to send with the longest prompts; replies "
-            "cost extra, and --total cost=N limits all of it"
-        )
+    text: str
 
 
 def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:
-    """Estimate what a campaign asks; None if it asks no language model.
+    """Estimate what a campaign asks if each simulation takes a question, asked again as often as possible.
 
-    Runs without a limit on simulations are not counted.
+    Runs without a limit on simulations are not counted, and calls of tools come on top.
 
     Args:
         request: the campaign.
         price_of: returns the price of a language model, None if it is unknown.
+
+    Returns:
+        The estimate; None if the campaign asks no language model.
     """
     asking = [(run.llm, run.budget) for run in request.runs if run.llm is not None]
     if not asking:
         return None
     prices = {key: price_of(llm) for key, llm in {repr(llm): llm for llm, _ in asking}.items()}
-    total = request.limits.cost if request.limits is not None else None
     questions, cost, limit = 0, 0.0, 0.0
     for llm, budget in asking:
         own = (budget.simulations or 0) * (1 + MAX_REASKS)
@@ -241,4 +199,20 @@ def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | 
         questions += own
         cost += inf if price is None else price.cost(own * DEFAULT_PROMPT_TOKENS, 0)
         limit += inf if budget.cost is None else budget.cost
-    return Ceiling(questions, None if cost == inf else cost, min(limit, inf if total is None else total))
+    if request.limits is not None and request.limits.cost is not None:
+        limit = min(limit, request.limits.cost)
+    told = "free of charge"
+    if limit < inf:
+        told = f"the cost is limited to {limit:.4g} US dollars"
+    elif cost == inf:
+        told = (
+            "the price is unknown (--llm-option price=SENT:RECEIVED), so the cost is too: --total tokens=N "
+            "limits it"
+        )
+    elif cost:
+        told = (
+            f"sending them with the longest prompts costs about {cost:.4g} US dollars; replies cost extra, "
+            "and --total cost=N limits all of it"
+        )
+    text = f"up to {counted(questions, 'question')} to language models; {told}"
+    return Ceiling(None if cost == inf else cost, text)

@@ -13,12 +13,12 @@ from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, Method, cross, run_campaign, suite
+from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, cross, run_campaign, suite
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
-from falsifier.campaigns.request import as_searched, ceiling
+from falsifier.campaigns.request import Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli.command import command, refuse
@@ -52,6 +52,7 @@ from falsifier.cli.options import (
 from falsifier.cli.output import conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
+from falsifier.engines import DEFAULT_ENGINE
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search import DEFAULT_SIMULATIONS
@@ -143,31 +144,26 @@ def bench(
         else [s for target in targets for s in sources_of(ProblemSource(target=target, profile=profile))]
     )
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
-    rights = policy_changes(options)
+    changes = {"changes": policy_changes(options)}
     problems = [
-        source.model_copy(update={"changes": rights, "context": (*source.context, *context)})
+        source.model_copy(update=changes | {"parameterization": kind, "context": (*source.context, *context)})
         for source in problems
+        for kind in kinds
     ]
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     budget = read_budget(options, asks=bool(llms), usual=usual)
-    how = llm_settings({"llm": next(iter(llms), None), **options}) or LLMSettings(name="")
-    methods = _methods(engines, llms, variants, kinds, profile or "", how)
+    how = llm_settings({"llm": next(iter(llms), None), **options})
+    searchers = _searchers(engines, llms, variants, how)
     request = CampaignRequest(
-        runs=cross(
-            problems,
-            methods,
-            seeds=range(seed, seed + runs),
-            budget=budget,
-            asking=how,
-        ),
+        runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget),
         limits=totals,
         suite=suite_name,
     )
     check_request(request)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
-    for method in methods:
+    for method in dict.fromkeys(map(method_of, request.runs)):
         allowed = ", if the spec allows it" if method.parameterization == "free" else ""
         name = replace(method, parameterization="fixed").label
         warn(f"{name}: {method.parameterization} parameterization{allowed}")
@@ -273,31 +269,16 @@ def _kinds(
     return next(iter(profiles), None), kinds or (default,)
 
 
-def _methods(
-    engines: tuple[str, ...],
-    llms: tuple[str, ...],
-    variants: tuple[str, ...],
-    parameterizations: tuple[Parameterization, ...],
-    profile: str,
-    how: LLMSettings,
-) -> list[Method]:
-    """Engines alone, or engines x LLMs x variants if an LLM is named; each with all parameterizations."""
-    if not llms:
+def _searchers(
+    engines: Sequence[str], llms: Sequence[str], variants: Sequence[str], how: LLMSettings | None
+) -> list[Searcher]:
+    """Engines alone, or engines x LLMs x variants if an LLM is named."""
+    if how is None:
         refuse("requires --llm NAME", variant=variants)
-    named = [name_and_effort(llm) for llm in llms] or [("", None)]
-    methods = [
-        Method(
-            engine=engine,
-            llm=llm,
-            effort=level or "",
-            variant=variant,
-            parameterization=parameterization,
-            profile=profile,
-            anonymous=how.anonymous,
-            fallback=how.fallback or "",
-        )
-        for engine, (llm, level), variant, parameterization in product(
-            engines or ("",), named, variants or ("",), parameterizations
-        )
-    ]
-    return list(dict.fromkeys(map(as_searched, methods)))
+        return [*(engines or (DEFAULT_ENGINE,))]
+    models = []
+    for llm, variant in product(llms, variants or (None,)):
+        name, effort = name_and_effort(llm)
+        decided = {"name": name, "effort": effort, "variant": variant}
+        models.append(LLMSettings.model_validate(how.model_dump() | decided))
+    return [*product(engines, models)] if engines else [*models]

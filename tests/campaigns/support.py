@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.campaigns import CampaignRequest, Method, cross
+from falsifier.campaigns import CampaignRequest, cross
 from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import Workers
 from falsifier.problem.problem import Problem
@@ -28,8 +28,11 @@ def request(
     """Campaign over problems of tests.problems."""
     return CampaignRequest(
         runs=cross(
-            [ProblemSource(target=f"python:tests.problems:{name}") for name in names],
-            [Method(engine) for engine in engines],
+            [
+                ProblemSource(target=f"python:tests.problems:{name}", parameterization="fixed")
+                for name in names
+            ],
+            engines,
             seeds=range(seeds),
             budget=Budget(budget),
         ),

@@ -9,48 +9,40 @@ from falsifier.search.request import LLMSettings
 AT1 = ProblemSource(target="AT1")
 
 
-def test_a_campaign_is_requirements_times_methods_times_seeds() -> None:
-    methods = [Method("uniform"), Method(llm="openai/gpt-5-nano", effort="low", variant="MP4")]
-    runs = cross(
-        [AT1, ProblemSource(target="my.toml:R")],
-        methods,
-        seeds=range(3),
-        budget=Budget(7),
-        asking=LLMSettings(name="", api_base="http://x", options={"top_p": 0.5}, cache=False),
-    )
-    assert len(runs) == 12
+NANO = LLMSettings(name="openai/gpt-5-nano", effort="low", variant="MP4")
+
+
+def test_a_campaign_is_requirements_times_searchers_times_seeds() -> None:
+    mine = ProblemSource(target="my.toml:R", parameterization="fixed")
+    runs = cross([AT1, mine], ["uniform", NANO, ("hybrid", NANO)], seeds=range(3), budget=Budget(7))
+    assert len(runs) == 18
     assert [r.seed for r in runs[:3]] == [0, 1, 2]
-    assert [method_of(r) for r in runs] == [m for _ in range(2) for m in methods for _ in range(3)]
-    assert runs[3].llm == LLMSettings(
-        name="openai/gpt-5-nano",
-        effort="low",
-        api_base="http://x",
-        variant="MP4",
-        options={"top_p": 0.5},
-        cache=False,
-    )
-    assert {r.problems[0].parameterization for r in runs} == {"fixed"}
+    assert [(r.engine, r.llm) for r in runs[::3]] == 2 * [("uniform", None), (None, NANO), ("hybrid", NANO)]
     assert {r.budget for r in runs} == {Budget(7)}
+    # An engine that never chooses control points is not said to have done so.
+    kinds = [r.problems[0].parameterization for r in runs[::3]]
+    assert kinds == ["fixed", "fixed", "free", "fixed", "fixed", "fixed"]
+    assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=Budget(7)) == runs[:2]
 
 
 def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
-    def name(method: Method, seed: int = 0, budget: int = 5, target: str = "specs/AT.toml:AT1") -> str:
-        problem = ProblemSource(target=target)
-        return run_name(cross([problem], [method], seeds=[seed], budget=Budget(budget))[0])
+    def name(searcher: str | LLMSettings = "surrogate", seed: int = 0, budget: int = 5, **source: str) -> str:
+        problem = ProblemSource.model_validate({"target": "specs/AT.toml:AT1"} | source)
+        return run_name(cross([problem], [searcher], seeds=[seed], budget=Budget(budget))[0])
 
-    base = name(Method("uniform"))
-    assert base.startswith("AT1-uniform-0-")
+    base = name()
+    assert base.startswith("AT1-surrogate-free-0-")
     others = {
-        name(Method("sobol")),
-        name(Method("uniform", parameterization="free")),
-        name(Method("uniform", profile="instance2")),
-        name(Method("uniform"), seed=1),
-        name(Method("uniform"), budget=6),
-        name(Method("uniform"), target="other/AT.toml:AT1"),
+        name("sobol"),
+        name(parameterization="fixed"),
+        name(profile="instance2"),
+        name(seed=1),
+        name(budget=6),
+        name(target="other/AT.toml:AT1"),
     }
     assert len(others | {base}) == 7
-    assert name(Method("uniform")) == base
-    unsafe = name(Method(llm="ollama_chat/gpt-oss:20b", variant="MP4"))
+    assert name() == base
+    unsafe = name(LLMSettings(name="ollama_chat/gpt-oss:20b", variant="MP4"))
     assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
 
 
@@ -61,12 +53,12 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
         "hybrid + gpt-5-mini high MP4, instance2"
     )
-    named = Method(llm="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
-    assert named.label == "gpt-5-mini, neutral names, fallback surrogate"
-    assert method_of(cross([AT1], [named], seeds=[0], budget=Budget(1))[0]) == named
+    named = LLMSettings(name="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
+    (run,) = cross([AT1], [named], seeds=[0], budget=Budget(1))
+    assert method_of(run).label == "gpt-5-mini, free, neutral names, fallback surrogate"
 
 
 def test_the_same_run_twice_is_refused() -> None:
-    run = cross([AT1], [Method("uniform")], seeds=[0], budget=Budget(5))
+    run = cross([AT1], ["uniform"], seeds=[0], budget=Budget(5))
     with pytest.raises(SpecError, match="the same run twice"):
         CampaignRequest(runs=run + run).named()

@@ -5,7 +5,6 @@ import pytest
 from falsifier.campaigns import (
     CampaignRequest,
     Follower,
-    Method,
     Progress,
     cross,
     resume_campaign,
@@ -120,7 +119,7 @@ def test_a_changed_model_is_refused(tmp_path: Path) -> None:
         f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\nstop_time = 1.0\noutput_interval = 0.1\n'
         "[inputs.throttle]\ncontrol_points = 1\n[requirements.R]\nformula = 'G[0,1] (speed <= -1)'\n"
     )
-    runs = cross([ProblemSource(target=f"{spec}:R")], [Method("uniform")], seeds=[0], budget=Budget(1))
+    runs = cross([ProblemSource(target=f"{spec}:R")], ["uniform"], seeds=[0], budget=Budget(1))
     run_campaign(CampaignRequest(runs=runs), directory)
     spec.write_text(spec.read_text() + "# changed\n")
     with pytest.raises(JournalError, match=r"lag\.toml has changed"):
