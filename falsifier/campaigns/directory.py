@@ -13,12 +13,13 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from filelock import FileLock, Timeout
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError
 from falsifier.record.files import locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
+from falsifier.record.manifest import Surroundings
 from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"
@@ -27,16 +28,9 @@ _LOCK = "lock"
 _LOCK_PATIENCE = 0.5
 
 
-class CampaignRecord(BaseModel):
+class CampaignRecord(Surroundings):
     """Content of campaign.json."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-    falsifier: str = Field(description="Version of this package.")
-    python: str
-    platform: str
-    packages: dict[str, str] = Field(description="Versions of the packages that influence the numbers.")
-    started: str = Field(description="Date and time in UTC.")
     request: CampaignRequest
     hashes: dict[str, str] = Field(description="SHA-256 of all FMUs and specs, by path.")
     sum: str = Field("", description="Checksum of the file up to here.")

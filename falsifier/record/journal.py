@@ -80,16 +80,15 @@ class Journal:
     def __init__(self, directory: Path, keep: Keep) -> None:
         self.directory = directory
         self._keep = keep
-        path = directory / JOURNAL
-        _check_is_file(path)
-        _drop_torn_line(path)
         remove_partial(directory / TRAJECTORIES, TRAJECTORY_NAMES)
-        remove_partial(directory, f"{re.escape(manifest.MANIFEST)}|{re.escape(JOURNAL)}")
-        self.records = read_journal(directory)
-        self._file = path.open("ab", buffering=0)
+        remove_partial(directory, re.escape(manifest.MANIFEST))
+        reader = JournalReader(directory)
+        self.records = list(reader.new())
+        self._file = reader.path.open("ab", buffering=0)
+        self._file.truncate(reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
-        self._lines = len(self.records)
+        self._lines = reader.line
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
@@ -218,14 +217,6 @@ def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[N
     return locked(directory / LOCK, busy=busy, patience=patience)
 
 
-def _check_is_file(path: Path) -> None:
-    if path.is_dir():
-        raise JournalError(
-            f"{path} is a folder, not a journal; to set it aside: "
-            f"falsifier tools repair {shlex.quote(str(path.parent))}"
-        )
-
-
 def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
     with can_be_a_folder(directory):
@@ -281,7 +272,6 @@ class JournalReader:
         Raises:
             JournalError: if a line is invalid.
         """
-        _check_is_file(self.path)
         if not self.path.exists() or self.path.stat().st_size == self.offset:
             return
         with self.path.open("rb") as file:
@@ -364,16 +354,6 @@ def _key(record: Record) -> _Key:
             return (record.kind,)
 
 
-def _drop_torn_line(path: Path) -> None:
-    if not path.exists():
-        return
-    content = path.read_bytes()
-    end = content.rfind(b"\n") + 1
-    if end < len(content):
-        with path.open("r+b") as file:
-            file.truncate(end)
-
-
 def repair(directory: Path) -> list[str]:
     """Drop what is damaged in a run directory; return what was found, in words; empty if nothing was.
 
@@ -385,33 +365,24 @@ def repair(directory: Path) -> list[str]:
         JournalError: if the manifest is damaged, which nothing can replace, or a process writes here.
     """
     manifest.read(directory)
+    found = []
     with run_lock(directory):
-        found = _repaired_journal(directory / JOURNAL)
-        folder = directory / TRAJECTORIES
-        damaged = [path for path in sorted(folder.glob("*.npz")) if not is_intact(path, path.read_bytes())]
-        return [
-            *found,
-            *(
-                f"{path}: damaged; kept as {set_aside(path).name}, simulated again if needed"
-                for path in damaged
-            ),
-        ]
-
-
-def _repaired_journal(path: Path) -> list[str]:
-    if path.is_dir():
-        return [f"{path}: a folder, not a journal; kept as {set_aside(path).name}"]
-    reader = JournalReader(path.parent)
-    try:
-        for _ in reader.new():
-            pass
-    except JournalError:
-        lost = path.read_bytes()[reader.offset :].count(b"\n")
-        copy = Path(copy2(path, free_name(path)))
-        with path.open("r+b") as file:
-            file.truncate(reader.offset)
-        return [
-            f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
-            f"original is kept as {copy.name}; falsifier resume repeats what is missing"
-        ]
-    return []
+        reader = JournalReader(directory)
+        try:
+            for _ in reader.new():
+                pass
+        except JournalError:
+            path = reader.path
+            lost = path.read_bytes()[reader.offset :].count(b"\n")
+            copy = Path(copy2(path, free_name(path)))
+            with path.open("r+b") as file:
+                file.truncate(reader.offset)
+            found.append(
+                f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
+                f"original is kept as {copy.name}; falsifier resume repeats what is missing"
+            )
+        for path in sorted((directory / TRAJECTORIES).glob("*.npz")):
+            if not is_intact(path, path.read_bytes()):
+                kept = set_aside(path).name
+                found.append(f"{path}: damaged; kept as {kept}, simulated again if needed")
+    return found

@@ -76,14 +76,19 @@ class LevelRecord(_Strict):
     searched: str = Field(description="How it searches the inputs, in words.")
 
 
-class Manifest(_Strict):
-    """Content of manifest.json: everything needed to repeat the run and to report on it."""
+class Surroundings(_Strict):
+    """With what and when a run or a campaign was started."""
 
     falsifier: str = Field(description="Version of this package.")
     python: str
     platform: str
     packages: dict[str, str] = Field(description="Versions of the packages that influence the numbers.")
     started: str = Field(description="Date and time in UTC.")
+
+
+class Manifest(Surroundings):
+    """Content of manifest.json: everything needed to repeat the run and to report on it."""
+
     request: RunRequest
     engine: str = Field(description="Name of the engine, even if it was made in Python.")
     requirements: tuple[RequirementRecord, ...] = Field(min_length=1)
@@ -193,7 +198,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
 
 
 def environment() -> dict[str, Any]:
-    """Versions, platform and time, as keyword arguments of a manifest."""
+    """Versions, platform and time, as keyword arguments of Surroundings."""
     return {
         "falsifier": __version__,
         "python": sys.version.split()[0],

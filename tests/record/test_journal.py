@@ -14,10 +14,10 @@ from falsifier.record.journal import (
     repair,
 )
 from falsifier.record.records import line_of
-from falsifier.record.run import falsify, resume
+from falsifier.record.run import falsify
 from falsifier.views.report.page import html_report
 from tests.hostile.test_damage import Standing
-from tests.problems import easy, impossible
+from tests.problems import impossible
 from tests.record.test_summary import evaluated
 
 
@@ -44,7 +44,7 @@ def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(t
     dead = 2**22 + 7
     folder = tmp_path / "trajectories"
     folder.mkdir()
-    left = [folder / f"3-0123456789abcdef.npz.{dead}.partial", tmp_path / f"journal.jsonl.{dead}.partial"]
+    left = [folder / f"3-0123456789abcdef.npz.{dead}.partial", tmp_path / f"manifest.json.{dead}.partial"]
     others = [folder / f"mine.npz.{dead}.partial", folder / "3-0123456789abcdef.npz.1.partial.txt"]
     for path in (*left, *others):
         path.touch()
@@ -82,16 +82,3 @@ def test_what_is_set_aside_replaces_nothing(tmp_path: Path) -> None:
         (tmp_path / "a").write_text(str(number))
         assert set_aside(tmp_path / "a").name == f"a.damaged-{number}"
     assert (tmp_path / "a.damaged-1").read_text() == "1"
-
-
-def test_a_journal_that_is_a_folder_is_set_aside(tmp_path: Path) -> None:
-    falsify(easy(), "corners", budget=2, directory=tmp_path)
-    journal = tmp_path / "journal.jsonl"
-    journal.unlink()
-    journal.mkdir()
-    with pytest.raises(JournalError, match="not a journal; to set it aside: falsifier tools repair"):
-        resume(tmp_path, problems=[easy()])
-    (finding,) = repair(tmp_path)
-    assert "kept as journal.jsonl.damaged-1" in finding
-    (result,) = resume(tmp_path, problems=[easy()])
-    assert result.spent.simulations > 0
