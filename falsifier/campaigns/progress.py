@@ -64,19 +64,6 @@ class Progress:
             searches[run.name] = max(known, run.spent, key=lambda spent: spent.simulations)
         return total(searches.values())
 
-    def by_requirement(self) -> dict[str, "Progress"]:
-        """Progress of each requirement."""
-        groups: dict[str, list[RunProgress]] = {}
-        for run in self.runs:
-            groups.setdefault(run.requirement, []).append(run)
-        return {name: Progress(tuple(runs)) for name, runs in groups.items()}
-
-    @property
-    def best_robustness(self) -> float | None:
-        """Smallest robustness of any run."""
-        found = [run.best_robustness for run in self.runs if run.best_robustness is not None]
-        return min(found, default=None)
-
 
 class Follower:
     """Follows the directory of a campaign, of a run, or one with runs in it.

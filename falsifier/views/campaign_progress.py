@@ -1,9 +1,8 @@
-"""The display of a running campaign on stderr: a live table on a terminal, plain lines otherwise."""
+"""The display of a running campaign on stderr: a line per run that ends, and how the whole goes on."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import TYPE_CHECKING
 
 from falsifier.campaigns import Progress, RunProgress
 from falsifier.core.literals import one_line
@@ -11,10 +10,8 @@ from falsifier.core.words import counted
 from falsifier.stl.margins import signed
 from falsifier.views.terminal import error_console, moving, unbroken
 
-if TYPE_CHECKING:
-    from rich.console import Console, RenderableType
-
 Show = Callable[[Progress], None]
+Write = Callable[[str], None]
 
 # Time in s over which simulations per second are averaged.
 _RATE_WINDOW = 10.0
@@ -25,22 +22,22 @@ _LINE_PERIOD = 30.0
 @contextmanager
 def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     """Show a campaign's progress while the context lasts."""
+    console = error_console()
+
+    def write(text: str) -> None:
+        console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+
     if quiet:
         yield lambda progress: None
-        return
-    console = error_console()
-    if not console.is_terminal:
-        board = PlainScoreboard(
-            lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
-        )
-        yield unbroken(board)
-        return
-    from rich.live import Live
+    elif not console.is_terminal:
+        yield unbroken(Scoreboard(write))
+    else:
+        from rich.live import Live
+        from rich.text import Text
 
-    rate = Rate()
-    live = Live(console=console, refresh_per_second=4, transient=True)
-    with moving(live):
-        yield unbroken(lambda progress: live.update(_fitting(progress, rate(progress), console)))
+        live = Live(console=console, refresh_per_second=4, transient=True)
+        with moving(live):
+            yield unbroken(Scoreboard(write, lambda text: live.update(Text(one_line(text)))))
 
 
 class Rate:
@@ -59,11 +56,16 @@ class Rate:
         return (after - before) / (end - begin) if end > begin else None
 
 
-class PlainScoreboard:
-    """Writes one line per run that ends, and now and then one line with the overall progress."""
+class Scoreboard:
+    """Tells of each run that ends, and of the overall progress.
 
-    def __init__(self, write: Callable[[str], None]) -> None:
-        self._write = write
+    Args:
+        write: writes a line that stays.
+        update: replaces the line on the overall progress; None: that one is written now and then.
+    """
+
+    def __init__(self, write: Write, update: Write | None = None) -> None:
+        self._write, self._update = write, update
         self._ended: dict[str, str] = {}
         self._begun = False
         self._rate = Rate()
@@ -79,9 +81,10 @@ class PlainScoreboard:
             if run.name in ended and self._ended.get(run.name) != run.status:
                 self._ended[run.name] = run.status
                 self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run_line(run)}")
-        rate = self._rate(progress)
-        line = overall_line(progress, rate)
-        if monotonic() - self._written > _LINE_PERIOD and line != self._overall:
+        line = overall_line(progress, self._rate(progress))
+        if self._update is not None:
+            self._update(line)
+        elif monotonic() - self._written > _LINE_PERIOD and line != self._overall:
             self._written, self._overall = monotonic(), line
             self._write(line)
 
@@ -108,27 +111,3 @@ def overall_line(progress: Progress, rate: float | None, *, stopped: bool = Fals
         cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
         parts.append(f"{spent.tokens} tokens, {cost}")
     return ", ".join(parts)
-
-
-def _fitting(progress: Progress, rate: float | None, console: "Console") -> "RenderableType":
-    """The live table: as many requirements as fit on the terminal, preferring those that are running."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    table = Table(box=None, pad_edge=False, caption=overall_line(progress, rate), caption_justify="left")
-    for name in ("requirement", "runs", "falsified", "simulations", "best robustness", "cost"):
-        table.add_column(name, justify="left" if name == "requirement" else "right")
-    groups = progress.by_requirement()
-    order = sorted(groups, key=lambda name: -groups[name].counts["running"])
-    for name in sorted(order[: max(console.height - 5, 3)], key=list(groups).index):
-        part = groups[name]
-        cost = part.spent.cost
-        table.add_row(
-            escape(one_line(name)),
-            f"{part.finished}/{len(part.runs)}",
-            str(part.counts["falsified"]),
-            str(part.spent.simulations),
-            "" if part.best_robustness is None else signed(part.best_robustness, 4),
-            "?" if cost is None else f"{cost:.4f}" if part.spent.calls else "",
-        )
-    return table

@@ -1,10 +1,6 @@
-import io
-
-from rich.console import Console
-
 from falsifier.campaigns import Method, Progress, RunProgress
 from falsifier.search.budget import Spent
-from falsifier.views.campaign_progress import PlainScoreboard, Rate, _fitting, overall_line
+from falsifier.views.campaign_progress import Rate, Scoreboard, overall_line
 
 
 def run(name: str, seed: int, status: str, simulations: int = 0, best: float | None = None) -> RunProgress:
@@ -30,7 +26,7 @@ AFTER = Progress(
 
 def test_plain_lines_say_each_end_once() -> None:
     lines: list[str] = []
-    board = PlainScoreboard(lines.append)
+    board = Scoreboard(lines.append)
     for progress in (BEFORE, AFTER, AFTER):
         board(progress)
     assert lines == [
@@ -55,11 +51,13 @@ def test_the_rate_is_over_the_last_looks() -> None:
     assert rate(AFTER, 30.0) is None, "what is long past does not count"
 
 
-def test_the_live_table_fits_the_terminal_and_keeps_what_runs() -> None:
-    runs = [run(f"R{i}", 0, "running" if i == 17 else "waiting", i, 1.0) for i in range(21)]
-    console = Console(file=io.StringIO(), width=100, height=10, force_terminal=True, color_system=None)
-    console.print(_fitting(Progress(tuple(runs)), 3.0, console))
-    shown = console.file.getvalue()  # type: ignore[attr-defined]
-    assert "R17" in shown
-    assert len(shown.splitlines()) <= 10
-    assert "0/21 runs finished" in shown
+def test_on_a_terminal_the_overall_line_is_replaced_and_ends_stay() -> None:
+    kept: list[str] = []
+    live: list[str] = []
+    board = Scoreboard(kept.append, live.append)
+    for progress in (BEFORE, AFTER):
+        board(progress)
+    assert len(kept) == 3 and [line.partition(",")[0] for line in live] == [
+        "0/3 runs finished",
+        "1/3 runs finished",
+    ]
