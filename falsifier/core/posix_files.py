@@ -1,4 +1,4 @@
-"""Files that nobody can shorten, locks, and folders that are removed in any state, on Linux and macOS."""
+"""Files without names, locks, and folders that are removed in any state, on Linux and macOS."""
 
 import contextlib
 import fcntl
@@ -7,37 +7,45 @@ import pwd
 import sys
 import tempfile
 from collections.abc import Iterator
+from io import FileIO
 from itertools import count
 from pathlib import Path
-from typing import IO
 from uuid import uuid4
 
 
-def sealed_file(size: int, *, may_grow: bool = False) -> IO[bytes]:
-    """Open a file without a name whose size no process can change, in memory if the system supports that.
+def unnamed_file() -> FileIO:
+    """Open a file without a name, in memory if the system supports that."""
+    if sys.platform == "linux" and hasattr(os, "memfd_create"):
+        descriptor = os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+        return FileIO(descriptor, "w+b")
+    return tempfile.TemporaryFile(buffering=0)
 
-    A process that maps a file dies when another one shortens it, and a file that grows fills the memory.
 
-    Args:
-        size: in bytes.
-        may_grow: whether it can be enlarged.
+def enlarge(file: FileIO, size: int) -> None:
+    """Make a file that is shared with the processes of FMUs larger, to this size in bytes.
 
     Raises:
         OSError: if it is larger than files of this process may be, or there is no room.
     """
-    if sys.platform == "linux" and can_seal():
-        file = os.fdopen(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING), "w+b", 0)
-    else:
-        with tempfile.TemporaryFile() as named:
-            file = os.fdopen(os.dup(named.fileno()), "w+b", 0)
     try:
         file.truncate(size)
     except OSError as error:
         error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
         raise
-    if sys.platform == "linux" and can_seal():
-        growth = 0 if may_grow else fcntl.F_SEAL_GROW
-        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | growth | fcntl.F_SEAL_SEAL)
+
+
+def sealed_file(size: int) -> FileIO:
+    """Open a file without a name of this size in bytes, which no process can change if it is in memory.
+
+    A file that grows fills the memory.
+
+    Raises:
+        OSError: as for ``enlarge``.
+    """
+    file = unnamed_file()
+    enlarge(file, size)
+    if sys.platform == "linux" and hasattr(os, "memfd_create"):
+        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)
     return file
 
 
@@ -54,11 +62,6 @@ def lock_file(path: Path) -> int | None:
         os.close(descriptor)
         return None
     return descriptor
-
-
-def can_seal() -> bool:
-    """Whether no process can shorten what ``sealed_file`` opens, so that it is safe to map."""
-    return hasattr(os, "memfd_create")
 
 
 def homes() -> tuple[Path, ...]:

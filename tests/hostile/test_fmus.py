@@ -205,7 +205,7 @@ def test_where_fmus_cannot_be_confined_a_process_with_secrets_hides_its_memory(t
 
 # The worker is gone when the next simulation starts, without a failure that would be repeated at once.
 GONE = """
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 print(tried())
 next(iter(REGISTRY._runners.values())).close()
 """

@@ -1,4 +1,4 @@
-"""What all simulations of one search have in common, checked once, and the arrays with what differs."""
+"""What all simulations of one search have in common, checked once, and the numbers in which they differ."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -62,6 +62,11 @@ class Plan:
     def samples(self) -> int:
         """Number of points of the output grid."""
         return len(self.times)
+
+    @property
+    def given(self) -> int:
+        """How many numbers a simulation is given; see ``given_values``."""
+        return len(self.parameters) + len(self.inputs) * 5 * self.pieces
 
     @property
     def steps(self) -> int:
@@ -148,58 +153,32 @@ def _steps_per_output(experiment: Experiment) -> int:
     return count
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Room:
-    """Arrays that a plan's simulations read from and write to.
+def given_values(
+    plan: Plan, inputs: Mapping[str, NDArray[np.float64]], parameters: Mapping[str, float]
+) -> NDArray[np.float64]:
+    """Return what one simulation is given: parameters, then the rows of the inputs; shape (plan.given,).
 
-    Attributes:
-        header: what the worker tells while it simulates, shape (8,); it may write anything there.
-        parameters: values to set, shape (parameters,).
-        inputs: each input as a piecewise cubic (``Signal.pieces``), shape (inputs, 5 * pieces); unused pieces
-            start at inf.
-        outputs: recorded values by output and sample, shape (outputs, samples).
-    """
-
-    header: NDArray[np.float64]
-    parameters: NDArray[np.float64]
-    inputs: NDArray[np.float64]
-    outputs: NDArray[np.float64]
-
-    @staticmethod
-    def sizes(plan: Plan) -> tuple[int, int, int, int]:
-        """Return the numbers of float64 values that a plan needs, by array."""
-        rows = len(plan.inputs) * 5 * plan.pieces
-        return HEADER, len(plan.parameters), rows, len(plan.outputs) * plan.samples
-
-    @classmethod
-    def over(cls, plan: Plan, memory: NDArray[np.float64]) -> "Room":
-        """Return a plan's arrays as views of a flat array of enough float64 values."""
-        ends = np.cumsum(cls.sizes(plan))
-        header, parameters, inputs, outputs, _ = np.split(memory, ends)
-        return cls(
-            header,
-            parameters,
-            inputs.reshape(len(plan.inputs), 5 * plan.pieces),
-            outputs.reshape(len(plan.outputs), plan.samples),
-        )
-
-
-def check_values(plan: Plan, room: Room) -> None:
-    """Reject values outside the range of a variable's type.
+    Args:
+        plan: of the simulation.
+        inputs: each input as a piecewise cubic (``Signal.pieces``); unused pieces of a row start at inf.
+        parameters: values of parameters and start values.
 
     Raises:
-        SimulationError: naming the variable and the range of its type.
+        SimulationError: if values do not fit a variable; names the variable and the range of its type.
     """
+    given = np.full(plan.given, np.inf)
+    given[: len(parameters)] = list(parameters.values())
+    for row, table in zip(
+        given[len(parameters) :].reshape(len(inputs), 5 * plan.pieces), inputs.values(), strict=True
+    ):
+        row[: table.size] = table.ravel()
     for name, (low, high) in plan.limits.items():
-        if name in plan.inputs:
-            # Interpolated values are always between those at the ends of a piece.
-            pieces = room.inputs[plan.inputs.index(name)].reshape(plan.pieces, 5)
-            values = pieces[np.isfinite(pieces[:, 0]), 1]
-        else:
-            values = room.parameters[plan.parameters.index(name)]
+        # Interpolated values are always between those at the ends of a piece.
+        values = inputs[name][:, 1] if name in inputs else np.array([parameters[name]])
         if not (low - 0.5 <= values.min() and values.max() <= high + 0.5):
             raise SimulationError(
                 f"{plan.model}: values from {values.min():g} to {values.max():g} do not fit {name!r}, "
                 f"whose type ranges from {low:g} to {high:g}",
                 time=0.0,
             )
+    return given

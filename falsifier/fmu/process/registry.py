@@ -18,7 +18,7 @@ from falsifier.core.model import Experiment, check_finite
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import Plan, Room, make_plan
+from falsifier.fmu.process.plan import Plan, given_values, make_plan
 from falsifier.fmu.process.rights import Rights, described, read_told, resolved
 from falsifier.fmu.process.runner import Runner
 from falsifier.fmu.process.start import Started
@@ -137,15 +137,7 @@ def simulate(
     # points.
     pieces = 1 << (max(map(len, inputs.values()), default=1) - 1).bit_length()
     plan = _plan(order, experiment, tuple(inputs), tuple(parameters), pieces)
-
-    def fill(room: Room) -> None:
-        if parameters:
-            room.parameters[:] = list(parameters.values())
-        for row, table in zip(room.inputs, inputs.values(), strict=True):
-            row[: table.size] = table.ravel()
-            row[table.size :] = np.inf
-
-    outputs, log = REGISTRY.runner(order).simulate(plan, fill)
+    outputs, log = REGISTRY.runner(order).simulate(plan, given_values(plan, inputs, parameters))
     columns = dict(zip(plan.outputs, outputs, strict=True))
     if not np.isfinite(outputs).all():
         check_finite(plan.model, plan.times, columns)

@@ -11,7 +11,7 @@ from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.process import outcome
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import Plan, Room
+from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker, tell_if_slow
 from falsifier.fmu.process.workplace import Workplace
 
@@ -74,9 +74,7 @@ class Runner:
         self._lock = threading.Lock()
         self._is_stopped = False
 
-    def simulate(
-        self, plan: Plan, fill: Callable[[Room], None]
-    ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    def simulate(self, plan: Plan, given: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         """Simulate once.
 
         A simulation that fails in a process that has simulated before is repeated in a new one before it
@@ -85,7 +83,7 @@ class Runner:
 
         Args:
             plan: what the simulations have in common.
-            fill: writes parameters and inputs to the memory that the worker reads.
+            given: the numbers of this one; see ``given_values``.
 
         Returns:
             The outputs, shape (outputs, samples), and the FMU's messages.
@@ -98,7 +96,7 @@ class Runner:
             worker = self._worker_for(plan)
             is_reused, reuse = worker.simulations > 0, self._experience.reuse
             try:
-                return self._simulate(worker, plan, fill)
+                return self._simulate(worker, plan, given)
             except SimulationError as error:
                 if not self._should_repeat(error, is_reused=is_reused):
                     raise
@@ -107,7 +105,7 @@ class Runner:
                 speaking = self._speaking_worker(plan)
             except (ModelError, SimulationError):
                 raise failure from None
-            repeated = self._simulate(speaking, plan, fill)
+            repeated = self._simulate(speaking, plan, given)
             if is_reused and reuse is not None:
                 self._experience.distrust(reuse)
             return repeated
@@ -153,10 +151,10 @@ class Runner:
         return worker
 
     def _simulate(
-        self, worker: Worker, plan: Plan, fill: Callable[[Room], None]
+        self, worker: Worker, plan: Plan, given: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         try:
-            worker = self._started(worker, plan, fill)
+            worker = self._started(worker, plan, given)
             reply = worker.wait()
         except TimeoutError:
             reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
@@ -166,7 +164,7 @@ class Runner:
             reason, log = worker.crash(error)
             self._worker = None
             raise outcome.crash(plan, reason, log) from None
-        except SimulationError:  # before it began
+        except SimulationError:  # stopped before it began
             raise
         except BaseException:
             # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
@@ -176,7 +174,7 @@ class Runner:
             log, refusals = worker.take_log(), worker.refusals
             self._drop()
             raise self._order.failure(plan, reply, refusals, log)
-        outputs = worker.room.outputs.copy()
+        outputs = worker.outputs(plan)
         log = worker.take_log(reply)
         if worker.simulations == 1:
             seconds = time.perf_counter() - worker.started
@@ -186,15 +184,15 @@ class Runner:
             self._drop()
         return outputs, log
 
-    def _started(self, worker: Worker, plan: Plan, fill: Callable[[Room], None]) -> Worker:
+    def _started(self, worker: Worker, plan: Plan, given: NDArray[np.float64]) -> Worker:
         """Start the simulation, in a new worker if this one has died since its last simulation."""
         self._check_wanted()  # it may have been stopped while the worker was being started
         try:
-            worker.start(fill)
+            worker.start(given)
         except Closed:
             self._drop()
             worker = self._worker_for(plan)
-            worker.start(fill)
+            worker.start(given)
         return worker
 
     def _check_wanted(self) -> None:

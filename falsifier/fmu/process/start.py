@@ -1,6 +1,5 @@
 """A worker's process with its files: the memory that it shares, its output, and the configuration of Wine."""
 
-import mmap
 import os
 import signal
 from collections.abc import Mapping
@@ -41,25 +40,20 @@ _SIGNALS = {
 class Memory:
     """Float64 values that this process and a worker share; they can become more.
 
-    Where no process can shorten the file, both map it. Elsewhere this process would die with it, and so it
-    writes and reads the file instead.
+    The worker maps the file that they are in. This process writes and reads it: a process dies that maps a
+    file which another one shortens.
 
     Args:
         path: of the file, for a worker that cannot get a descriptor; None: it has no name.
 
     Attributes:
-        values: the values.
         path: as above.
     """
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
-        if path is None:
-            self._file = posix_files.sealed_file(0, may_grow=True)
-        else:
-            self._file = path.open("x+b", buffering=0)
-        self._is_mapped = path is None and posix_files.can_seal()
-        self.values: NDArray[np.float64] = np.zeros(0)
+        self._file = posix_files.unnamed_file() if path is None else path.open("x+b", buffering=0)
+        self._count = 0
 
     def fileno(self) -> int:
         """Descriptor of the file."""
@@ -71,40 +65,32 @@ class Memory:
         Raises:
             OSError: if there is none, or files may not be so large.
         """
-        if count <= len(self.values):
-            return
-        try:
-            self._file.truncate(8 * count)
-        except OSError as error:
-            error.filename = "memory shared with the processes of FMUs"  # the file itself has no name
-            raise
-        if self._is_mapped:
-            self.values = np.frombuffer(mmap.mmap(self.fileno(), 8 * count), dtype=np.float64)
-        else:
-            self.values = np.zeros(count)
+        if count > self._count:
+            posix_files.enlarge(self._file, 8 * count)
+            self._count = count
 
-    def give(self) -> None:
-        """Let the worker see the values."""
-        if not self._is_mapped:
-            os.pwrite(self.fileno(), self.values.tobytes(), 0)
+    def write(self, values: NDArray[np.float64], position: int) -> None:
+        """Let the worker see these values."""
+        os.pwrite(self.fileno(), values.data, 8 * position)
 
-    def take(self) -> None:
-        """See what the worker has written."""
-        if not self._is_mapped:
-            read = os.pread(self.fileno(), self.values.nbytes, 0)
-            found = np.frombuffer(read[: len(read) // 8 * 8], dtype=np.float64)
-            self.values[: len(found)] = found
-            self.values[len(found) :] = np.nan
+    def read(self, values: NDArray[np.float64], position: int) -> None:
+        """Fill an array, shape (n,), with what the worker has written; with NaN if the file has shrunk."""
+        self._file.seek(8 * position)
+        left = values.view(np.uint8).data
+        while left and (count := self._file.readinto(left)):
+            left = left[count:]
+        if left:
+            values[:] = np.nan
 
     def header(self, position: int) -> float:
         """Return a number of the header, as the worker says; it may be anything."""
-        if self._is_mapped or self._file.closed:
-            return float(self.values[position]) if len(self.values) else 0.0
-        read = os.pread(self.fileno(), 8, 8 * position)
-        return float(np.frombuffer(read.ljust(8, b"\0"), dtype=np.float64)[0])
+        value = np.zeros(1)
+        if not self._file.closed:
+            self.read(value, position)
+        return float(value[0])
 
     def close(self) -> None:
-        """Close the file; the values stay."""
+        """Close the file."""
         self._file.close()
 
 

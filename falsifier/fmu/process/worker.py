@@ -9,6 +9,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Literal, get_args
 
+import numpy as np
+from numpy.typing import NDArray
+
 from falsifier.core.posix import exit_text
 from falsifier.errors import ModelError
 from falsifier.fmu.description.libraries import HOW_TO_INSTALL
@@ -24,7 +27,7 @@ from falsifier.fmu.process.connection import (
 )
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import HEADER, Plan, Room, check_values
+from falsifier.fmu.process.plan import HEADER, Plan
 from falsifier.fmu.process.rights import Told, read_told
 from falsifier.fmu.process.start import RUNNING, SIMULATED, Started, crash_code
 from falsifier.fmu.process.workplace import Workplace
@@ -123,7 +126,6 @@ class Worker:
 
     Attributes:
         plan: the plan for which it is prepared.
-        room: the plan's arrays.
         logging: as above.
         awaits_test: whether it is finding out how simulations can start.
         simulations: number of simulations that it has completed.
@@ -188,26 +190,21 @@ class Worker:
     def prepare(self, plan: Plan, limit: float) -> Reply:
         """Let the worker look up a plan's variables; errors as for ``load``."""
         started = self._started
-        started.memory.fit(sum(Room.sizes(plan)))
-        started.memory.give()
-        self.room = Room.over(plan, started.memory.values)
+        started.memory.fit(HEADER + plan.given + len(plan.outputs) * plan.samples)
         send(started.program, Request.PREPARE, text(started.place) + self._order.prepare(plan))
         reply = self.receive(limit)
         if reply.is_done:
             self.plan = plan
         return reply
 
-    def start(self, fill: Callable[[Room], None]) -> None:
-        """Start a simulation.
+    def start(self, given: NDArray[np.float64]) -> None:
+        """Start a simulation with these numbers.
 
         Raises:
-            SimulationError: if an input does not fit its variable.
             Closed: if the process has ended.
         """
         assert self.plan is not None, "it is prepared"
-        fill(self.room)
-        check_values(self.plan, self.room)
-        self._started.memory.give()
+        self._started.memory.write(given, HEADER)
         payload = reals(self.plan.time_limit) + integers(0 if self.plan.has_limit else SHARES)
         send(self._started.program, Request.SIMULATE, payload)
 
@@ -230,10 +227,15 @@ class Worker:
                 patience.look(self.reached)
         self._is_quick = time.perf_counter() - started < QUICK_SECONDS
         if reply.is_done:
-            self._started.memory.take()
             self.simulations += 1
             self.awaits_test = reply.more
         return reply
+
+    def outputs(self, plan: Plan) -> NDArray[np.float64]:
+        """Return what the last simulation has recorded, shape (outputs, samples)."""
+        found = np.empty(len(plan.outputs) * plan.samples)
+        self._started.memory.read(found, HEADER + plan.given)
+        return found.reshape(len(plan.outputs), plan.samples)
 
     def receive(self, limit: float, polling: float = 0.0) -> Reply:
         """Wait for a reply; see ``connection.receive``."""

@@ -59,7 +59,7 @@ void start_session(struct request *request)
         give_up("%s", wrong);
 }
 
-/* The memory of simulations begins with a header; then it is laid out as Room is: parameters, inputs, outputs. */
+/* The memory of simulations begins with a header; then it is laid out: parameters, inputs, outputs. */
 static void prepare(void)
 {
     struct request request = plan;

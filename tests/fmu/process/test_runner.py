@@ -124,7 +124,7 @@ def test_each_fmu_has_a_worker_of_its_own_without_secrets(
 
 def test_a_worker_that_hangs_ends_with_its_parent(tmp_path: Path) -> None:
     body = """
-from falsifier.fmu.process import REGISTRY
+from falsifier.fmu.process.registry import REGISTRY
 (runner,) = REGISTRY._runners.values()
 import threading
 threading.Timer(0.3, os.kill, (os.getpid(), 9)).start()
