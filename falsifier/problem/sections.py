@@ -1,18 +1,14 @@
 """The sections of a spec file."""
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    model_validator,
-)
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
+from falsifier.errors import did_you_mean
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
@@ -33,7 +29,26 @@ MAX_CONTROL_POINTS = 10_000
 class Strict(BaseModel):
     """A section that takes no other keys than its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, populate_by_name=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_known_keys(cls, section: Any) -> Any:
+        """Say which keys there are, and what a missing one means; ``wrong_key`` states the key beside it."""
+        if not isinstance(section, Mapping):
+            return section
+        fields = {field.alias or name: field for name, field in cls.model_fields.items()}
+        for key in section:
+            if key not in fields and key not in cls.model_fields:
+                raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), fields)}")
+        for key, field in fields.items():
+            if field.is_required() and key not in section:
+                raise _wrong(key, f"this key is missing ({field.description})")
+        return section
+
+
+def _wrong(key: str, message: str) -> PydanticCustomError:
+    return PydanticCustomError("wrong_key", "{message}", {"key": key, "message": message})
 
 
 class FreeSection(Strict):
@@ -135,8 +150,6 @@ class ComponentSection(Strict):
 
 class ConnectionSection(Strict):
     """Where the values of one input of a component come from."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
 
     source: str = Field(alias="from", description="Output, as COMPONENT.VARIABLE.")
     factor: Number | None = Field(None, description="Factor of factor * value + offset, in place of units.")

@@ -8,14 +8,13 @@ these sections that sets a key wins::
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from functools import reduce
 from operator import or_
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_args, get_origin
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
-from pydantic.fields import FieldInfo
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, rejected
@@ -50,10 +49,7 @@ _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 _STEPS = ("tuple", "function-before")
 
 
-# Kinds of requirements; pydantic's locations have them as tags between a requirement's name and its keys.
-_KINDS: Mapping[str, type[RequirementSection | Template]] = {"formula": RequirementSection, **TEMPLATES}
-
-
+# Pydantic's locations have the kind of a requirement as a tag between its name and its keys.
 def _kind_of_requirement(section: object) -> str | None:
     """Return which section a requirement is; None if there is no such template."""
     name = section.get("template") if isinstance(section, Mapping) else getattr(section, "template", None)
@@ -63,6 +59,7 @@ def _kind_of_requirement(section: object) -> str | None:
 if TYPE_CHECKING:
     AnyRequirement = RequirementSection | Template
 else:
+    _KINDS = {"formula": RequirementSection, **TEMPLATES}
     _TAGGED = (Annotated[kind, Tag(f"<{name}>")] for name, kind in _KINDS.items())
     AnyRequirement = Annotated[reduce(or_, _TAGGED), Discriminator(_kind_of_requirement)]
 
@@ -187,57 +184,25 @@ def _error_of(error: ValidationError) -> SpecError:
     """Return the error to raise for the first thing that is wrong."""
     first = error.errors()[0]
     where = [str(part) for part in first["loc"] if part not in _STEPS]
-    # Below the name of a requirement comes the tag of its kind, which is no key.
-    kind = where.pop(2) if where[0] == "requirements" and len(where) > 2 else ""
-    key, wrong = ".".join(where), first["type"]
-    if wrong == "union_tag_not_found":
+    if where[:1] == ["requirements"] and len(where) > 2:
+        where.pop(2)  # below the name of a requirement comes the tag of its kind, which is no key
+    if first["type"] == "union_tag_not_found":
         known = did_you_mean(str(first["input"].get("template")), TEMPLATES)
-        return SpecError(f"no such template; {known}", key=f"{key}.template")
-    if wrong in ("extra_forbidden", "missing") and (quoted := _unquoted(error)):
-        return SpecError(f"names with dots are written in quotes: {quoted}", key=".".join(where[:2]))
-    if wrong == "extra_forbidden":
-        known = did_you_mean(where[-1], sorted(_fields(where[:-1], kind)))
-        return SpecError(f"unknown key; {known}", key=key)
-    if wrong == "missing":
-        field = _fields(where[:-1], kind).get(where[-1])
-        meaning = f" ({field.description})" if field is not None and field.description else ""
-        return SpecError(f"this key is missing{meaning}", key=key)
-    return SpecError(rejected(first["msg"], first["input"]), key=key)
+        return SpecError(f"no such template; {known}", key=f"{'.'.join(where)}.template")
+    if first["type"] == "wrong_key":
+        wrong = first["ctx"]["key"]
+        if quoted := _unquoted(where, wrong, first["input"].get(wrong)):
+            message = f"names with dots are written in quotes: {quoted}"
+            return SpecError(message, key=".".join(where[:2]))
+        where.append(wrong)
+    return SpecError(rejected(first["msg"], first["input"]), key=".".join(where))
 
 
-def _unquoted(error: ValidationError) -> str:
+def _unquoted(where: Sequence[str], key: str, value: object) -> str:
     """Return how to write a dotted name that TOML has read as nested tables; empty if there is none."""
-    for each in error.errors():
-        location = [str(part) for part in each["loc"]]
-        if each["type"] != "extra_forbidden" or len(location) < 3:
-            continue
-        section, *names = location[-3:]
-        name = f'"{".".join(names)}"'
-        if section in ("inputs", "parameters") and isinstance(each["input"], dict):
-            return f"[{section}.{name}]"
-        is_quoted = "." in names[0]
-        if section == "parameters" or (section == "connections" and not is_quoted):
-            return f"{name} = ..."
-    return ""
-
-
-def _fields(keys: Iterable[str], kind: str) -> Mapping[str, FieldInfo]:
-    """Return the fields of the section with these keys; a requirement's are those of its kind."""
-    fields: Mapping[str, FieldInfo] = Spec.model_fields
-    remaining = iter(keys)
-    for key in remaining:
-        annotation = fields[key].annotation if key in fields else None
-        if get_origin(annotation) is dict:  # the next key is a name that the user chose
-            next(remaining, None)
-        section = _section_in(annotation)
-        if section is RequirementSection:
-            section = _KINDS.get(kind.strip("<>"), RequirementSection)
-        fields = section.model_fields if section else fields
-    return fields
-
-
-def _section_in(annotation: object) -> type[BaseModel] | None:
-    """Return the first section that a type contains."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next(filter(None, map(_section_in, get_args(annotation))), None)
+    section, name = ("", "", *where)[-2:]
+    quoted = f'"{name}.{key}"'
+    if section in ("inputs", "parameters") and isinstance(value, dict):
+        return f"[{section}.{quoted}]"
+    is_dotted = section == "parameters" or (section == "connections" and "." not in name)
+    return f"{quoted} = ..." if is_dotted and value is not None else ""

@@ -40,7 +40,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
         ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected either range"),
         ("requirements", {}, r"requirements: "),
-        ("requirements.R", {"formul": "x"}, r"requirements\.R\.formula: this key is missing"),
+        ("requirements.R", {"formul": "x"}, r"requirements\.R\.formul: unknown key; did you mean 'formula'"),
         ("profiles.p.inputs.u.hodl", 1, r"profiles\.p\.inputs\.u\.hodl: unknown key; did you mean 'hold'"),
     ],
 )
