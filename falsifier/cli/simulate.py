@@ -2,7 +2,6 @@
 
 from contextlib import closing
 from dataclasses import replace
-from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, outcome_text
 
@@ -40,8 +40,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
-    given = _numbers(options)
-    source = problem_source(options)
+    source, given = _without_numbers(problem_source(options))
     is_table = place is not None and place.suffix.lower() == ".csv"
     stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
@@ -78,21 +77,13 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
     conclude(as_shown(text, content, as_json=as_json), 1 if evaluation.violated else 0)
 
 
-def _numbers(options: dict[str, Any]) -> dict[str, float]:
-    """Take the numbers of ``--set`` out of a command's keyword arguments: they may lie outside of ranges."""
-    numbers, texts = dict[str, float](), list[str]()
-    for option in options["values"]:
-        name, equals, text = option.partition("=")
-        try:
-            value = float(text)
-        except ValueError:
-            value = nan
-        if equals and name.strip() and isfinite(value):
-            numbers[name.strip()] = value
-        else:
-            texts.append(option)
-    options["values"] = texts
-    return numbers
+def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, float]]:
+    """Take the numbers of ``--set`` out of a source: they may lie outside of ranges."""
+    stated = source.changes.parameters
+    numbers = {name: s.value for name, s in stated.items() if isinstance(s.value, float)}
+    others = {name: section for name, section in stated.items() if name not in numbers}
+    changes = source.changes.model_copy(update={"parameters": others})
+    return source.model_copy(update={"changes": changes}), numbers
 
 
 def _read(file: Path, problem: Problem) -> dict[str, Signal]:

@@ -313,7 +313,10 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
         stated = section.model_dump(exclude_unset=True)
         if info[name].causality == "input":
             if isinstance(section.value, str):
-                raise SpecError(f"{name}: expected a number, got {section.value!r}")
+                raise SpecError(
+                    f"{name}: expected a number, got {section.value!r}; to search a range: --search "
+                    f"{name}=LOW:HIGH"
+                )
             inputs[name] = InputSection.model_validate(stated)
         elif not stated.keys() <= {"range", "value"} or not stated:
             raise SpecError(

@@ -5,18 +5,15 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
-from falsifier.core.signals import INTERPOLATIONS
-from falsifier.errors import FormulaError, SpecError, did_you_mean, rejected
+from falsifier.errors import FormulaError, SpecError, rejected
 from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
-
-_DIGITS = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # One argument of a template: spaces only in quotes and in lists.
@@ -35,6 +32,8 @@ InputChoice = (
 )
 # A value, text for a string, a range to search, or a complete section of a spec.
 ParameterChoice = float | str | tuple[float, float] | ParameterSection
+
+Choice = TypeVar("Choice")
 
 
 def changes_from(
@@ -60,18 +59,24 @@ def changes_from(
     inputs, parameters = inputs or {}, parameters or {}
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
-    sections = {name: _input_section(name, choice) for name, choice in inputs.items()}
-    named = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
-    return _changes(sections, named, experiment, allow, deny)
+    data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
+    data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
+    data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
+    rights = {"allow": resolved(allow, Path()), "deny": tuple(deny)}
+    data |= {name: words for name, words in rights.items() if words}
+    try:
+        return ModelChanges.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise SpecError(f"{where}: {rejected(first['msg'], first['input'])}") from None
 
 
 def changes_from_options(
     *,
     values: Iterable[str] = (),
     ranges: Iterable[str] = (),
-    allow: Iterable[str] = (),
-    deny: Iterable[str] = (),
-    **experiment: float | Interface | None,
+    **more: Any,
 ) -> ModelChanges:
     """Return the changes for command-line options.
 
@@ -83,9 +88,7 @@ def changes_from_options(
         ranges: ``name=low:high`` (an input is searched with the spec's control points, or else a free
             parameterization), ``name=low:high:points``, ``name=low:high:points:interpolation``, or ``name``
             (an input is searched as in the spec, or between the FMU's min and max).
-        allow: ``write:PATH``, ``read:PATH`` or ``programs``; paths begin in the current folder.
-        deny: ``network``.
-        experiment: fields of ModelChanges; None leaves a field unchanged.
+        more: ``allow``, ``deny`` and fields of ModelChanges; see ``changes_from``.
 
     Raises:
         SpecError: naming the option that is invalid.
@@ -94,7 +97,7 @@ def changes_from_options(
     searched = _once("--search", map(_range, ranges))
     if both := sorted(constant.keys() & searched.keys()):
         raise SpecError(f"{both[0]}: --set keeps it constant, --search varies it; drop one of them")
-    return _changes(searched, constant, experiment, allow, deny)
+    return changes_from(inputs=searched, parameters=constant, **more)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
@@ -125,25 +128,6 @@ def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, s
     if isinstance(section, InputSection) and section.control_points is not None:
         said += [str(section.control_points), *([section.interpolation] if section.interpolation else [])]
     return "--search", f"{name}={':'.join(said)}"
-
-
-def _changes(
-    inputs: Mapping[str, object],
-    parameters: Mapping[str, object],
-    experiment: Mapping[str, float | Interface | None],
-    allow: Iterable[str],
-    deny: Iterable[str],
-) -> ModelChanges:
-    data: dict[str, Any] = {"inputs": inputs, "parameters": parameters}
-    data |= {name: value for name, value in experiment.items() if value is not None}
-    rights = {"allow": resolved(allow, Path()), "deny": tuple(deny)}
-    data |= {name: words for name, words in rights.items() if words}
-    try:
-        return ModelChanges.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"{where}: {rejected(first['msg'], first['input'])}") from None
 
 
 def _input_section(name: str, choice: InputChoice) -> object:
@@ -185,78 +169,44 @@ def named_file(text: str, folder: Path) -> str:
 # -- texts of options ----------------------------------------------------------------------------------------
 
 
-def _once(flag: str, sections: Iterable[tuple[str, dict[str, object]]]) -> dict[str, dict[str, object]]:
-    found: dict[str, dict[str, object]] = {}
-    for name, section in sections:
+def _once(flag: str, choices: Iterable[tuple[str, Choice]]) -> dict[str, Choice]:
+    found: dict[str, Choice] = {}
+    for name, choice in choices:
         if name in found:
             raise SpecError(f"{flag} {name}: given twice; drop one of them")
-        found[name] = section
+        found[name] = choice
     return found
 
 
-def _value(option: str) -> tuple[str, dict[str, object]]:
-    name, parts = _split(option, "--set", "NAME=VALUE", "mass=1200")
-    numbers = [_number(part) for part in parts]
-    if None in numbers:
-        return name, {"value": named_file(":".join(parts), Path())}
-    if len(numbers) > 1:
-        raise SpecError(f"--set {option}: expected one value; to search a range: --search {option}")
-    if not isfinite(numbers[0] or 0.0):
-        raise SpecError(f"--set {option}: expected a finite number")
-    return name, {"value": numbers[0]}
-
-
-def _as_range(text: str) -> str:
-    """Return the range that a text with another separator was meant to be, or an example."""
-    match = re.fullmatch(rf"[\[(]?\s*({_DIGITS})\s*(?:-|,|;|\.\.+|\bto\b|\s)\s*({_DIGITS})\s*[\])]?", text)
-    return f"{match[1]}:{match[2]}" if match else "0:100"
-
-
-def _range(option: str) -> tuple[str, dict[str, object]]:
-    if option.strip() and "=" not in option:
-        return option.strip(), {}
-    name, parts = _split(option, "--search", "NAME=LOW:HIGH[:POINTS]", "throttle=0:100:7")
-    if len(parts) == 1 and _number(parts[0]) is not None:
-        raise SpecError(f"--search {option}: expected a range LOW:HIGH; to keep it constant: --set {option}")
-    if len(parts) == 1 or "" in (part.strip() for part in parts[:2]):
-        raise SpecError(
-            f"--search {option}: expected NAME=LOW:HIGH, with a colon, for example --search "
-            f"{name}={_as_range(parts[0])}"
-        )
-    if len(parts) > 4:
-        raise SpecError(f"--search {option}: expected NAME=LOW:HIGH:POINTS:INTERPOLATION")
-    limits = [_number(part) for part in parts[:2]]
-    if None in limits:
-        wrong = parts[limits.index(None)]
-        raise SpecError(f"--search {option}: {wrong!r} is not a number; expected NAME=LOW:HIGH")
-    section: dict[str, object] = {"range": limits}
-    if len(parts) > 2:
-        if not parts[2].isdigit():
-            raise SpecError(
-                f"--search {option}: {parts[2]!r} is not a number of control points; expected 1 or more"
-            )
-        section["control_points"] = int(parts[2])
-    if len(parts) > 3:
-        if parts[3] not in INTERPOLATIONS:
-            raise SpecError(
-                f"--search {option}: unknown interpolation; {did_you_mean(parts[3], INTERPOLATIONS)}"
-            )
-        section["interpolation"] = parts[3]
-    return name, section
-
-
-def _split(option: str, flag: str, ways: str, example: str) -> tuple[str, list[str]]:
-    name, equals, rest = option.partition("=")
-    if not equals or not name.strip() or not rest.strip():
-        raise SpecError(f"{flag} {option}: expected {ways}, for example {flag} {example}")
-    return name.strip(), rest.strip().split(":")
-
-
-def _number(text: str) -> float | None:
+def _value(option: str) -> tuple[str, float | str]:
+    name, _, said = (part.strip() for part in option.partition("="))
+    if not name or not said:
+        raise SpecError(f"--set {option}: expected NAME=VALUE, for example --set mass=1200")
     try:
-        return float(text)
+        value = float(said)
     except ValueError:
-        return None
+        return name, said
+    if not isfinite(value):
+        raise SpecError(f"--set {option}: expected a finite number")
+    return name, value
+
+
+def _range(option: str) -> tuple[str, InputChoice]:
+    name, equals, said = (part.strip() for part in option.partition("="))
+    if name and not equals:
+        return name, None
+    try:
+        low, high, *more = said.split(":")
+        points = [int(number) for number in more[:1]]
+        choice: Any = (float(low), float(high), *points, *more[1:])
+        if name and len(choice) <= 4:
+            return name, choice
+    except ValueError:  # of a number, or because there is no colon
+        pass
+    raise SpecError(
+        f"--search {option}: expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search "
+        f"{name or 'throttle'}=0:100:7; to keep it constant: --set {name or 'throttle'}=50"
+    )
 
 
 def template_arguments(text: str) -> dict[str, Any]:

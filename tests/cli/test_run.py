@@ -47,8 +47,11 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
     [
         ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "nothing is left to search: --set keeps"),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
-        ((*SPEED, "--search", "throttle=0-100"), "for example --search throttle=0:100"),
-        ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=0:100"),
+        (
+            (*SPEED, "--search", "throttle=0-100"),
+            "expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search throttle=0:100:7",
+        ),
+        ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=LOW:HIGH"),
         ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
         (("AT1", "--set", "throtle=3"), "did you mean 'throttle'?"),
