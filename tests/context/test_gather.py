@@ -75,7 +75,8 @@ def test_a_secret_in_a_part_of_a_simulink_file_names_the_part(tmp_path: Path) ->
 
 def test_a_secret_behind_an_encoding_is_refused_as_well(tmp_path: Path) -> None:
     parts: dict[str, str | bytes] = dict(simulink.newer_parts())
-    system = simulink.CONTROLLER.replace('Name="Proportional"', 'Name="sk-abcdefghijklmnop"')
+    system = simulink.newer_parts()["simulink/systems/system_4.xml"]
+    system = system.replace('Name="Proportional"', 'Name="sk-abcdefghijklmnop"')
     system = system.replace('encoding="utf-8"', 'encoding="utf-16"')
     parts["simulink/systems/system_4.xml"] = system.encode("utf-16")
     with pytest.raises(SpecError, match=r"limphome\.slx, as it is told: line \d+ looks like a key"):
