@@ -30,45 +30,28 @@ class _Item:
 
 def read_charts(tree: Node) -> Iterator[Chart]:
     """Return the charts of a file in the order in which it has them."""
-    flat = _listed(tree)
+    # Items of older files stand beside their charts, and name what they are in by its number.
+    beside: dict[str, list[Node]] = {}
+    for child in (child for node in tree.walk() if node.kind == "Stateflow" for child in node.children):
+        beside.setdefault(_parent(child), []).append(child)
     for node in tree.walk():
         if node.kind == "chart":
-            items = [*_nested(node, ""), *flat.get(node.get("id"), ())]
-            yield _chart(node, items)
+            yield _chart(node, list(_items(node, "", beside)))
 
 
-def _nested(node: Node, parent: str) -> Iterator[_Item]:
-    for child in node.children:
+def _items(around: Node, parent: str, beside: Mapping[str, list[Node]]) -> Iterator[_Item]:
+    number = around.get("id")
+    for child in (*around.children, *(beside.get(number, ()) if number else ())):
         if child.kind in _KINDS:
             key = child.get("SSID", "id")
             yield _Item(child, key, parent)
-            yield from _nested(child, key)
-
-
-def _listed(tree: Node) -> Mapping[str, list[_Item]]:
-    """Items of older files, which stand beside their charts and name what they are in by its number."""
-    charts = {node.get("id") for node in tree.walk() if node.kind == "chart"}
-    beside = [
-        child for node in tree.walk() if node.kind == "Stateflow" for child in node.children
-        if child.kind in _KINDS and child.get("id")
-    ]  # fmt: skip
-    parents = {child.get("id"): _parent(child) for child in beside}
-    found: dict[str, list[_Item]] = {}
-    for child in beside:
-        parent = around = parents[child.get("id")]
-        for _ in range(_MAX_NESTING):  # from state to state, up to the chart
-            if around in charts or around not in parents:
-                break
-            around = parents[around]
-        item = _Item(child, child.get("id"), "" if parent in charts else parent)
-        found.setdefault(child.get("chart") or around, []).append(item)
-    return found
+            yield from _items(child, key, beside)
 
 
 def _parent(node: Node) -> str:
     """Number of what an item of an older file is in: the first number of its position in the tree."""
     found = _INTEGER.search(node.get("treeNode", "linkNode"))
-    return found[0] if found else ""
+    return found[0] if found else node.get("chart")
 
 
 def _chart(node: Node, items: list[_Item]) -> Chart:
