@@ -146,10 +146,15 @@ def gather(*directories: Path) -> Content:
     Raises:
         JournalError: if a directory is neither, or is damaged.
     """
-    return Content(list(map(_side, directories)))
+    names = [directory.resolve().name for directory in directories]
+    titles = (
+        str(directory) if names.count(name) > 1 else name
+        for directory, name in zip(directories, names, strict=True)
+    )
+    return Content(list(map(_side, directories, titles)))
 
 
-def _side(directory: Path) -> Side:
+def _side(directory: Path, title: str) -> Side:
     runs = load(directory)
     grouped: dict[str, dict[str, list[Run]]] = {}
     for run in runs:
@@ -157,7 +162,7 @@ def _side(directory: Path) -> Side:
     # Of a single run, shares and means say nothing.
     counts = is_campaign(directory) or any(len(m) > 1 for by in grouped.values() for m in by.values())
     return Side(
-        directory.resolve().name,
+        title,
         runs,
         main_table(runs, read_published()) if counts else None,
         [_section(name, by_method) for name, by_method in grouped.items()],

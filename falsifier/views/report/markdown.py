@@ -38,8 +38,13 @@ def markdown_report(*directories: Path) -> str:
                 parts += _verdict(section, where)
     if len(content.sides) > 1:
         parts.append(differences(content).markdown().rstrip())
-    parts += [side.table.markdown().rstrip() for side in content.sides if side.table is not None]
-    return "\n\n".join([*parts, *map(_environment, content.sides)]) + "\n"
+    for side in content.sides:
+        if side.table is not None:
+            parts += [f"## Statistics: {markdown_text(side.title)}", side.table.markdown().rstrip()]
+    for side in content.sides:
+        whose = f"{markdown_text(side.title)}: " if len(content.sides) > 1 else ""
+        parts.append(f"{whose}{_environment(side)}")
+    return "\n\n".join(parts) + "\n"
 
 
 def _verdict(section: Section, where: str) -> list[str]:

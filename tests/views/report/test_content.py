@@ -30,6 +30,16 @@ def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) 
     assert "<h2>stl-2: G (y &lt;= 6) " in html_report(tmp_path)
 
 
+def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    places = [tmp_path / folder / "nightly" for folder in ("before", "after")]
+    for place in places:
+        falsify(hard(), "uniform", budget=20, directory=place)
+    text = markdown_report(*places).replace("\\", "")
+    for place in places:
+        assert f"## HARD in {place}: violated" in text
+        assert f"{place}: falsifier " in text, "its versions"
+
+
 def test_a_search_can_be_repeated_from_its_command() -> None:
     changes = changes_from_options(ranges=["u=0:1:3"], stop_time=5.0)
     request = RunRequest(
