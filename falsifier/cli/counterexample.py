@@ -11,7 +11,6 @@ import click
 
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
-from falsifier.cli.llm_options import api_base_option, llm_option, name_and_effort
 from falsifier.cli.options import (
     PATH,
     budget_option,
@@ -67,8 +66,6 @@ _LEAST_MAP_BUDGET = ceil(4 * _MAP_BUDGET / _MAP_POINTS)
     help="With --shrink: maximum robustness of the simpler one; 0: any violation. Default: half of that of "
     "a counterexample, or a tenth more than that of a nearest miss.",
 )
-@llm_option()
-@api_base_option
 @requirement_option
 @out_option(
     "File to write; default: shrunk.json, or shrunk.csv for a nearest miss; with --map robustness-map.png."
@@ -82,8 +79,6 @@ def explain(
     mapped: bool,
     budget: int | None,
     at_most: float | None,
-    llm: str | None,
-    api_base: str | None,
     requirement: str | None,
     out: Path | None,
     as_json: bool,
@@ -95,26 +90,22 @@ def explain(
     miss, the simulation that came nearest to a violation.
 
     Without --shrink and --map: says what broke, and what happens if each input alone is reset; for a nearest
-    miss it also draws nearest-miss.png. With --llm, a language model describes it in its own words, too.
-    Except with --shrink, the shrunk counterexample of a run is used if there is one.
+    miss it also draws nearest-miss.png. Except with --shrink, the shrunk counterexample of a run is used if
+    there is one.
     """
     if shrunk and mapped:
         raise click.UsageError("--shrink and --map cannot be combined; run one after the other")
     if not shrunk:
         refuse("applies to --shrink only", at_most=at_most)
-    if shrunk or mapped:
-        refuse("leave out --shrink and --map", llm=llm, api_base=api_base)
-    else:
+    if not (shrunk or mapped):
         refuse("add --shrink or --map", budget=budget, out=out)
-    if llm is None:
-        refuse("requires --llm NAME", api_base=api_base)
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
         _shrink(case, rights, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
     elif mapped:
         _map(case, run, rights, budget=budget or _MAP_BUDGET, out=out, as_json=as_json)
     else:
-        _explain(case, run, rights, llm=llm, api_base=api_base, as_json=as_json)
+        _explain(case, run, rights, as_json=as_json)
 
 
 @command()
@@ -253,24 +244,10 @@ def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> lis
     return files if picture is None else [*files, picture]
 
 
-def _explain(
-    case: Case,
-    run: Path,
-    rights: Mapping[str, Any],
-    *,
-    llm: str | None,
-    api_base: str | None,
-    as_json: bool,
-) -> None:
+def _explain(case: Case, run: Path, rights: Mapping[str, Any], *, as_json: bool) -> None:
     """Print what broke, and what resetting each input alone comes to."""
-    from falsifier.counterexamples.explain import explain, narrate
+    from falsifier.counterexamples.explain import explain
 
-    chat = None
-    if llm is not None:
-        from falsifier.llm.connect import connect
-
-        name, effort = name_and_effort(llm)
-        chat = connect(name, effort=effort, api_base=api_base)
     picture = None
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
@@ -279,18 +256,14 @@ def _explain(
             picture = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
     with suppress(OSError):  # it is printed anyway
         write_whole(beside(case.file, EXPLANATION), f"{explanation.text}\n")
-    words = narrate(explanation, chat) if chat else None
     content = {
         "violated": explanation.violated,
         "text": explanation.text,
         "effects": [asdict(effect) for effect in explanation.effects],
         "about": str(case.place),
-        "told_by": {"llm": llm, "words": words} if words else None,
         "picture": picture and str(picture),
     }
     lines = [*_about(case, problem, run), explanation.text]
-    if words is not None:
-        lines.append(f"\nIn the words of {llm}, which may be wrong:\n{words}")
     if picture is not None:
         lines.append(f"picture: {picture}")
     say(as_shown("\n".join(lines), content, as_json=as_json))

@@ -8,15 +8,11 @@ effect: several at once may do what none does alone.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange
-from falsifier.core.words import candidate_lines
 from falsifier.counterexamples.shrink import (
     constant_signal,
     stretches,
@@ -30,17 +26,6 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, in_words
 from falsifier.stl.margins import is_on_limit, margin_words, shown, signed
 
-if TYPE_CHECKING:
-    from falsifier.llm.messages import Chat
-
-_NARRATOR = (
-    "You explain to a control engineer {what}. Describe in one short paragraph of plain text what happens "
-    "over time and which inputs cause it. Use only the information given, and mark assumptions as such."
-)
-_VIOLATES = "why a simulated system violates a requirement"
-_HOLDS = "how near a simulated system comes to violating a requirement, which it does not violate"
-# Rows of the trajectory shown to a language model, in addition to those that matter.
-_ROWS = 21
 # Maximum number of stretches of one signal that are reset one at a time; the longest are chosen.
 _MAX_STRETCHES = 12
 
@@ -163,55 +148,6 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
     effects = tuple(_effects(problem, evaluation.candidate))
     return Explanation(problem, evaluation, diagnosis, effects)
-
-
-def narrate(explanation: Explanation, chat: "Chat") -> str:
-    """Let a language model describe what happens, given only the findings and the trajectory.
-
-    Raises:
-        ChatError: if the LLM gives no reply.
-    """
-    from falsifier.llm.conversation import converse
-    from falsifier.llm.messages import ChatRequest, Message
-
-    messages = (
-        Message(role="system", content=_NARRATOR.format(what=_VIOLATES if explanation.violated else _HOLDS)),
-        Message(role="user", content=_findings(explanation)),
-    )
-    return converse(chat, ChatRequest(messages=messages), str.strip, lambda exchange: None)
-
-
-def _findings(explanation: Explanation) -> str:
-    """The text for the language model: system, findings, inputs and a few rows of the trajectory."""
-    problem, evaluation = explanation.problem, explanation.evaluation
-    trajectory = evaluation.trajectory
-    assert trajectory is not None
-    described = [
-        f"- {v.name}{f' [{v.unit}]' if v.unit else ''}: {v.description or v.causality}"
-        for v in problem.info.variables
-        if v.name in trajectory.names or v.name in evaluation.candidate.parameters
-    ]
-    last = len(trajectory) - 1
-    times = (explanation.diagnosis.critical_time, evaluation.verdict.moment if evaluation.verdict else 0.0)
-    samples = sorted({*np.linspace(0, last, _ROWS).astype(int), *map(trajectory.index, times)})
-    rows = [
-        ", ".join(f"{x:.5g}" for x in (trajectory.times[k], *(trajectory[n][k] for n in trajectory.names)))
-        for k in samples
-    ]
-    return "\n".join(
-        [
-            f"System: {problem.info.description or problem.info.name}",
-            "Signals:",
-            *described,
-            f"Formula: {problem.requirement.formula}",
-            f"Findings: {explanation.text}",
-            "Inputs:",
-            *(f"- {line}" for line in candidate_lines(evaluation.candidate, problem.space)),
-            "Trajectory:",
-            ", ".join(("time", *trajectory.names)),
-            *rows,
-        ]
-    )
 
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:

@@ -7,7 +7,6 @@ import pytest
 
 from falsifier.core.files import bundled
 from tests.command import Done, falsifier
-from tests.llm.server import Step, serving
 from tests.pictures import CRITICAL, OUTPUT, colours
 
 
@@ -76,15 +75,6 @@ def test_explain_names_what_it_takes(folder: Path) -> None:
         assert part in done.out
     effects = run(folder, "explain", "run", "--json").json["effects"]
     assert {e["name"]: e["violated"] for e in effects} == {"throttle": False, "brake": False}
-
-
-def test_a_language_models_words_are_marked_as_its_own(folder: Path) -> None:
-    with serving(Step(content="Full throttle for 20 s.")) as server:
-        done = run(folder, "explain", "run", "--llm", "openai/any", "--api-base", server.url)
-    assert done.code == 0, done.err
-    assert "With throttle at rest (0 %) alone: +" in done.out
-    assert done.out.endswith("In the words of openai/any, which may be wrong:\nFull throttle for 20 s.\n")
-    assert "With throttle at rest (0 %) alone: +" in server.received[0].texts[-1]
 
 
 def test_export_writes_the_files_of_every_tool(folder: Path) -> None:

@@ -5,9 +5,8 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
-from falsifier.counterexamples.explain import explain, narrate
+from falsifier.counterexamples.explain import explain
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.replay import ScriptedChat
 from falsifier.testing import Array, lag_problem
 from tests.problems import broken, conditional
 
@@ -88,23 +87,6 @@ def test_a_failed_simulation_cannot_be_explained() -> None:
     problem = lag_problem(response=broken)
     with pytest.raises(ValueError, match="failed"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-
-
-def test_a_language_model_is_given_the_findings_and_its_words_are_returned() -> None:
-    problem = lag_problem()
-    explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
-    chat = ScriptedChat(["", "The drive stays at its upper end.\n"])
-    assert narrate(explanation, chat) == "The drive stays at its upper end."
-    told = chat.requests[0].messages[-1].content
-    for part in (
-        "A first-order lag.",
-        "- u [V]: drive",
-        explanation.text,
-        "constant 1",
-        "\n10, 0.99997, 1\n",
-    ):
-        assert part in f"{told}\n"
-    assert len(told.splitlines()) < 50
 
 
 def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> None:
