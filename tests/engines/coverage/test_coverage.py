@@ -1,12 +1,20 @@
 from functools import partial
 
+import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from falsifier.core.space import Freedom, ParameterRange
+from falsifier.core.trajectory import Trajectory
 from falsifier.engines.coverage import Coverage
+from falsifier.engines.coverage.explorer import describe
+from falsifier.engines.coverage.marks import MODES, Mark, Marker
+from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
-from falsifier.testing import drive, lag_problem
+from falsifier.testing import FREE, START, drive, lag_problem
 from tests.engines.coverage.support import lock_problem, safe_problem
 from tests.engines.support import NamedEngine
 
@@ -46,3 +54,145 @@ def test_a_small_space_is_searched_as_a_whole() -> None:
     asked = drive(Coverage(problem, seed=2), partial(evaluate, problem), rounds=14)
     assert len({c.key for c in asked[:10]}) == 10
     assert len(asked) == 14, "then it repeats"
+
+
+def lock_marks(stage: list[float], opened: list[float]) -> dict[Mark, float]:
+    times = np.linspace(0.0, 0.5 * (len(stage) - 1), len(stage))
+    columns = {"stage": np.array(stage), "open": np.array(opened)}
+    return Marker.of(lock_problem()).marks(Trajectory(times, columns))
+
+
+def test_values_changes_and_modes_are_marks_with_the_time_of_their_first_occurrence() -> None:
+    marks = lock_marks([0, 1, 0, 1, 2], [0, 0, 0, 0, 1])
+    assert marks[Mark("stage", ("is", 0.0))] == 0.0
+    assert marks[Mark("stage", ("changes", 0.0, 1.0, 1))] == 0.5
+    assert marks[Mark("stage", ("changes", 0.0, 1.0, 2))] == 1.5
+    assert marks[Mark(MODES, ("stage = 2", "open = 1"))] == 2.0
+    assert Mark("open", ("is", 1.0)) in marks
+    assert Mark(MODES, ("stage = 0", "open = 1")) not in marks
+
+
+def test_the_order_of_changes_and_the_time_between_them_are_marks() -> None:
+    soon = lock_marks([0, 1, 1, 1, 1, 1], [0, 0, 1, 1, 1, 1])
+    late = lock_marks([0, 1, 1, 1, 1, 1], [0, 0, 0, 0, 0, 1])
+    other = lock_marks([0, 0, 1, 1, 1, 1], [0, 1, 1, 1, 1, 1])
+    pairs = [{m for m in marks if m.what[0] == "after"} for marks in (soon, late, other)]
+    assert all(len(found) == 1 for found in pairs)
+    assert len(set.union(*pairs)) == 3
+
+
+def test_a_signal_that_chatters_does_not_hide_the_others() -> None:
+    count = 5000
+    opened = np.zeros(count)
+    opened[3] = 1
+    marks = lock_marks((np.arange(count) % 2.0).tolist(), opened.tolist())
+    assert len(marks) < 100
+    assert Mark("open", ("changes", 0.0, 1.0, 1)) in marks
+
+
+def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
+    problem = lag_problem("G[0,10] (x <= 0.9)")
+    marker = Marker.of(problem)
+    times = np.linspace(0.0, 10.0, 101)
+
+    def found(scale: float) -> set[Mark]:
+        x = scale * (1 - np.exp(-times))
+        return set(marker.marks(Trajectory(times, {"x": x, "u": np.ones(101)})))
+
+    assert {m.what[0] for m in found(0.85) - found(0.5)} == {"up", "near"}
+    assert not {m.source for m in found(0.5)} & {"u"}
+    assert any(m.what[0] == "changes" for m in found(0.95)), "the predicate became false"
+
+
+@given(
+    st.lists(
+        st.sampled_from([0.0, 1e-300, -1.0, 2.0, 1e300, np.inf, np.nan, -np.inf]), min_size=2, max_size=9
+    )
+)
+@example([0.0, float(np.nextafter(2.0**-10, 0.0))])  # its logarithm is rounded up to that of 2 ** -10
+def test_any_numbers_have_marks(values: list[float]) -> None:
+    marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
+    times = np.linspace(0.0, 1.0, len(values))
+    marker.marks(Trajectory(times, {"x": np.array(values), "u": np.zeros(len(values))}))
+
+
+def test_marks_are_said_in_words() -> None:
+    assert describe(Mark("gear", ("is", 3.0))) == "gear = 3"
+    assert describe(Mark("gear", ("changes", 1.0, 2.0, 2))) == "gear change from 1 to 2 2 times"
+    assert (
+        describe(Mark("x", ("after", 0.0, 1.0, "y", 1.0, 0.0, 3)))
+        == "x change from 0 to 1 after y from 1 to 0"
+    )
+    assert describe(Mark("x > 3", ("near", 2))) == "x > 3 come close to its threshold"
+    assert describe(Mark("x", ("up", -2))) == "x go up"
+    assert describe(Mark(MODES, ("gear = 1", "brake = 0"))) == "gear = 1 and brake = 0"
+
+
+GRID = TimeGrid.over(10.0, 10.0, cells=50, shortest=0.1)
+
+
+def layout_of(*, inputs: int) -> Layout:
+    return planning_layout(lag_problem(inputs=inputs, free=FREE, parameters=[START]).space, GRID)
+
+
+def drawn(seed: int) -> np.random.Generator:
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize("time", [0.0, 3.1, 9.99])
+@pytest.mark.parametrize("inputs", [1, 2])
+def test_what_follows_a_time_is_drawn_again_and_what_precedes_it_is_kept(time: float, inputs: int) -> None:
+    layout = layout_of(inputs=inputs)
+    programs = Programs(layout)
+    changed = False
+    for seed in range(20):
+        point = programs.fresh(drawn(seed))
+        for other in (
+            programs.another_end(drawn(seed + 100), point, time),
+            programs.repeated(drawn(seed), point, time, programs.fresh(drawn(seed + 50)), (1.0, 4.0)),
+        ):
+            for coding, group in zip(layout.codings, layout.groups, strict=False):
+                kept = np.asarray(coding.times) <= time
+                assert (other[group][kept] == point[group][kept]).all()
+            assert other.min() >= 0.0 and other.max() <= 1.0
+            changed |= bool((other != point).any())
+    assert changed
+
+
+def test_discrete_inputs_take_their_values_only() -> None:
+    layout = planning_layout(lock_problem(free=Freedom(100, 0.1)).space, GRID)
+    programs = Programs(layout)
+    point = programs.fresh(drawn(1))
+    for seed in range(50):
+        point = programs.moved(drawn(seed), programs.another_end(drawn(seed), point, 2.0))
+        assert point * 5 == pytest.approx(np.round(point * 5))
+
+
+def test_values_are_drawn_between_levels_that_are_known() -> None:
+    layout = layout_of(inputs=1)
+    (ranged,) = layout.space.inputs
+    width = ranged.high - ranged.low
+    low, high = ranged.low + 0.700 * width, ranged.low + 0.701 * width
+    levels = {ranged.name: [low, high, ranged.low, ranged.high + 1.0], "another": [0.0]}
+    aimed, plain = (
+        np.concatenate([p.fresh(drawn(seed))[layout.groups[0]] for seed in range(40)])
+        for p in (Programs(layout, levels), Programs(layout))
+    )
+    inside = [np.mean((values >= 0.6999) & (values <= 0.7011)) for values in (aimed, plain)]
+    assert inside[0] > 0.15
+    assert inside[1] < 0.02
+    assert np.mean(aimed == 0.0) > 0.05, "bounds are still tried"
+
+
+def test_values_at_which_something_happened_are_used_again() -> None:
+    layout = layout_of(inputs=2)
+    programs = Programs(layout)
+    point = np.full(layout.dimension, 0.7)
+    first, second = layout.groups[:2]
+    point[first[:10]], point[second] = 0.3, 1.0
+    programs.remember(point, 2.0, 0.1)
+    fresh = np.array([programs.fresh(drawn(seed)) for seed in range(40)])
+    for value in (0.3, 0.7):
+        assert np.mean(fresh[:, first] == value) > 0.15, "before and after the change that may have caused it"
+    assert np.mean(fresh[:, second] == 0.7) == 0.0
+    assert np.mean(fresh[:, second] == 1.0) < 0.5, "bounds are drawn often enough"

@@ -1,4 +1,4 @@
-"""Search without dynamics: changes of the best inputs, and the trust region."""
+"""Search without dynamics: changes of inputs, and the trust region."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
+from falsifier.engines.surrogate.variation import mutations, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -94,3 +95,25 @@ def test_the_trust_region_starts_again_where_nothing_improves() -> None:
         engine.tell([Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))])
     starts = [i for i, why in enumerate(reasons) if why.startswith("a new start")]
     assert max(starts) > 20 and len(starts) < 30
+
+
+def test_changes_near_the_critical_time_leave_what_comes_later_alone() -> None:
+    layout = layout_of()
+    parents = np.full((1, 101), 0.5)
+    rng = np.random.default_rng(0)
+
+    def late_changes(critical: float | None) -> float:
+        known = None if critical is None else np.array([critical])
+        children = mutations(layout, rng, parents, 400, critical=known)
+        return float(np.mean(children[:, 45:100] != 0.5))
+
+    assert late_changes(0.3) < 0.7 * late_changes(None)
+
+
+def test_switching_inputs_stay_at_a_bound_for_the_dwell() -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(10):
+        point = switching(layout_of(), rng, 2.0)
+        assert set(point[:-1].tolist()) <= {0.0, 1.0}
+        changes = np.flatnonzero(np.diff(point[:-1]))
+        assert (np.diff(changes) >= 19).all(), "20 cells are 2 s"
