@@ -13,9 +13,8 @@ from falsifier.cli.files import check_out, checked_picture, draw
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, say
 from falsifier.core.literals import csv_text
-from falsifier.errors import SpecError
 from falsifier.record import manifest
-from falsifier.search.result import Columns, frame
+from falsifier.search.result import Columns
 from falsifier.views.analyses_text import coverage_json, coverage_text
 from falsifier.views.report import html_report, junit_report, markdown_report
 from falsifier.views.terminal import warn
@@ -33,7 +32,6 @@ from falsifier.views.terminal import warn
     metavar="FILE",
     help="Also write every evaluation: inputs, robustness, critical time, status.",
 )
-@click.option("--parquet", type=PATH, metavar="FILE", help="The same as --csv in a Parquet file.")
 @click.option(
     "--arch-comp",
     type=PATH,
@@ -47,7 +45,6 @@ def report(
     markdown: bool,
     junit: Path | None,
     csv_file: Path | None,
-    parquet: Path | None,
     arch_comp: Path | None,
 ) -> None:
     """Report on the run or campaign in DIRECTORY: one self-contained HTML page.
@@ -61,9 +58,9 @@ def report(
         junit.write_text(junit_report(first), encoding="utf-8")
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
-    if csv_file is not None or parquet is not None:
-        _write_evaluations(directories, csv_file, parquet)
-    for written in filter(None, (junit, arch_comp, csv_file, parquet)):
+    if csv_file is not None:
+        csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
+    for written in filter(None, (junit, arch_comp, csv_file)):
         warn(f"{written} written")
     if markdown and out is None:
         say(markdown_report(*directories), nl=False)
@@ -96,8 +93,8 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     say(as_shown(text, content, as_json=as_json))
 
 
-def _write_evaluations(directories: Iterable[Path], csv_file: Path | None, parquet: Path | None) -> None:
-    """Write a row per evaluation: requirement, method and seed of its run, then what Run.columns gives.
+def _evaluations_csv(directories: Iterable[Path]) -> str:
+    """Return a row per evaluation: requirement, method and seed of its run, then what Run.columns gives.
 
     What a run did not search has no value in its rows.
     """
@@ -109,10 +106,4 @@ def _write_evaluations(directories: Iterable[Path], csv_file: Path | None, parqu
         about = {"requirement": run.requirement, "method": run.method.label, "seed": run.seed}
         for name, values in table.items():
             values += [about[name]] * count if name in about else columns.get(name, [None] * count)
-    if csv_file is not None:
-        csv_file.write_text(csv_text([table, *zip(*table.values(), strict=True)]), encoding="utf-8")
-    if parquet is not None:
-        try:
-            frame(table).to_parquet(parquet)
-        except ImportError:
-            raise SpecError("a Parquet file needs pyarrow: pip install 'falsifier[frames]'") from None
+    return csv_text([table, *zip(*table.values(), strict=True)])

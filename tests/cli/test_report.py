@@ -2,8 +2,6 @@ import csv
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from falsifier.campaigns.analysis import load
 from tests.cli.support import bench
 from tests.command import falsifier
@@ -32,10 +30,6 @@ def test_every_evaluation_is_written_as_a_table(command: Any, tmp_path: Path) ->
         own = [r for r in rows if (r["requirement"], r["seed"]) == (run.requirement, str(run.seed))]
         assert [float(r["robustness"]) for r in own] == run.robustness.tolist()
         assert all(r["critical_time"] and r["method"] == run.method.label for r in own)
-    pandas = pytest.importorskip("pandas")
-    pytest.importorskip("pyarrow")
-    assert command("report", "c", "--parquet", "e.parquet").exit_code == 0
-    assert len(pandas.read_parquet(tmp_path / "e.parquet")) == len(rows)
 
 
 def test_directories_are_compared_in_one_page(command: Any, tmp_path: Path) -> None:
