@@ -27,6 +27,10 @@ if TYPE_CHECKING:
     from falsifier.record.manifest import Manifest
     from falsifier.record.records import Record
 
+# Of a request of a check, in s, and how often it is sent if failures are temporary; a run waits longer.
+_CHECK_TIMEOUT = 60.0
+_CHECK_ATTEMPTS = 2
+
 
 @command()
 @requirement_options
@@ -165,23 +169,20 @@ def check(*, name: str, **options: Any) -> None:
     NAME is PROVIDER/MODEL, e.g. openai/gpt-5-mini, or PROVIDER/MODEL@EFFORT. The exit code is 3 if there is
     no usable answer.
     """
-    from falsifier.llm.check import check_llm
-    from falsifier.llm.usage import Price
+    from falsifier.llm.check import check_chat
+    from falsifier.llm.providers import key_variable
+    from falsifier.search.make_engines import open_chat, price_of
 
     settings = llm_settings({"llm": name, **options})
     assert settings is not None
-    found = check_llm(
-        settings.name,
-        api_base=settings.api_base,
-        effort=settings.effort,
-        options=settings.options,
-        price=Price(*settings.price) if settings.price else None,
-        timeout=settings.timeout,
-    )
-    price = "unknown" if found.price is None else str(found.price)
-    key = f"key from {found.key}" if found.key else "no key needed"
-    lines = [f"{found.llm}: {key}; price: {price}; {counted(found.usage.tokens, 'token')} for this check"]
-    lines += [f"  {'ok ' if f.works else 'no '} {f.name}: {f.said}" for f in found.features]
-    if not found.is_usable:
+    alone = {"cache": False, "timeout": settings.timeout or _CHECK_TIMEOUT}
+    features, usage = check_chat(open_chat(settings.model_copy(update=alone), attempts=_CHECK_ATTEMPTS))
+    price = price_of(settings) or "unknown"
+    variable = key_variable(settings.name)
+    key = f"key from {variable}" if variable else "no key needed"
+    lines = [f"{settings.name}: {key}; price: {price}; {counted(usage.tokens, 'token')} for this check"]
+    lines += [f"  {'ok ' if f.works else 'no '} {f.name}: {f.said}" for f in features]
+    is_usable = features[0].works
+    if not is_usable:
         lines.append("  no usable answer came: a run with this language model would fail")
-    conclude("\n".join(lines), 0 if found.is_usable else 3)
+    conclude("\n".join(lines), 0 if is_usable else 3)

@@ -112,8 +112,13 @@ def check_names(request: RunRequest) -> None:
     check_engine(llm.fallback or DEFAULT_ENGINE)
 
 
-def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
+def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int | None = None) -> Chat:
     """Make the chat with a language model; nothing is sent.
+
+    Args:
+        llm: which one, and how to ask it.
+        max_cost: limit of the cost in US dollars, if there is one.
+        attempts: maximum number of requests per reply if failures are temporary; None: as of a run.
 
     Raises:
         SpecError: if the cost is limited although the price is unknown.
@@ -121,6 +126,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
     """
     from falsifier.llm.client import DEFAULT_TIMEOUT
     from falsifier.llm.connect import connect, default_cache_directory, preflight
+    from falsifier.llm.retry import DEFAULT_ATTEMPTS
     from falsifier.llm.usage import Price
 
     preflight(llm.name, api_base=llm.api_base)
@@ -138,6 +144,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None) -> Chat:
         price=price,
         timeout=llm.timeout or DEFAULT_TIMEOUT,
         gate=_gate(llm.name, llm.api_base),
+        attempts=attempts or DEFAULT_ATTEMPTS,
         cache=default_cache_directory() if llm.cache else None,
     )
 
