@@ -9,7 +9,6 @@ import click
 from falsifier.cli.command import Decorator, Function, add, refuse
 from falsifier.cli.options import option
 from falsifier.context.values import NOTHING
-from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.errors import did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT, Effort
@@ -139,14 +138,17 @@ def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
 
     name, effort = name_and_effort(llm)
     given = dict(map(_name_and_value, pairs))
-    passed = {name: _passed(name, value) for name, value in given.items() if name not in _EXPECTED}
+    passed = {name: _number_or_text(value) for name, value in given.items() if name not in _EXPECTED}
     fields: dict[str, Any] = {name: value for name, value in given.items() if name in _EXPECTED}
     if "price" in fields:
         fields["price"] = fields["price"].split(":")
     try:
         return LLMSettings(name=name, effort=effort, options=passed, **asked, **fields)
     except ValidationError as error:
-        wrong = str(error.errors()[0]["loc"][0])
+        first = error.errors()[0]
+        wrong = str(first["loc"][0])
+        if wrong == "options":  # one that may hold a key; the message names it, and not its value
+            raise click.UsageError(f"--llm-option {first['msg'].removeprefix('Value error, ')}") from None
         raise click.UsageError(f"--llm-option {wrong}={given[wrong]}: {_EXPECTED[wrong]}") from None
 
 
@@ -194,17 +196,8 @@ def _name_and_value(text: str) -> tuple[str, str]:
     return name, value
 
 
-def _passed(name: str, value: str) -> str | float:
+def _number_or_text(value: str) -> str | float:
     """Return the value of an option for the provider, as a number if it is one."""
-    if is_secret_option(name):  # options are written to the run's manifest
-        raise click.UsageError(
-            f"--llm-option {name}: keys are read from the environment only; set the provider's variable"
-        )
-    if holds_credentials(value):
-        raise click.UsageError(
-            f"--llm-option {name}: contains a user name or a password, and options are recorded; state them "
-            "in the environment"
-        )
     try:
         number = int(value) if value.isdigit() else float(value)
     except ValueError:

@@ -65,11 +65,14 @@ class LLMSettings(_Strict):
         for name in filter(is_secret_option, options):
             raise ValueError(
                 f"{name}: may contain a key; keys are read from the environment only, because requests are "
-                "recorded"
+                "recorded: set the provider's variable"
             )
         for name, value in options.items():
             if isinstance(value, str) and holds_credentials(value):
-                raise ValueError(f"{name}: contains a user name or a password, and requests are recorded")
+                raise ValueError(
+                    f"{name}: contains a user name or a password, and requests are recorded; state them in "
+                    "the environment"
+                )
         return options
 
 

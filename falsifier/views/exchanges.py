@@ -3,20 +3,15 @@
 Prompts are folded; nothing needs a script.
 """
 
-import re
 import shlex
-from collections import Counter
 from pathlib import Path
 
 from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
-from falsifier.llm.usage import count_tokens
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, Sample, iterations
-from falsifier.views.html import Html, el, join, table
+from falsifier.views.html import Html, el, join
 
-# Characters of a part's first line that name it.
-_LONGEST_NAME = 60
 _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
@@ -82,7 +77,6 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
         el(
             "details",
             el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}"),
-            _parts(exchange),
             *prompt,
             class_="prompt",
         ),
@@ -96,22 +90,3 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
 
 def _text(text: str) -> Html:
     return el("pre", text, style=_WRAPPED)
-
-
-def _parts(exchange: Exchange) -> Html:
-    """How many tokens each part of the prompt has, by our count; samples together."""
-    counts: Counter[str] = Counter()
-    for message in exchange.messages:
-        for part in message.content.split("\n\n"):
-            if part.strip():
-                counts[_name(part)] += count_tokens(part, exchange.llm)
-    total = sum(counts.values()) or 1
-    rows = [(name, str(n), f"{100 * n / total:.0f} %") for name, n in counts.items()]
-    return table(("part of the prompt", "tokens", "share"), rows, label="Parts of the prompt")
-
-
-def _name(part: str) -> str:
-    line = part.strip().partition("\n")[0]
-    if re.match(r"Sample \d", line):
-        return "samples"
-    return line if len(line) <= _LONGEST_NAME else f"{line[:_LONGEST_NAME]} ..."

@@ -48,9 +48,8 @@ def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path)
     assert "2 questions before sample 2, 1500 tokens, 3 s: robustness +" in html
     assert "no idea" in html and "<b>Rejected: </b>" in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt; answer 1" in html and EVIL not in html
-    assert '<th scope="row" style="text-align: left">samples</th>' in html
     assert "as in the question before" in html
-    assert html.count("You search for a counterexample") == 1 + 7, "the text once, its share in each question"
+    assert html.count("You search for a counterexample") == 1, "each text once"
 
 
 def test_long_runs_are_cut_and_say_how_the_rest_is_seen(run: Path) -> None:
