@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import TypeVar
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from falsifier.campaigns.published import PROTOCOL_SIMULATIONS, bundled_target
 from falsifier.campaigns.runs import Run, load
@@ -24,13 +25,12 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
-from falsifier.errors import FalsifierError, SpecError
+from falsifier.errors import FalsifierError, SpecError, rejected
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import read_journal, recorded_candidates
 
-_T = TypeVar("_T")
 Matrix = NDArray[np.float64]
 Finder = Callable[[str, str, float | None], Problem]
 
@@ -78,8 +78,22 @@ _LONGEST_SHOWN = 60
 _ROUNDING = 1e-6
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+def _our_name(property_: str) -> str:
+    known = {theirs.replace(" ", ""): ours for ours, (_, theirs) in _NAMES.items()}
+    return known.get(property_.replace(" ", ""), property_)
+
+
+def _matrix(text: str) -> Matrix:
+    """Parse a matrix in MATLAB notation; empty text is an empty matrix."""
+    rows = [re.split(r"[\s,]+", row.strip()) for row in text.strip("[] \t\n").split(";") if row.strip()]
+    try:
+        return np.atleast_2d(np.array([[float(v) for v in row] for row in rows], dtype=np.float64))
+    except ValueError:  # no number, or rows of unequal length
+        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+        raise ValueError(f"expected numbers such as [0 50; 10 20], got {shown!r}") from None
+
+
+class Row(BaseModel):
     """One row of a validation file, which describes one run.
 
     Attributes:
@@ -87,22 +101,24 @@ class Row:
         requirement: our name of the property.
         instance: ``1`` or ``2``.
         input: times in s in the first column, then one column per input, shape (n, 1 + inputs).
-        parameters: parameter values in the order of the problem.
+        parameters: parameter values in the order of the problem, shape (1, parameters).
         falsified: whether the tool claims a counterexample.
         simulations: number of simulations used.
         robustness: robustness that the tool claims, if stated.
         stop_time: end of the simulation in s, if stated.
     """
 
+    model_config = ConfigDict(arbitrary_types_allowed=True, frozen=True)
+
     number: int
-    requirement: str
-    instance: str
-    input: Matrix
-    parameters: tuple[float, ...]
-    falsified: bool
-    simulations: int
-    robustness: float | None
-    stop_time: float | None
+    requirement: Annotated[str, BeforeValidator(_our_name)] = Field(alias="property")
+    instance: Literal["1", "2"] = "1"
+    input: Annotated[Matrix, BeforeValidator(_matrix)]
+    parameters: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
+    falsified: bool = False
+    simulations: int = Field(ge=0)
+    robustness: float | None = None
+    stop_time: float | None = Field(None, alias="stop time")
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,56 +239,13 @@ def _matrix_text(matrix: Matrix) -> str:
 
 
 def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
-    stated = {name: text.strip() for name, text in cells.items() if text and text.strip()}
-    instance = stated.get("instance", "1")
+    stated = {name: text.strip() for name, text in cells.items() if name and text and text.strip()}
     try:
-        if instance not in _PROFILES:
-            raise ValueError(f"instance {instance!r}: expected 1 or 2")
-        return Row(
-            number,
-            _our_name(stated.get("property", "")),
-            instance,
-            _cell(stated, "input", _matrix, "a matrix such as [0 50; 10 20]"),
-            tuple(_cell(stated, "parameters", _matrix, "a vector such as [1 2]").ravel().tolist()),
-            stated.get("falsified", "").lower() in ("yes", "true", "1"),
-            _cell(stated, "simulations", _count, "a number of simulations"),
-            _cell(stated, "robustness", float, "a number") if "robustness" in stated else None,
-            _cell(stated, "stop time", float, "a number") if "stop time" in stated else None,
-        )
-    except ValueError as error:
-        raise SpecError(f"row {number}: {error}", file=str(path)) from None
-
-
-def _cell(stated: Mapping[str, str], name: str, read: Callable[[str], _T], expected: str) -> _T:
-    text = stated.get(name, "")
-    try:
-        return read(text)
-    except ValueError:
-        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
-        raise ValueError(f"column {name}: expected {expected}, got {shown!r}") from None
-
-
-def _count(text: str) -> int:
-    number = float(text)
-    if number < 0 or not number.is_integer():  # inf and nan are no integers
-        raise ValueError(text)
-    return int(number)
-
-
-def _our_name(property_: str) -> str:
-    known = {theirs.replace(" ", ""): ours for ours, (_, theirs) in _NAMES.items()}
-    return known.get(property_.replace(" ", ""), property_)
-
-
-def _matrix(text: str) -> Matrix:
-    """Parse a matrix in MATLAB notation; empty text is an empty matrix.
-
-    Raises:
-        ValueError: for anything that is not a number, and for rows of unequal length.
-    """
-    rows = [re.split(r"[\s,]+", row.strip()) for row in text.strip("[] \t\n").split(";") if row.strip()]
-    numbers = [[float(v) for v in row] for row in rows]
-    return np.array(numbers, dtype=np.float64) if rows else np.empty((0, 0))
+        return Row.model_validate({"number": number} | stated)
+    except ValidationError as error:
+        first = error.errors()[0]
+        told = rejected(first["msg"], first["input"])
+        raise SpecError(f"row {number}: column {first['loc'][0]}: {told}", file=str(path)) from None
 
 
 def _checked(row: Row, budget: int, find: Finder) -> Revalidated:
@@ -304,19 +277,19 @@ def _candidate(row: Row, problem: Problem) -> Candidate:
         ValueError: if the number of inputs or parameters is wrong, or a value is outside its range.
     """
     inputs, parameters = problem.space.inputs, problem.space.parameters
-    columns = max(row.input.shape[1] - 1, 0) if len(row.input) else 0
-    if columns != len(inputs) or len(row.parameters) != len(parameters):
+    columns, stated = max(row.input.shape[1] - 1, 0), row.parameters.ravel().tolist()
+    if columns != len(inputs) or len(stated) != len(parameters):
         raise ValueError(
-            f"contains {counted(columns, 'input')} and {counted(len(row.parameters), 'parameter')}, expected "
+            f"contains {counted(columns, 'input')} and {counted(len(stated), 'parameter')}, expected "
             f"{len(inputs)} and {len(parameters)}"
         )
     signals = {}
     for i, r in enumerate(inputs, start=1):
         _check_range(f"input {r.name!r}", row.input[:, i], r.low, r.high)
         signals[r.name] = _signal(row.input[:, 0], row.input[:, i], r.hold)
-    for p, value in zip(parameters, row.parameters, strict=True):
-        _check_range(f"parameter {p.name!r}", np.array([value]), p.low, p.high)
-    values = {p.name: v for p, v in zip(parameters, row.parameters, strict=True)}
+    values = {p.name: value for p, value in zip(parameters, stated, strict=True)}
+    for p in parameters:
+        _check_range(f"parameter {p.name!r}", np.array([values[p.name]]), p.low, p.high)
     return Candidate(signals, values, origin="validation")
 
 

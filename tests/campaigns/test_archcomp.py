@@ -78,12 +78,12 @@ def test_unknown_requirements_are_findings_not_errors(tmp_path: Path) -> None:
 
 
 def test_unreadable_cells_name_their_row(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"row 1: column input: expected a matrix .*'\[0 x\]'"):
+    with pytest.raises(SpecError, match=r"row 1: column input: expected numbers .*'\[0 x\]'"):
         read_rows(rows(tmp_path, 'S,HARD,1,"[0 x]",[],yes,3,1,1,-0.4,10'))
-    with pytest.raises(SpecError, match="row 1: instance '3'"):
+    with pytest.raises(SpecError, match="row 1: column instance: expected '1' or '2', got '3'"):
         read_rows(rows(tmp_path, 'S,HARD,3,"[0 1]",[],yes,3,1,1,-0.4,10'))
     for number in ("many", "inf", "nan", "-1", ""):
-        with pytest.raises(SpecError, match=f"row 1: column simulations: expected .*, got '{number}'"):
+        with pytest.raises(SpecError, match="row 1: column simulations: "):
             read_rows(rows(tmp_path, f'S,HARD,1,"[0 1]",[],yes,{number},1,1,-0.4,10'))
 
 
