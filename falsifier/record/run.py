@@ -251,7 +251,6 @@ def carry_out(
     problems: Sequence[Problem],
     directory: Path | None,
     *,
-    described: Manifest | None = None,
     engine: Engine | None = None,
     chat: Chat | None = None,
     listeners: Iterable[Listener] = (),
@@ -264,7 +263,6 @@ def carry_out(
         request: what to run.
         problems: what is searched; they differ only in their requirement.
         directory: run directory; None: no record.
-        described: manifest of the request; None: it is made here.
         engine: the engine, if it was made in Python.
         chat: chat with the language model, if it was made in Python.
         listeners: called with every event.
@@ -291,8 +289,7 @@ def carry_out(
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         levels = levels_of(request, problems[0].space)
         recorded = manifest.read(directory) if begun and directory else None
-        stated = described or recorded
-        told = told_problems(request, problems, stated.contexts if stated else {})
+        told = told_problems(request, problems, recorded.contexts if recorded else {})
         engines = [engine] if engine is not None else make_engines(request, told, chat, levels)
         known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         for problem in problems:
@@ -300,7 +297,7 @@ def carry_out(
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         all_listeners = tuple(listeners)
         if directory is not None:
-            described = described or manifest.describe(request, told, engines[0].name)
+            described = manifest.describe(request, told, engines[0].name)
             if recorded is not None:
                 manifest.check_unchanged(directory, recorded.hashes, described.hashes)
                 manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)

@@ -4,14 +4,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from math import inf
 from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
-from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun, HasRemarks
+from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.llm.replay import RecordedChat
@@ -27,11 +25,10 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
-from falsifier.search.findings import Finding, inexpressible
-from falsifier.search.refine_levels import RefineLevel, reached
+from falsifier.search.refine_levels import RefineLevel
+from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Steps
-from falsifier.search.vacuity import Vacuity
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
@@ -111,53 +108,6 @@ def search(
             loop.end("failed", f"{type(error).__name__}: {error}")
         raise
     return loop.end(status, reason)
-
-
-@dataclass(slots=True)
-class RequirementState:
-    """One requirement in a running search.
-
-    Attributes:
-        problem: what is to be falsified.
-        engine: searches for a violation.
-        evaluations: all so far, without trajectories.
-        doubtful: violations that were not confirmed.
-        best: evaluation with the smallest robustness, with its trajectory.
-        smallest: its robustness.
-        counterexample: the confirmed violation.
-        spent: what the run had spent by then.
-        untold: evaluations that the engine has not been told.
-    """
-
-    problem: Problem
-    engine: Engine
-    evaluations: list[Evaluation] = field(default_factory=list)
-    doubtful: list[Confirmation] = field(default_factory=list)
-    best: Evaluation | None = None
-    smallest: float = inf
-    counterexample: Confirmation | None = None
-    spent: Spent | None = None
-    untold: list[Evaluation] = field(default_factory=list)
-    vacuity: Vacuity = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.vacuity = Vacuity(self.problem)
-
-    def note(self, evaluation: Evaluation) -> bool:
-        """Add an evaluation; return whether it is the best so far."""
-        self.vacuity.see(evaluation, len(self.evaluations))
-        improved = evaluation.robustness is not None and evaluation.robustness < self.smallest
-        if evaluation.robustness is not None and improved:
-            self.best, self.smallest = evaluation, evaluation.robustness
-        self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
-        return improved
-
-    def findings(self, levels: tuple[RefineLevel, ...]) -> tuple[Finding, ...]:
-        """Return what the search could not show about a requirement, if it did not falsify it."""
-        if self.best is None or self.counterexample is not None:
-            return ()
-        limits = inexpressible(self.problem, levels, len(self.evaluations))
-        return (*self.vacuity.findings(), *([limits] if limits else []))
 
 
 # A candidate that is being simulated, or will be when it is waited for, and whose engine suggested it.
@@ -407,27 +357,11 @@ class _Loop:
 
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
-        results = [self.result(state, status, reason) for state in self.states]
+        results = [
+            state.result(status, reason, levels=self.levels, spent=self.clock(), directory=self.directory)
+            for state in self.states
+        ]
         overall = "falsified" if all(r.falsified for r in results) else status
         stated = results[0].reason if len(results) == 1 else reason
         self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
         return [replace(result, unrecorded=self.unrecorded) for result in results]
-
-    def result(self, state: RequirementState, status: ResultStatus, reason: str) -> Result:
-        found = state.counterexample
-        return Result(
-            problem=state.problem,
-            status=status if found is None else "falsified",
-            reason=reason if found is None else found.reason,
-            counterexample=found,
-            best=state.best,
-            evaluations=tuple(state.evaluations),
-            refuted=tuple(c for c in state.doubtful if c.outcome == "refuted"),
-            fragile=tuple(c for c in state.doubtful if c.outcome == "fragile"),
-            spent=state.spent or self.clock(),
-            searched=reached(self.levels, len(state.evaluations))[-1].space,
-            levels=self.levels if len(self.levels) > 1 else (),
-            findings=state.findings(self.levels),
-            directory=self.directory,
-            remarks=state.engine.remarks(state.evaluations) if isinstance(state.engine, HasRemarks) else (),
-        )

@@ -1,0 +1,94 @@
+"""One requirement in a running search, up to its result."""
+
+from dataclasses import dataclass, field, replace
+from math import inf
+from pathlib import Path
+
+from falsifier.engines.protocol import Engine, HasRemarks
+from falsifier.evaluation.confirm import Confirmation
+from falsifier.evaluation.evaluate import Evaluation
+from falsifier.problem.problem import Problem
+from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding, inexpressible
+from falsifier.search.refine_levels import RefineLevel, reached
+from falsifier.search.result import Result, ResultStatus
+from falsifier.search.vacuity import Vacuity
+
+
+@dataclass(slots=True)
+class RequirementState:
+    """One requirement in a running search.
+
+    Attributes:
+        problem: what is to be falsified.
+        engine: searches for a violation.
+        evaluations: all so far, without trajectories.
+        doubtful: violations that were not confirmed.
+        best: evaluation with the smallest robustness, with its trajectory.
+        smallest: its robustness.
+        counterexample: the confirmed violation.
+        spent: what the run had spent by then.
+        untold: evaluations that the engine has not been told.
+    """
+
+    problem: Problem
+    engine: Engine
+    evaluations: list[Evaluation] = field(default_factory=list)
+    doubtful: list[Confirmation] = field(default_factory=list)
+    best: Evaluation | None = None
+    smallest: float = inf
+    counterexample: Confirmation | None = None
+    spent: Spent | None = None
+    untold: list[Evaluation] = field(default_factory=list)
+    vacuity: Vacuity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.vacuity = Vacuity(self.problem)
+
+    def note(self, evaluation: Evaluation) -> bool:
+        """Add an evaluation; return whether it is the best so far."""
+        self.vacuity.see(evaluation, len(self.evaluations))
+        improved = evaluation.robustness is not None and evaluation.robustness < self.smallest
+        if evaluation.robustness is not None and improved:
+            self.best, self.smallest = evaluation, evaluation.robustness
+        self.evaluations.append(replace(evaluation, trajectory=None))  # trajectories would fill the memory
+        return improved
+
+    def result(
+        self,
+        status: ResultStatus,
+        reason: str,
+        *,
+        levels: tuple[RefineLevel, ...],
+        spent: Spent,
+        directory: Path | None,
+    ) -> Result:
+        """Return the result for this requirement of a search that has ended.
+
+        Args:
+            status: how the search ended; if this requirement was falsified, that is its status.
+            reason: why, in words.
+            levels: the levels of the search, coarse first.
+            spent: what the whole search has spent.
+            directory: where it is recorded.
+        """
+        found, findings = self.counterexample, list[Finding]()
+        if self.best is not None and found is None:
+            limits = inexpressible(self.problem, levels, len(self.evaluations))
+            findings = [*self.vacuity.findings(), *([limits] if limits else [])]
+        return Result(
+            problem=self.problem,
+            status=status if found is None else "falsified",
+            reason=reason if found is None else found.reason,
+            counterexample=found,
+            best=self.best,
+            evaluations=tuple(self.evaluations),
+            refuted=tuple(c for c in self.doubtful if c.outcome == "refuted"),
+            fragile=tuple(c for c in self.doubtful if c.outcome == "fragile"),
+            spent=self.spent or spent,
+            searched=reached(levels, len(self.evaluations))[-1].space,
+            levels=levels if len(levels) > 1 else (),
+            findings=tuple(findings),
+            directory=directory,
+            remarks=self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else (),
+        )
