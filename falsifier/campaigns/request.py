@@ -1,6 +1,5 @@
 """What a campaign runs and what that may cost: methods, requests, run names."""
 
-import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -9,6 +8,7 @@ from math import inf
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from falsifier.core.files import readable_part
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
@@ -22,8 +22,6 @@ from falsifier.search.refine_levels import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
-# Maximum length of a run's name before its hash; file systems allow 255 bytes.
-_READABLE_LENGTH = 120
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -160,7 +158,7 @@ def run_name(request: RunRequest) -> str:
     """Name of a run's directory: readable, and unique by a hash of the request."""
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
     readable = f"{request.problems[0].name}-{method_of(request).label}-{request.seed}"
-    return f"{re.sub(r'[^A-Za-z0-9.]+', '-', readable)[:_READABLE_LENGTH].strip('-.')}-{digest}"
+    return f"{readable_part(readable)}-{digest}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ def file_name(name: str) -> str:
     >>> file_name("../../etc/x"), file_name("")
     ('etc-x-56da1a2ef2', 'e3b0c44298')
     """
-    readable = _cut(re.sub(r"[^\w.-]+", "-", normalize("NFC", name)).strip("-."))
+    readable = readable_part(name)
     is_device = readable.partition(".")[0].upper() in _DEVICES
     if readable and readable == name and not is_device and not _LOOKS_HASHED.search(name):
         return name
@@ -40,7 +40,13 @@ def file_name(name: str) -> str:
     return f"{readable}-{digest}" if readable else digest
 
 
-def _cut(text: str) -> str:
+def readable_part(name: str) -> str:
+    """Return what of a name may be part of a file name: letters of any language, digits and ``_ - .``.
+
+    >>> readable_part("Öl druck (2)")
+    'Öl-druck-2'
+    """
+    text = re.sub(r"[^\w.-]+", "-", normalize("NFC", name)).strip("-.")
     return text.encode("utf-8")[:_LONGEST_NAME].decode("utf-8", "ignore").strip("-.")
 
 
@@ -134,7 +140,7 @@ def seal(text: str) -> str:
     r"""Add a checksum to the text of a JSON object that is not empty.
 
     >>> seal('{"a":1}')
-    '{"a":1,"sum":"f52fcad08a1c96f3"}\n'
+    '{"a":1,"sum":"8b0f0d75aabe01bb"}\n'
     """
     body = text.rstrip().removesuffix("}").rstrip()
     separator = ",\n  " if "\n" in body else ","

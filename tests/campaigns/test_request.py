@@ -44,6 +44,7 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     assert name() == base
     unsafe = name(LLMSettings(name="ollama_chat/gpt-oss:20b", variant="MP4"))
     assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
+    assert name(target="specs/AT.toml:Öl druck").startswith("Öl-druck-surrogate-free-0-")
 
 
 def test_free_and_fixed_parameterizations_are_different_methods() -> None:
