@@ -1,13 +1,14 @@
 """What is simulated, as workers get it: a system of components, or a single FMU, which is a system of one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from falsifier.core.model import Interface
 from falsifier.fmu.description.model_description import Description
 
+T = TypeVar("T")
 Method = Literal["gauss-seidel", "jacobi"]
 Loops = Literal["refuse", "delay", "iterate"]
 Extrapolation = Literal["hold", "linear"]
@@ -121,6 +122,17 @@ class Network:
     def stepped(self, position: int) -> str:
         """Return the name of the component at a position of the order; empty if there is none."""
         return self.members[self.order[position]].name if 0 <= position < len(self.order) else ""
+
+    def of_member(self, member: int, named: Iterable[tuple[str, T]]) -> list[tuple[str, T]]:
+        """Return what is of one component among named things, with the names that it has there."""
+        places = ((self.places[name], thing) for name, thing in named)
+        return [(place.name, thing) for place, thing in places if place.member == member]
+
+    def connected_outputs(self) -> dict[Place, int]:
+        """Return the outputs that feed inputs, with their positions among the worker's signals."""
+        sources = {link.source for link in self.links if link.source.member != SYSTEM}
+        ordered = sorted(sources, key=lambda place: (self.order.index(place.member), place.name))
+        return {place: k for k, place in enumerate(ordered)}
 
     def title(self, place: Place) -> str:
         """Return the name of a variable in the system."""

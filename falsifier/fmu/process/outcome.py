@@ -1,50 +1,87 @@
 """What a worker's replies, and its end, mean in words."""
 
+from collections.abc import Mapping, Sequence
+
 from falsifier.errors import FalsifierError, ModelError, SimulationError
 from falsifier.fmu.process.connection import Reply, Where
+from falsifier.fmu.process.network import Network
 from falsifier.fmu.process.plan import Plan
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
-_ENDS = {
-    Where.TERMINATED: "the FMU terminated the simulation",
-    Where.STUCK: "the FMU makes no progress: its events never end",
+# What the system as a whole fails in, not the component that was looked at last.
+_OF_ALL = (Where.UNSETTLED, Where.NOT_CONVERGED, Where.TIMEOUT)
+_BEFORE = "at {reached}, before the stop time {stop}"
+_EVENT = f"the event iteration {{returned}} {_BEFORE}"
+_TEXTS: Mapping[int, str] = {
+    Where.SETTING: f"setting the inputs {{returned}} {_BEFORE}",
+    Where.STEPPING: f"the step {{returned}} {_BEFORE}",
+    Where.GETTING: f"reading the outputs {{returned}} {_BEFORE}",
+    Where.EVENT: _EVENT,
+    Where.TERMINATED: f"the FMU terminated the simulation {_BEFORE}",
+    Where.STUCK: f"the FMU makes no progress: its events never end {_BEFORE}",
     Where.TOO_SMALL: (
-        "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast"
+        "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast "
+        f"{_BEFORE}"
     ),
-}
-_DOINGS = {
-    Where.SETTING: "setting the inputs",
-    Where.STEPPING: "the step",
-    Where.GETTING: "reading the outputs",
+    Where.RESTORING: f"saving or restoring the state {{returned}} {_BEFORE}",
+    Where.NOT_A_NUMBER: f"{{outputs}} became nan {_BEFORE}",
+    Where.MISSING_AT_FIRST: "{outputs} is nan at t = 0 s, in the initialisation",
+    Where.MISSING_AFTER_START: "{outputs} is nan at t = 0 s, after the initialisation",
+    Where.UNSETTLED: (
+        "the initialisation does not converge: after {rounds} rounds through the connections, these still "
+        "change: {changes}; they depend on each other in a loop: give a component other start values or a "
+        "delay, or raise coupling.max_rounds or coupling.tolerance"
+    ),
+    Where.NOT_CONVERGED: (
+        "the loop of {loop} does not converge at {reached}: after {rounds} rounds, these still change: "
+        "{changes}; raise coupling.max_rounds or coupling.tolerance, or accept a delay of one communication "
+        'step: loops = "delay"'
+    ),
+    Where.CALLING: "{text} {returned} at the start of the simulation",
+    Where.WRITING: "setting the {text} {returned}",
+    Where.TEXT: "setting {string} {returned}",
+    Where.CANNOT_RENEW: "{text}",
+    Where.IMPOSSIBLE: "{text}",
+    Where.TIMEOUT: "stopped at {reached} {out_of_time}",
 }
 # The last messages that an error tells.
 _SHOWN_LINES = 3
 
 
-def status_name(status: int) -> str:
-    """Return the name of an FMI status."""
-    if status < len(_STATUS_NAMES):
-        return _STATUS_NAMES[status]
-    return f"status {status - (1 << 32) if status >> 31 else status}"
-
-
-def failure(plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]) -> FalsifierError:
-    """Return the error for a simulation of an FMU that did not reach its stop time.
+def failure(
+    network: Network, plan: Plan, reply: Reply, refusals: str, log: tuple[str, ...]
+) -> FalsifierError:
+    """Return the error for a simulation that did not reach its stop time.
 
     Args:
+        network: what was simulated.
         plan: of the simulation.
-        reply: how it ended.
-        refusals: what the FMU tried and was refused, for the end of the message.
-        log: what the FMU has said.
+        reply: how it ended; a worker may tell anything.
+        refusals: what the FMUs tried and were refused, for the end of the message.
+        log: what the FMUs have said.
     """
+    component = "" if reply.where in _OF_ALL else network.stepped(reply.component)
+    words = reply.text.split()
+    said = _TEXTS.get(reply.where, _EVENT).format(
+        text=reply.text,
+        returned=f"returned {_status_name(reply.status)}",
+        reached=f"t = {reply.time:g} s",
+        stop=f"{plan.stop_time:g} s",
+        out_of_time=_out_of_time(plan),
+        string=_string(network, plan, reply),
+        outputs=", ".join(_titles(network, words)),
+        loop=", ".join(_loop(network, reply.component)),
+        changes=_changes(network, words),
+        rounds=network.coupling.max_rounds,
+    )
+    text = f"{component or plan.model}: {said}{refusals}"
     if reply.where == Where.IMPOSSIBLE:
-        return ModelError(f"{plan.model}: {reply.text}{refusals}")
-    end = refusals + last_lines(log)
-    if reply.where == Where.TIMEOUT:
-        text = f"{plan.model}: stopped at t = {reply.time:g} s {_out_of_time(plan)}{end}"
-        return SimulationError(text, status="timeout", time=reply.time, log=log)
+        return ModelError(text)
+    is_late = reply.where == Where.TIMEOUT
     time = None if reply.time < 0 else reply.time
-    return SimulationError(f"{plan.model}: {_reason(plan, reply)}{end}", time=time, log=log)
+    return SimulationError(
+        text + last_lines(log), status="timeout" if is_late else "failed", time=time, log=log
+    )
 
 
 def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
@@ -71,6 +108,12 @@ def last_lines(log: tuple[str, ...]) -> str:
     return f"; its last message: {lines[0]}" if lines else ""
 
 
+def _status_name(status: int) -> str:
+    if status < len(_STATUS_NAMES):
+        return _STATUS_NAMES[status]
+    return f"status {status - (1 << 32) if status >> 31 else status}"
+
+
 def _out_of_time(plan: Plan) -> str:
     if plan.has_limit:
         return f"after the time limit of {plan.time_limit:g} s; slow models need a larger time_limit"
@@ -78,23 +121,42 @@ def _out_of_time(plan: Plan) -> str:
     return f"after {share}; slow models need a time_limit"
 
 
-def _reason(plan: Plan, reply: Reply) -> str:
-    returned = f"returned {status_name(reply.status)}"
-    if reply.where == Where.CANNOT_RENEW:
-        return reply.text
-    if reply.where == Where.CALLING:
-        return f"{reply.text} {returned} at the start of the simulation"
-    if reply.where == Where.WRITING:
-        return f"setting the {reply.text} {returned}"
-    if reply.where == Where.TEXT:
-        name, value = _string(plan, reply.text)
-        return f"setting {name!r} to {value!r} {returned}"
-    doing = next((said for where, said in _DOINGS.items() if where == reply.where), "the event iteration")
-    ended = next((said for where, said in _ENDS.items() if where == reply.where), f"{doing} {returned}")
-    return f"{ended} at t = {reply.time:g} s, before the stop time {plan.stop_time:g} s"
+def _loop(network: Network, position: int) -> list[str]:
+    """Return the names of the components that iterate with the one at a position of the order."""
+    inside = [range(first, last) for first, last in network.loops if first <= position < last]
+    return sorted(network.stepped(k) for k in (inside[0] if inside else ()))
 
 
-def _string(plan: Plan, position: str) -> tuple[str, str]:
-    """Return the string parameter at a position that the worker tells, which may tell anything."""
-    known = position.isascii() and position.isdigit() and int(position[:9]) < len(plan.strings)
-    return plan.strings[int(position)] if known else ("a string", "a text")
+def _changes(network: Network, words: Sequence[str]) -> str:
+    """Name the outputs that still change, and by how much, of which a worker tells the number first."""
+    titles, changes = _titles(network, words[1::2]), words[2::2]
+    shown = ", ".join(f"{t} (by {_short(change)})" for t, change in zip(titles, changes, strict=False))
+    more = int(words[0]) - len(titles) if words and _is_position(words[0]) else 0
+    return shown + (f" and {more} more" if more > 0 else "")
+
+
+def _titles(network: Network, positions: Sequence[str]) -> list[str]:
+    """Return the names of the connected outputs at these positions."""
+    titles = [network.title(place) for place in network.connected_outputs()]
+    known = [int(text) for text in positions if _is_position(text)]
+    return [titles[k] for k in known if k < len(titles)]
+
+
+def _string(network: Network, plan: Plan, reply: Reply) -> str:
+    """Name the string parameter of a component at the position that a worker tells, and its value."""
+    member = network.order[reply.component] if 0 <= reply.component < len(network.order) else 0
+    strings = network.of_member(member, plan.strings)
+    known = _is_position(reply.text) and int(reply.text) < len(strings)
+    name, value = strings[int(reply.text)] if known else ("a string", "a text")
+    return f"{name!r} to {value!r}"
+
+
+def _is_position(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) < 10
+
+
+def _short(number: str) -> str:
+    try:
+        return f"{float(number):.3g}"
+    except ValueError:
+        return "an unknown number"

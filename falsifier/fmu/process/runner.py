@@ -173,7 +173,7 @@ class Runner:
         if not reply.is_done:
             log, refusals = worker.take_log(), worker.refusals
             self._drop()
-            raise self._order.failure(plan, reply, refusals, log)
+            raise outcome.failure(self._order.network, plan, reply, refusals, log)
         outputs = worker.outputs(plan)
         log = worker.take_log(reply)
         if worker.simulations == 1:
@@ -241,7 +241,7 @@ class Runner:
     def _check(self, worker: Worker, reply: Reply, *, may_load_later: bool) -> None:
         if reply.is_done:
             return
-        name = self._order.component(reply.component)
+        name = self._order.network.stepped(reply.component)
         said = f"{name}: {reply.text}" if name else reply.text
         text = f"{self._order.network.name}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
         # What has loaded before is not unusable for that.

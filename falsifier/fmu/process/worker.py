@@ -259,7 +259,7 @@ class Worker:
     @property
     def during(self) -> str:
         """Which component of a system was running, in words; nothing for a single FMU."""
-        name = self._order.component(self.position)
+        name = self._order.network.stepped(self.position)
         return f" in component {name}" if name else ""
 
     def take_log(self, reply: Reply | None = None) -> tuple[str, ...]:

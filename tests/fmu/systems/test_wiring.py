@@ -9,6 +9,7 @@ from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Connection, Coupling, Frame, System
 from falsifier.fmu.description import libraries
 from falsifier.fmu.process.connection import Reply, Where
+from falsifier.fmu.process.outcome import failure
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 from tests.fmu.small_systems import LOOP, solved, system
@@ -174,7 +175,6 @@ def test_an_input_of_the_whole_closes_no_loop() -> None:
 
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
-ORDER = MODEL.order
 STRINGS = (("table.fileName", "a.txt"),)
 PLAN = make_plan(
     MODEL.network.description, Experiment(1.0, 0.1, ("plant.y",), strings=STRINGS), (), (), pieces=1
@@ -185,5 +185,5 @@ PLAN = make_plan(
 @pytest.mark.parametrize("text", ["", "x", "1 99 y -1 ٣ 1e999 nan", "9" * 5000])
 @pytest.mark.parametrize("component", [-1, 2, 10**8])
 def test_nonsense_is_no_defect(where: int, text: str, component: int) -> None:
-    error = ORDER.failure(PLAN, Reply(where, 1 << 31, text, 0.5, component=component), "", ("slow",))
+    error = failure(MODEL.network, PLAN, Reply(where, 1 << 31, text, 0.5, component=component), "", ("slow",))
     assert isinstance(error, SimulationError | ModelError) and str(error)
