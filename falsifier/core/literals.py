@@ -120,7 +120,7 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
     r"""Return a table as comma-separated values; cells that are None are empty.
 
     >>> csv_text([["time", "a,b"], [0.5, None]])
-    'time,"a,b"\\n0.5,\\n'
+    'time,"a,b"\n0.5,\n'
     """
     text = StringIO()
     writer = csv.writer(text, lineterminator="\n")
