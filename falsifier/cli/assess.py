@@ -126,7 +126,7 @@ def margin(
         raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(options["target"]).kind != "python"
-    requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None, "template": None}
+    requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:

@@ -12,7 +12,7 @@ Decorator = Callable[[Function], Function]
 # Headings of --help, for commands with many options; what is in none of them belongs to the command itself.
 OPTION_GROUPS = {
     "What is searched": (
-        *("--stl", "--template", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
+        *("--stl", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
         *("--output-interval", "--time-limit", "--allow", "--deny"),
     ),
     "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs"),

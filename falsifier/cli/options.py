@@ -105,15 +105,6 @@ def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[
     return formulas[0] if formulas else None
 
 
-template_option = click.option(
-    "--template",
-    multiple=True,
-    callback=_only_one,
-    metavar="'NAME KEY=VALUE ...'",
-    help="Template in place of a formula, e.g. 'settles signal=speed reference=80 within=2% time=3'.",
-)
-
-
 def policy_options(command: Function) -> Function:
     """Add what FMUs may do."""
     return add(
@@ -145,7 +136,10 @@ def interface_option(text: str) -> Decorator:
     return click.option("--interface", type=click.Choice(["co-simulation", "model-exchange"]), help=text)
 
 
-def stl_option(text: str = "Formula to use instead of the spec's requirement.") -> Decorator:
+def stl_option(
+    text: str = "Formula to use instead of the spec's requirement; or a template with its arguments, such as "
+    "'settles signal=speed reference=80 within=2% time=3'.",
+) -> Decorator:
     return click.option(
         "--stl",
         multiple=True,  # so that a second one is an error and does not silently replace the first
@@ -206,7 +200,7 @@ def problem_options(command: Function) -> Function:
 
 def requirement_options(command: Function) -> Function:
     """Add problem_options and the requirement."""
-    return add(command, stl_option(), template_option, problem_options)
+    return add(command, stl_option(), problem_options)
 
 
 def source_of(target: str, chosen: Parameterized, **more: Any) -> "ProblemSource":
@@ -243,26 +237,14 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
     """Take the values of requirement_options out of a command's keyword arguments.
 
     Raises:
-        click.UsageError: if two options state the requirement, or a profile is chosen from an FMU.
+        click.UsageError: if a profile is chosen from an FMU.
     """
     from falsifier.problem.shorthand import changes_from_options
 
     changes = changes_from_options(**{name: options.pop(name) for name in _CHANGES})
     taken = {name: options.pop(name) for name in ("target", "stl")}
-    chosen, template = options.pop("parameterization"), options.pop("template")
-    source = source_of(chosen=chosen, changes=changes, context=options.pop("context", ()), **taken)
-    if template is not None and source.stl is not None:
-        raise click.UsageError("--stl and --template both state the requirement; drop one of them")
-    return with_template(source, template)
-
-
-def with_template(source: "ProblemSource", template: str | None) -> "ProblemSource":
-    """Return a source with the formula of ``--template``, if that is given."""
-    if template is None:
-        return source
-    from falsifier.problem.loading import formula_of_template
-
-    return source.model_copy(update={"stl": formula_of_template(source, template)})
+    chosen = options.pop("parameterization")
+    return source_of(chosen=chosen, changes=changes, context=options.pop("context", ()), **taken)
 
 
 def engine_option(*, multiple: bool = False) -> Decorator:

@@ -18,9 +18,8 @@ from falsifier.cli.options import (
     out_option,
     parameterization_option,
     source_of,
+    stl_option,
     target_argument,
-    template_option,
-    with_template,
 )
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import write_whole
@@ -39,7 +38,7 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 @command()
 @target_argument
 @parameterization_option()
-@template_option
+@stl_option()
 @budget_option(
     0,
     least=0,
@@ -47,21 +46,20 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 )
 @json_option
 def check(
-    *, target: str, parameterization: Parameterized, template: str | None, budget: int, as_json: bool
+    *, target: str, parameterization: Parameterized, stl: str | None, budget: int, as_json: bool
 ) -> None:
     """Check a spec file, and find requirements that say nothing.
 
     First, keys, signals, ranges and formulas are checked. Then it looks for parts that cannot fail or hold,
     signals that no input moves, windows and parts that do not matter, units that do not fit, and requirements
-    that repeat others. With --template, only the requirement made from the template is checked; TARGET is
-    then a spec or an FMU.
+    that repeat others. With --stl, only that requirement is checked; TARGET is then a spec or an FMU.
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = with_template(source_of(target, parameterization), template)
+    source = source_of(target, parameterization, stl=stl)
     if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
         raise SpecError(
-            f"{target}: no requirement to check; add --template 'NAME KEY=VALUE ...', or give a spec "
+            f"{target}: no requirement to check; add --stl 'G[0,10] (SIGNAL <= 1)', or give a spec "
             f"(falsifier init {shlex.quote(target)} begins one)"
         )
     findings = lint(source, simulations=budget)

@@ -22,11 +22,10 @@ from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.requirement import TEMPLATE_OPTION
 from falsifier.problem.sections import InputSection, ModelChanges, RequirementSection
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, template_arguments
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import Parameterization, ProblemSource, Target
-from falsifier.problem.spec import AnyRequirement, Spec, parse_spec, read_spec
+from falsifier.problem.spec import Spec, read_spec
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
 # loading it once more.
@@ -96,7 +95,7 @@ def load_problem(
 
     Args:
         target: see ProblemSource; the requirement's name is optional if the spec has only one.
-        stl: a formula to use instead of the spec's requirement.
+        stl: a formula, or a template with its arguments, to use instead of the spec's requirement.
         profile: name of a profile of the spec, e.g. ``instance2``.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
             only the control points of the spec are allowed.
@@ -182,8 +181,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         if source.context:  # else it may name its own
             problem = replace(problem, named_context=named_context(source))
     else:
-        stated = None if source.stl is None else RequirementSection(formula=source.stl)
-        joined, context = _joined(source, stated, searches=searches)
+        joined, context = _joined(source, searches=searches)
         problem = replace(Problem.of(joined), named_context=context)
     problem = replace(problem, source=source)
     if source.shortest_piece is not None:
@@ -216,10 +214,9 @@ def reloadable(problem: Problem) -> ProblemSource | None:
     return source if known == problem.fingerprint else None
 
 
-def _joined(
-    source: ProblemSource, stated: AnyRequirement | None, *, searches: bool = True
-) -> tuple[Joined, Named]:
-    """Join what a source names; ``stated`` takes the place of the spec's requirement."""
+def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
+    """Join what a source names."""
+    stated = None if source.stl is None else requirement_of(source.stl)
     if source.parts.kind == "fmu":
         fmu = Path(source.target)
         if stated is None and fmu.is_file():
@@ -309,35 +306,3 @@ def _raised(what: str, error: Exception) -> str:
     where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
     said = one_line(f"{type(error).__name__}: {error}")
     return f"{what} raised {said}{where}; expected a Problem or a function without arguments that returns one"
-
-
-def formula_of_template(source: ProblemSource, text: str) -> str:
-    """Return the text of the formula that a template stands for.
-
-    Args:
-        source: the model and its experiment.
-        text: name of the template and ``key=value`` for each argument.
-
-    Raises:
-        SpecError: naming the argument that is wrong.
-        FormulaError: if the text is not of this form.
-    """
-    arguments = template_arguments(text)
-    if source.parts.kind == "python":
-        raise SpecError(
-            f"{source.target}: a problem made in Python has its own requirement; drop {TEMPLATE_OPTION}"
-        )
-    if beside := sorted(arguments.keys() & {*_OVERRIDES, "description"}):
-        # It would shape the formula and not the simulation.
-        raise SpecError(
-            "no argument of a template on the command line; simulations are changed by the other options "
-            "(--stop-time, --set, --search, ...), or write a spec with [requirements.NAME]",
-            file=TEMPLATE_OPTION,
-            key=beside[0],
-        )
-    try:
-        spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=TEMPLATE_OPTION)
-    except SpecError as error:
-        key = (error.key or "").removeprefix("requirements.R").lstrip(".")
-        raise SpecError(error.message, file=TEMPLATE_OPTION, key=key or None) from None
-    return str(_joined(source, spec.requirements["R"])[0].requirement.formula)

@@ -14,8 +14,7 @@ from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.sections import RequirementSection
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import STL_NAME, ProblemSource
 
 if TYPE_CHECKING:
@@ -103,7 +102,7 @@ class Problem:
 
         Args:
             fmu: path of the FMU or package, or the system, whose variables are ``component.variable``.
-            formula: the requirement, in Signal Temporal Logic.
+            formula: the requirement, in Signal Temporal Logic; or a template with its arguments.
             name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
                 all real inputs with a min and a max are. Inputs that are connected cannot be searched.
@@ -144,7 +143,7 @@ class Problem:
             allow=allow,
             deny=deny,
         )
-        stated = RequirementSection(formula=formula)
+        stated = requirement_of(formula)
         model = fmu if isinstance(fmu, System) else Path(fmu)
         problem = Problem.of(join_formula(model, stated, changes=changes, name=name))
         source = None

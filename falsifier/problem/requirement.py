@@ -9,13 +9,12 @@ from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
+from falsifier.problem.spec import NAME_IN_LINES, STL_OPTION, AnyRequirement
 from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
 from falsifier.stl.formula import replaced
 
-STL_OPTION, TEMPLATE_OPTION = "--stl", "--template"
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
 PLACEHOLDER = "LIMIT"
 
@@ -111,7 +110,7 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
         SpecError: naming what is wrong with the formula, or with the arguments of a template.
     """
     kind = "template" if isinstance(section, Template) else "formula"
-    option = None if key else {"template": TEMPLATE_OPTION, "formula": STL_OPTION}[kind]
+    option = None if key else STL_OPTION
     with in_section(option, key):
         text = section.expanded(experiment.stop_time, experiment.output_interval)
     with in_section(option, key and f"{key}.{kind}"):

@@ -11,11 +11,15 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance
 from falsifier.core.model import Interface
-from falsifier.errors import FormulaError, SpecError, rejected
+from falsifier.errors import SpecError, in_section, rejected
 from falsifier.fmu import resolved
-from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
+from falsifier.problem.spec import STL_OPTION, AnyRequirement, parse_spec
+from falsifier.stl.lexer import RESERVED
 
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
+# A template and its first argument; no formula begins like this.
+_TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
@@ -209,30 +213,49 @@ def _range(option: str) -> tuple[str, InputChoice]:
     )
 
 
-def template_arguments(text: str) -> dict[str, Any]:
-    """Return the section for a template on the command line: its name, then ``key=value`` in any order.
+def requirement_of(text: str) -> AnyRequirement:
+    """Return the requirement that a text states: a formula, or the name of a template and its arguments.
 
-    Values are written as in TOML; text needs no quotes of its own unless it contains spaces.
+    Arguments are ``key=value`` in any order. Values are written as in TOML; text needs no quotes of its own
+    unless it contains spaces.
 
-    >>> template_arguments("settles signal=speed reference=80 within=2% time=3")["reference"]
-    80
+    >>> requirement_of("settles signal=speed reference=80 within=2% time=3").expanded(50.0)
+    'G[3,50] (abs(speed - 80) <= 1.6)'
 
     Raises:
-        FormulaError: naming what is not ``key=value``.
+        SpecError: naming the argument that is wrong, or what is not ``key=value``.
     """
-    rest = _ARGUMENT.sub("", text).strip()
-    if rest or not text.strip():
-        problem = f"{rest}: a quote has no end" if rest else "empty"
-        raise FormulaError(
-            f"--template: {problem}; write a template and its arguments: 'settles signal=speed ...'"
-        )
+    instance("formula", text, str, "text")
+    named = _TEMPLATE.match(text)
+    if named is None or named[1] in RESERVED:
+        return RequirementSection(formula=text)
+    with in_section(STL_OPTION):
+        arguments = _arguments(text)
+        if beside := sorted(arguments.keys() & ModelChanges.model_fields.keys()):
+            # It would shape the formula and not the simulation.
+            raise SpecError(
+                "no argument of a template here; other options (--stop-time, --set, --search, ...) change "
+                "simulations, or write a spec with [requirements.NAME]",
+                key=beside[0],
+            )
+    try:
+        spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=STL_OPTION)
+    except SpecError as error:
+        key = (error.key or "").removeprefix("requirements.R").lstrip(".")
+        raise SpecError(error.message, file=STL_OPTION, key=key or None) from None
+    return spec.requirements["R"]
+
+
+def _arguments(text: str) -> dict[str, Any]:
+    if rest := _ARGUMENT.sub("", text).strip():
+        raise SpecError(f"{rest}: a quote has no end")
     name, *pairs = _ARGUMENT.findall(text)
     found: dict[str, Any] = {"template": name}
     for pair in pairs:
         key, equals, value = pair.partition("=")
         if not equals or key in found:
-            raise FormulaError(
-                f"--template: {pair}: expected each argument once, as key=value; spaces need quotes: "
+            raise SpecError(
+                f"{pair}: expected each argument of {name} once, as key=value; spaces need quotes: "
                 "when='speed > 5'"
             )
         try:

@@ -56,7 +56,7 @@ class ProblemSource(BaseModel):
     Attributes:
         target: ``file.toml:REQ``, ``file.fmu``, a bundled name such as ``AT1``, or ``python:MODULE:NAME``: a
             Problem made in Python, or a function that returns one.
-        stl: formula to use instead of the spec's requirement.
+        stl: formula, or template with its arguments, to use instead of the spec's requirement.
         stl_name: name of the requirement that this formula makes.
         profile: name of a profile of the spec.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:

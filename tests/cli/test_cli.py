@@ -31,7 +31,6 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--stl", "x <= 1", "--stl", "x <= 2"], "--stl: given 2 times"),
         (["coverage", "gone"], "gone: no such directory; expected that of a run"),
         (["assess", "."], ".: not a run directory: it contains no manifest.json; expected"),
-        (["run", "AT1", "--template", "x", "--stl", "x <= 1"], "--stl and --template"),
         (["run", "AT1", "--llm", "openai/x@hgih"], "unknown effort 'hgih'; did you mean 'high'?"),
         (["margin", "AT1", "--stl", "G (speed <= {limit})", "--between", "nan:1"], "expected LOW:HIGH"),
         (["run", "AT1", "--set", "throttle=nan"], "--set throttle=nan: expected a finite number"),

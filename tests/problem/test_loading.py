@@ -5,10 +5,8 @@ import pytest
 from falsifier.core.space import Freedom
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.loading import formula_of_template, load_problem, load_problems, load_source
+from falsifier.problem.loading import load_problem, load_problems, load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.shorthand import changes_from_options
-from falsifier.problem.source import ProblemSource
 from tests.problem.support import AT, GOOD, echo, spec
 
 
@@ -132,37 +130,36 @@ GRID = "[model]\noutput_interval = 0.01"
 RISE = "rise signal=speed reference=80 time=10"
 
 
-def test_a_template_becomes_the_formula_of_its_simulation(tmp_path: Path) -> None:
-    long = ProblemSource(target="AT1")
-    assert formula_of_template(long, RISE) == "F[0,10] (speed >= 72)"
+def test_a_template_becomes_the_formula_of_its_simulation() -> None:
+    long = load_problem("AT1", stl=RISE)
+    assert (long.name, str(long.requirement.formula)) == ("stl", "F[0,10] (speed >= 72)")
     dwell = "dwell condition='abs(gear - 3) <= 0.5' at_least=2.5"
-    assert formula_of_template(long, dwell).startswith("G[0,47.49] ((not")
-    changes = changes_from_options(ranges=["throttle=0:100"], stop_time=20.0)
-    short = ProblemSource(target=str(AT), changes=changes)
-    assert formula_of_template(short, "overshoot signal=speed reference=80 at_most=10%") == (
-        "G[0,20] (speed - 80 <= 8)"
-    )
+    assert str(load_problem("AT1", stl=dwell).requirement.formula).startswith("G[0,47.49] ((not")
+    overshoot = "overshoot signal=speed reference=80 at_most=10%"
+    short = Problem.from_fmu(AT, overshoot, inputs={"throttle": (0, 100)}, stop_time=20.0)
+    assert str(short.requirement.formula) == "G[0,20] (speed - 80 <= 8)"
+    assert short.source is not None and load_source(short.source) == short
 
 
 @pytest.mark.parametrize(
     ("target", "text", "message"),
     [
-        ("AT1", RISE.replace("speed", "sped"), r"--template: unknown signal 'sped'; did you"),
-        ("AT1", "rise signal=speed reference=80 time=51", r"--template: needs values up to 51 s"),
-        ("AT1", "rise signal=speed reference=80", r"--template: time: this key is missing"),
-        ("AT1", "raise signal=speed", r"--template: template: no such template; did you mean 'rise'"),
-        (str(AT), "rise signal=sped reference=80 time=10", r"--template: unknown signal 'sped'"),
-        (str(AT), "stays_within signal=speed", r"^--template: expected low, high or both"),
-        ("AT1", "dwell condition=gear>2", r"^--template: expected at_least, at_most or both"),
-        ("AT1", f"{RISE} stop_time=10", r"^--template: stop_time: .*other options \(--stop-time"),
-        (str(AT), f"{RISE} description=fast", r"^--template: description: "),
+        ("AT1", RISE.replace("speed", "sped"), r"--stl: unknown signal 'sped'; did you"),
+        ("AT1", "rise signal=speed reference=80 time=51", r"--stl: needs values up to 51 s"),
+        ("AT1", "rise signal=speed reference=80", r"--stl: time: this key is missing"),
+        ("AT1", "raise signal=speed", r"--stl: template: no such template; did you mean 'rise'"),
+        (str(AT), "rise signal=sped reference=80 time=10", r"--stl: unknown signal 'sped'"),
+        (str(AT), "stays_within signal=speed", r"^--stl: expected low, high or both"),
+        ("AT1", "dwell condition=gear>2", r"^--stl: expected at_least, at_most or both"),
+        ("AT1", f"{RISE} stop_time=10", r"^--stl: stop_time: .*other options .*\(--stop-time"),
         ("AT1", "ramp_limit signal=speed limit=9", r"unknown signal 'der\(speed\)'.*with over and range"),
+        ("AT1", "not speed=9", r"equality is =="),
         ("python:tests.problems:easy", RISE, "made in Python"),
     ],
 )
 def test_errors_name_the_argument(target: str, text: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
-        formula_of_template(ProblemSource(target=target), text)
+        load_problem(target, stl=text)
 
 
 def test_a_spec_with_a_template_is_a_problem_with_its_formula(folder: Path) -> None:
@@ -188,8 +185,8 @@ def test_of_several_requirements_that_simulate_differently_one_has_to_be_named(t
     target = spec(tmp_path, more)
     within = "stays_within signal=speed high=120"
     with pytest.raises(SpecError, match=r"simulate in different ways.*:NAME, with one of R, S"):
-        formula_of_template(ProblemSource(target=target), within)
-    assert formula_of_template(ProblemSource(target=f"{target}:R"), within) == "G[0,30] (speed <= 120)"
+        load_problem(target, stl=within)
+    assert str(load_problem(f"{target}:R", stl=within).requirement.formula) == "G[0,30] (speed <= 120)"
     alike = spec(tmp_path, more.replace("stop_time = 30.0", ""))
     assert str(load_problem(alike, stl="G[0,9] (rpm <= 1)").requirement.formula) == "G[0,9] (rpm <= 1)"
 

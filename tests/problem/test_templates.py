@@ -4,19 +4,13 @@ import numpy as np
 import pytest
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import FormulaError, SpecError
-from falsifier.problem.shorthand import template_arguments
-from falsifier.problem.spec import AnyRequirement, parse_spec
+from falsifier.errors import SpecError
+from falsifier.problem.shorthand import requirement_of
+from falsifier.problem.spec import parse_spec
 from falsifier.problem.templates import TEMPLATES
 from falsifier.stl import Monitor, parse
 
 STOP, STEP = 10.0, 0.1
-
-
-def section(text: str) -> AnyRequirement:
-    """The section of a spec for a template, written as on the command line."""
-    data = {"model": {"fmu": "a.fmu"}, "requirements": {"R": template_arguments(text)}}
-    return parse_spec(data, file="my.toml").requirements["R"]
 
 
 WRITTEN: list[tuple[str, str]] = [
@@ -90,7 +84,7 @@ def trajectories(count: int) -> list[Trajectory]:
 
 @pytest.mark.parametrize(("template", "formula"), WRITTEN)
 def test_a_template_has_the_robustness_of_the_formula_by_hand(template: str, formula: str) -> None:
-    text = section(template).expanded(STOP, STEP)
+    text = requirement_of(template).expanded(STOP, STEP)
     ours, theirs = (Monitor(parse(each), STEP, 101) for each in (text, formula))
     assert str(parse(text)) == text
     values = [(ours.evaluate(t).robustness, theirs.evaluate(t).robustness) for t in trajectories(20)]
@@ -110,7 +104,7 @@ def ramp(rate: float) -> Trajectory:
 @pytest.mark.parametrize(("rate", "violated"), [(0.5, False), (1.0, False), (1.9, True), (8.0, True)])
 def test_levels_never_call_a_slow_signal_fast(rate: float, *, violated: bool) -> None:
     """In 0.5 s 0.5 is allowed, and levels are 0.4 apart: from 1.8 per second on it is found for certain."""
-    text = section("ramp_limit signal=x limit=1 over=0.5 range=[0,4] levels=10").expanded(STOP, STEP)
+    text = requirement_of("ramp_limit signal=x limit=1 over=0.5 range=[0,4] levels=10").expanded(STOP, STEP)
     assert Monitor(parse(text), STEP, 101).evaluate(ramp(rate)).violated is violated
 
 
@@ -133,21 +127,21 @@ def test_levels_never_call_a_slow_signal_fast(rate: float, *, violated: bool) ->
 )
 def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: str) -> None:
     with pytest.raises(SpecError, match=message):
-        section(template).expanded(STOP, STEP)
+        requirement_of(template).expanded(STOP, STEP)
 
 
 @pytest.mark.parametrize(
     ("template", "message"),
     [
-        ("settles reference=1 within=1 time=1", r"R\.signal: this key is missing \(Signal"),
-        ("settls", r"R\.template: no such template; did you mean 'settles'"),
+        ("settles reference=1 within=1 time=1", r"--stl: signal: this key is missing \(Signal"),
+        ("settls signal=x", r"--stl: template: no such template; did you mean 'settles'"),
         ("rise signal=x reference=1 reaches=3 time=1", "percentage of the reference"),
         ("rise signal=x reference=1 direction=down time=1", "state reaches as well"),
-        ("rise signal=x reference=1 time=1 tim=1", r"R\.tim: unknown key; did you mean 't"),
+        ("rise signal=x reference=1 time=1 tim=1", r"--stl: tim: unknown key; did you mean 't"),
         ("stays_within signal=x", "expected low, high or both"),
         ("stays_within signal=x low=2 high=1", "low is 2, more than high, 1"),
         ("stays_within signal=x low=1 reference=2 within=1", "expected low, high or both"),
-        ("never_together conditions=['a']", r"R\.conditions: expected at least 2 items, got 1"),
+        ("never_together conditions=['a']", r"--stl: conditions: expected at least 2 items, got 1"),
         ("dwell condition=a", "expected at_least"),
         ("dwell condition=a at_least=2 at_most=1", "more than at_most"),
         ("ramp_limit signal=x limit=1 over=1", "over and range together"),
@@ -155,29 +149,29 @@ def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: st
         ("ramp_limit signal=x limit=1 over=1 range=[1,0]", "low < high"),
     ],
 )
-def test_wrong_arguments_are_errors_of_the_file(template: str, message: str) -> None:
+def test_wrong_arguments_are_named(template: str, message: str) -> None:
     with pytest.raises(SpecError, match=message) as raised:
-        section(template)
-    assert str(raised.value).startswith("my.toml: requirements.R")
+        requirement_of(template)
+    assert str(raised.value).startswith("--stl: ")
 
 
 def test_arguments_are_read_as_in_toml_or_as_text() -> None:
-    text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=1"
-    read = {"reference": 80, "within": "2%", "after": "brake > 0.5", "during": [0, 5], "stays": 1}
-    assert template_arguments(text) == {"template": "settles", "signal": "y2-y1"} | read
-    text = """never_together conditions=["a > 1", 'F[0,2] (b > 1)'] during=[0,5]"""
-    assert template_arguments(text)["conditions"] == ["a > 1", "F[0,2] (b > 1)"]
-    assert template_arguments("order conditions=['a','b']")["conditions"] == ["a", "b"]
-    assert template_arguments("order during=[0, 5] on=true")["during"] == [0, 5]
-    assert template_arguments("rise signal=car.'front left'.v")["signal"] == "car.'front left'.v"
-    assert template_arguments("rise signal='\"G\"'")["signal"] == '"G"'
-    assert template_arguments(f"rise time={'9' * 5000}")["time"] == "9" * 5000
+    text = "settles signal=y2-y1 reference=80 within=2% after='brake > 0.5' during=[0,5] stays=1 time=1"
+    read = {"signal": "y2 - y1", "reference": 80.0, "within": "2%", "after": "brake > 0.5"}
+    read |= {"during": (0.0, 5.0), "stays": 1.0}
+    assert read.items() <= dict(requirement_of(text)).items()
+    for written in ("""conditions=["a > 1", 'F[0,2] (b > 1)'] during=[0, 5]""", "conditions=['a','b']"):
+        found = dict(requirement_of(f"never_together {written}"))["conditions"]
+        assert found in (("a > 1", "F[0,2] (b > 1)"), ("a", "b"))
+    for name in ("car.'front left'.v", "'\"G\"'"):
+        found = requirement_of(f"rise signal={name} reference=1 time=1")
+        assert parse(found.expanded(9.0)).signals == (name.strip("'\""),)
 
 
-@pytest.mark.parametrize("text", ["", "settles signal", "rise time=1 time=2", "rise signal='x"])
+@pytest.mark.parametrize("text", ["settles signal=x reference", "rise time=1 time=2", "rise signal='x"])
 def test_what_is_no_template_says_how_to_write_one(text: str) -> None:
-    with pytest.raises(FormulaError, match=r"--template: .*(key=value|write a template)"):
-        template_arguments(text)
+    with pytest.raises(SpecError, match=r"--stl: .*(key=value|a quote has no end)"):
+        requirement_of(text)
 
 
 @pytest.mark.parametrize(
