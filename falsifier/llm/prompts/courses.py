@@ -4,9 +4,9 @@ Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
-from itertools import pairwise
+from itertools import pairwise, zip_longest
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,8 +113,7 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(starts, ends, strict=True))
 
 
-@dataclass(frozen=True, slots=True)
-class Swing:
+class Swing(NamedTuple):
     """An interval in which a signal oscillates too fast for single points.
 
     Attributes:
@@ -148,110 +147,74 @@ class Swing:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Course:
-    """A signal over time: breakpoints, joined by straight lines, in each part that does not oscillate.
-
-    Attributes:
-        lines: the parts between oscillations.
-        swings: the parts that oscillate.
-        error: largest distance between what is told and the signal.
-        excess: the same in multiples of what was wanted there; at most 1 if the points suffice.
-        claimed: distance up to which nothing is said of it.
-    """
-
-    lines: tuple[Points, ...]
-    swings: tuple[Swing, ...]
-    error: float
-    excess: float
-    claimed: float
-
-    def text(self, *, clock: int) -> str:
-        """Breakpoints as ``time:value``, envelopes and periods; what is less exact than claimed says so.
-
-        Args:
-            clock: decimals of times.
-        """
-        parts = [(points[0][0], _pairs(points, clock)) for points in self.lines]
-        parts += [(swing.start, swing.text(clock)) for swing in self.swings]
-        told = "; ".join(text for _, text in sorted(parts, key=lambda part: part[0]))
-        if self.error <= self.claimed:
-            return told
-        decimals = decimals_for(self.error, 2)
-        # Rounded up: it is not less than it is told to be.
-        return f"{told} (each value within {plain(self.error + 0.5 * 10.0**-decimals, decimals)})"
-
-
 def course(
     times: Array,
     column: Array,
     *,
+    clock: int,
     tolerance: Array | float,
     slower_than: float,
     claimed: float | None = None,
     kept: Iterable[float] = (),
     most: int = MOST_BREAKPOINTS,
-) -> Course:
-    """Redraw a signal.
+) -> str:
+    """Return breakpoints as ``time:value``, joined by straight lines, and envelopes and periods between them.
+
+    What is less exact than claimed says so.
 
     Args:
         times: time grid in s.
         column: the signal.
+        clock: decimals of times.
         tolerance: distance from the signal that is wanted, in its own unit; one number or one per time.
-        claimed: distance that the reader is told in general; default: the largest that is wanted.
         slower_than: oscillations with at least this period in s are told point by point, if points suffice.
+        claimed: distance that the reader is told in general; default: the largest that is wanted.
         kept: times in s at which a breakpoint is wanted in any case.
         most: maximum number of other breakpoints.
     """
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), times.shape)
     kept, claimed = tuple(kept), float(allowed.max()) if claimed is None else claimed
-    drawn = _drawn(times, column, allowed, claimed, (), kept, most)
+
+    def drawn(swings: list[Swing]) -> tuple[float, float, str]:
+        """The error in multiples of what is wanted, the error, and the text; breakpoints between swings."""
+        edges = [0, *(_index(times, t) for s in swings for t in (s.start, s.end)), len(times) - 1]
+        gaps = list(zip(edges[::2], edges[1::2], strict=True))
+        error, told = np.zeros_like(times), []
+        for (begin, end), swing in zip_longest(gaps, swings):
+            if end > begin:
+                part = slice(begin, end + 1)
+                chosen = breakpoints(
+                    times[part],
+                    column[part],
+                    tolerance=_OF_LINES * allowed[part],
+                    first=_OF_LINES * claimed,
+                    most=max(2, most // sum(b > a for a, b in gaps)),
+                    kept=[_index(times[part], t) for t in kept if times[begin] <= t <= times[end]],
+                )
+                points = _points(times[part], column[part], allowed[part], chosen)
+                error[part] = np.abs(np.interp(times[part], *np.array(points).T[:2]) - column[part])
+                told.append(_pairs(points, clock))
+            if swing is not None:
+                error = np.maximum(error, swing.beyond(times, column))
+                told.append(swing.text(clock))
+        # A breakpoint where nothing may be off stands for itself.
+        excess = error / np.where(allowed > 0, allowed, np.inf)
+        return float(excess.max()) / _OF_LINES, float(error.max()) / _OF_LINES, "; ".join(told)
+
+    best = drawn([])
     for slowest in (slower_than, _SLOWER * slower_than):
-        if drawn.excess <= 1 or slowest <= 0:
+        if best[0] <= 1 or slowest <= 0:
             break
         found = oscillations(times, column, slower_than=slowest, tolerance=allowed)
-        longest = sorted(found, key=lambda s: s.start - s.end)[:_MOST_SWINGS]
-        if longest:
-            ordered = sorted(longest, key=lambda s: s.start)
-            swinging = _drawn(times, column, allowed, claimed, ordered, kept, most)
-            drawn = min(drawn, swinging, key=lambda one: one.excess)
-    return drawn
-
-
-def _drawn(
-    times: Array,
-    column: Array,
-    allowed: Array,
-    claimed: float,
-    swings: Iterable[Swing],
-    kept: tuple[float, ...],
-    most: int,
-) -> Course:
-    """Redraw a signal with these oscillations, and breakpoints between them."""
-    swings = tuple(swings)
-    spans = [(_index(times, s.start), _index(times, s.end)) for s in swings]
-    begins, ends = [0, *(b for _, b in spans)], [*(a for a, _ in spans), len(times) - 1]
-    gaps = [(a, b) for a, b in zip(begins, ends, strict=True) if b > a]
-    error = np.zeros_like(times)
-    lines = []
-    for begin, end in gaps:
-        part = slice(begin, end + 1)
-        inside = [_index(times[part], t) for t in kept if times[begin] <= t <= times[end]]
-        chosen = breakpoints(
-            times[part],
-            column[part],
-            tolerance=_OF_LINES * allowed[part],
-            first=_OF_LINES * claimed,
-            most=max(2, most // len(gaps)),
-            kept=inside,
-        )
-        error[part] = np.abs(np.interp(times[part], times[part][chosen], column[part][chosen]) - column[part])
-        lines.append(_points(times[part], column[part], allowed[part], chosen))
-    for swing in swings:
-        error = np.maximum(error, swing.beyond(times, column))
-    # A breakpoint where nothing may be off stands for itself.
-    excess = error / np.where(allowed > 0, allowed, np.inf) / _OF_LINES
-    return Course(tuple(lines), swings, float(error.max()) / _OF_LINES, float(excess.max()), claimed)
+        if found:
+            longest = sorted(found, key=lambda s: s.start - s.end)[:_MOST_SWINGS]
+            best = min(best, drawn(sorted(longest)), key=lambda one: one[0])
+    _, off, text = best
+    if off <= claimed:
+        return text
+    decimals = decimals_for(off, 2)
+    # Rounded up: it is not less than it is told to be.
+    return f"{text} (each value within {plain(off + 0.5 * 10.0**-decimals, decimals)})"
 
 
 def breakpoints(

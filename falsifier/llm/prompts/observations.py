@@ -265,16 +265,16 @@ def _drawn(
         if name in (str(predicate.left), str(predicate.right)):
             left, right = (side.evaluate(inside.columns) for side in (predicate.left, predicate.right))
             wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(np.asarray(left) - np.asarray(right)))
-    drawn = course(
+    return course(
         inside.times,
         column,
+        clock=coarse_clock(view.space.stop_time),
         tolerance=np.maximum(wanted, _FINEST * float(np.ptp(column))),
         claimed=claimed,
         slower_than=_SLOWEST_OSCILLATION * float(inside.times[-1]),
         kept=steps,
         most=most,
     )
-    return drawn.text(clock=coarse_clock(view.space.stop_time))
 
 
 def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterator[str]:
@@ -288,16 +288,16 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
         part = column[near]
         if np.ptp(part) == 0:
             continue
-        drawn = course(
+        told = course(
             inside.times[near],
             part,
+            clock=_clock(view),
             tolerance=_close_tolerance(view, column, part, name, verdict),
             claimed=CLOSE_TOLERANCE * float(np.ptp(part)),
             slower_than=0.0,
             kept=(verdict.critical_time,),
         )
-        shown = drawn.text(clock=_clock(view))
-        yield f"{name} around t = {plain(verdict.critical_time, _clock(view))} s: {shown}"
+        yield f"{name} around t = {plain(verdict.critical_time, _clock(view))} s: {told}"
 
 
 def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluation) -> NDArray[np.bool_]:
