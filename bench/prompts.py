@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
 from falsifier.engines.briefing import preview
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -79,8 +78,7 @@ def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
     """The courses that a prompt tells of one sample, in full and in short, against its trajectory."""
     trajectory = evaluation.trajectory
     assert trajectory is not None
-    end = int(np.searchsorted(trajectory.times, view.looked_at + trajectory.step / 2))
-    inside = Trajectory(trajectory.times[:end], {n: c[:end] for n, c in trajectory.columns.items()})
+    inside = view.inside(trajectory)
     columns = {n: inside[n] for n in view.experiment.outputs} | compared_columns(view, inside)
     seen = observed(view, evaluation)
     for line in (*seen.full, *seen.short):

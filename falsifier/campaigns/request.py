@@ -13,7 +13,7 @@ from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import MAX_REASKS
-from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
@@ -195,7 +195,7 @@ def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | 
         own = (budget.simulations or 0) * (1 + MAX_REASKS)
         price = prices[repr(llm)]
         questions += own
-        cost += inf if price is None else price.cost(own * DEFAULT_PROMPT_TOKENS, 0)
+        cost += inf if price is None else price.cost(own * MOST_PROMPT_TOKENS, 0)
         limit += inf if budget.cost is None else budget.cost
     if request.limits is not None and request.limits.cost is not None:
         limit = min(limit, request.limits.cost)

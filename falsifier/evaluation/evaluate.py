@@ -17,7 +17,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem
-from falsifier.stl import Diagnosis, Formula, Monitor
+from falsifier.stl import Formula, Monitor
 from falsifier.stl.monitor import Verdict
 
 Status = Literal["ok", "failed", "crashed", "timeout"]
@@ -178,12 +178,6 @@ def monitor_for(problem: Problem) -> Monitor:
 @lru_cache(maxsize=256)
 def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
     return Monitor(formula, step=step, samples=samples)
-
-
-@lru_cache(maxsize=64)
-def diagnosis_of(monitor: Monitor, trajectory: Trajectory) -> Diagnosis:
-    """Return why a trajectory has its robustness; made once for each of the last trajectories looked at."""
-    return monitor.diagnose(trajectory)
 
 
 def _inputs(

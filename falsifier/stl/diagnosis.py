@@ -197,7 +197,7 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     for here, following in zip(path, [*path[1:], path[-1]], strict=True):
         formula, time, decider = here.part.formula, float(times[here.sample]), following.part.formula
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
-        chain = chain or _links(formula)
+        chain = chain or links(formula)
         text = ""
         if isinstance(formula, Predicate):
             text = _comparison(formula, here.value, trajectory.at(time))
@@ -229,9 +229,9 @@ def _vacuity(part: Part, buffer: NDArray[np.float64], times: NDArray[np.float64]
     )
 
 
-def _links(formula: Formula) -> list[Formula]:
+def links(formula: Formula) -> list[Formula]:
     """Parts of a chain of the same connective, from left to right."""
-    parts = (_links(child) if type(child) is type(formula) else [child] for child in formula.children)
+    parts = (links(child) if type(child) is type(formula) else [child] for child in formula.children)
     return [part for found in parts for part in found]
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from falsifier.campaigns.request import CampaignRequest, Searcher, ceiling, cross
-from falsifier.llm.prompts import DEFAULT_PROMPT_TOKENS
+from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
@@ -28,7 +28,7 @@ def test_without_a_language_model_there_is_nothing_to_say() -> None:
 def test_the_most_is_every_question_three_times_at_full_length() -> None:
     most = ceiling(asked(PAID, "uniform"), price)
     assert most is not None
-    assert most.cost == pytest.approx(60 * DEFAULT_PROMPT_TOKENS * 0.5 / 1e6)
+    assert most.cost == pytest.approx(60 * MOST_PROMPT_TOKENS * 0.5 / 1e6)
     assert "up to 60 questions" in most.text and "costs about 0.48 US dollars" in most.text
 
 

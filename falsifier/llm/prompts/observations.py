@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.evaluation.evaluate import Evaluation, diagnosis_of
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
     Array,
@@ -22,6 +22,7 @@ from falsifier.llm.prompts.courses import (
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
+from falsifier.stl.diagnosis import links
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
 
@@ -78,17 +79,18 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     if trajectory is None:
         return Observed((line,), (line,), line)
     monitor = monitor_for(view)
-    diagnosis = diagnosis_of(monitor, trajectory)
+    diagnosis = monitor.diagnose(trajectory)
     reasons = tuple(_reasons(verdict, diagnosis))
     parts = tuple(_parts(view, monitor, diagnosis, trajectory))
     there = _values_there(view, trajectory, diagnosis)
-    predicates = tuple(_predicates(view, monitor, diagnosis, trajectory))
-    inside = _looked_at(view, trajectory)
+    predicates = _predicates(view, monitor, diagnosis, trajectory)
+    inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
-    close = tuple(_close_up(view, inside, evaluation))
+    courses = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
+    few_courses = _continuous(view, evaluation, inside, of=_deciding(view, verdict))
     return Observed(
-        (*reasons, there, *parts, *discrete, *predicates, *_continuous(view, evaluation, inside), *close),
-        (*reasons, *parts, *discrete, *_continuous(view, evaluation, inside, of=_deciding(view, verdict))),
+        (*reasons, there, *parts, *discrete, *predicates, *courses),
+        (*reasons, *parts, *discrete, *few_courses),
         line,
     )
 
@@ -133,12 +135,6 @@ def _continuous(
         yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
 
 
-def _looked_at(view: View, trajectory: Trajectory) -> Trajectory:
-    """The part of a trajectory at which the requirement looks."""
-    end = int(np.searchsorted(trajectory.times, view.looked_at + trajectory.step / 2))
-    return Trajectory(trajectory.times[:end], {n: column[:end] for n, column in trajectory.columns.items()})
-
-
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
     there = []
     for name, value in trajectory.at(diagnosis.critical_time).items():
@@ -166,7 +162,7 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
         above = kind
         if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
             continue
-        sides = _sides(step.formula)
+        sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
         found = monitor.robustness(trajectory, step.time)
         words = (
             f"{side} robustness {signed(found[side], 4)}{_scale(view, side)}"
@@ -174,17 +170,6 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
             if side in found
         )
         yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
-
-
-def _sides(formula: Formula) -> list[Formula]:
-    """Operands of a connective; a chain of the same connective is flattened."""
-    if not isinstance(formula, And | Or):
-        return list(formula.children)
-    return [
-        side
-        for child in formula.children
-        for side in (_sides(child) if type(child) is type(formula) else [child])
-    ]
 
 
 def _scale(view: View, part: Formula) -> str:
@@ -288,12 +273,15 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
         part = column[near]
         if np.ptp(part) == 0:
             continue
+        visible = 10.0 ** -_decimals(view, column, name, verdict.robustness)
+        claimed = CLOSE_TOLERANCE * float(np.ptp(part))
         told = course(
             inside.times[near],
             part,
             clock=_clock(view),
-            tolerance=_close_tolerance(view, column, part, name, verdict),
-            claimed=CLOSE_TOLERANCE * float(np.ptp(part)),
+            # Less than is claimed if the margin would not be visible.
+            tolerance=min(claimed, max(visible, _FINEST * float(np.ptp(part)))),
+            claimed=claimed,
             slower_than=0.0,
             kept=(verdict.critical_time,),
         )
@@ -310,12 +298,6 @@ def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluati
     if around:
         reach = _CLOSE_PERIODS / 2 * around[0].periods[0]
     return np.asarray(np.abs(times - critical) <= max(reach, 4 * view.experiment.output_interval))
-
-
-def _close_tolerance(view: View, column: Array, part: Array, name: str, verdict: Verdict) -> float:
-    """A share of the span there; less if the margin would not be visible."""
-    visible = 10.0 ** -_decimals(view, column, name, verdict.robustness)
-    return min(CLOSE_TOLERANCE * float(np.ptp(part)), max(visible, _FINEST * float(np.ptp(part))))
 
 
 def _input_steps(evaluation: Evaluation) -> tuple[float, ...]:

@@ -31,7 +31,7 @@ from falsifier.llm.usage import count_tokens
 from falsifier.stl.margins import is_on_limit, margin_words, signed
 
 # Fits LLMs with a context of 32k tokens and leaves room for reasoning.
-DEFAULT_PROMPT_TOKENS = 16_000
+MOST_PROMPT_TOKENS = 16_000
 # What a prompt should need; samples get at least as much as the rest, if the limit allows it.
 USUAL_PROMPT_TOKENS = 6_000
 # Share of the tokens beside the constant part that samples may have, that they have once shortened, and that
@@ -106,7 +106,6 @@ class Questions:
         view: the problem; may be replaced by one that tells the same with other scales.
         variant: which parts a question contains.
         start: smallest and largest value of each output at time 0, by name, as far as known.
-        tokens: maximum number of tokens of a question.
         llm: name of the LLM whose tokens are counted.
     """
 
@@ -116,14 +115,14 @@ class Questions:
         variant: Variant,
         *,
         start: Mapping[str, tuple[float, float]] | None = None,
-        tokens: int = DEFAULT_PROMPT_TOKENS,
         llm: str = "",
     ) -> None:
         self.view = view
-        self._variant, self._tokens = variant, tokens
+        self._variant = variant
         self._start = dict(start or {}) if variant.has("circumstances") else {}
         self._count: Callable[[str], int] = lambda text: count_tokens(text, llm)
         self._fixed = self._count(self._standing(1))
+        self._aim = min(MOST_PROMPT_TOKENS, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
         self._samples: list[_Sample] = []
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
@@ -171,17 +170,18 @@ class Questions:
         """
         constant = self._standing(count)
         news = "\n\n".join(self._news(count, simulations, pending, notes, lessons))
-        others, aim = self._count(constant) + self._count(news), self._aim()
-        while (size := others + self._count(self._lasting())) > aim and self._samples:
+        others = self._count(constant) + self._count(news)
+        while (size := others + self._count(self._lasting())) > self._aim and self._samples:
             self._drop()
-        if size > self._tokens:
+        if size > MOST_PROMPT_TOKENS:
             raise ChatError(
-                f"the prompt needs {size} tokens without any history, but the limit is {self._tokens}: "
-                "raise the limit (prompt_tokens), or choose a plainer prompt variant (--variant)"
+                f"the prompt needs {size} tokens without any history, but the limit is {MOST_PROMPT_TOKENS}: "
+                "choose a plainer prompt variant (--variant)"
             )
         lasting, latest = self._lasting(), self._latest()
-        more = (latest,) if latest and size + self._count(latest) <= aim else ()
-        changing = "\n\n".join(part for part in (lasting, *more, news) if part)
+        if size + self._count(latest) > self._aim:
+            latest = ""
+        changing = "\n\n".join(part for part in (lasting, latest, news) if part)
         return (
             Message(role="system", content=constant, stable=len(constant)),
             Message(role="user", content=changing, stable=len(lasting)),
@@ -191,9 +191,6 @@ class Questions:
         if self._variant.is_published:
             return published_standing(self.view, self._variant, count=count)
         return standing(self.view, self._variant, count=count, start=self._start)
-
-    def _aim(self) -> int:
-        return min(self._tokens, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
 
     def _lasting(self) -> str:
         if not self._samples:
@@ -227,7 +224,8 @@ class Questions:
         is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            first = f"{self._advice_on_first()} " if is_own else ""
+            kind = "parameters" if not self.view.space.inputs else "jumping" if self._only_jumps else "inputs"
+            first = f"{_FIRST[kind]} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
@@ -240,36 +238,24 @@ class Questions:
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._samples:
-            yield "\n".join(self._advice_on_samples())
+            what = self.view.chosen
+            on_time = [] if self._is_flat() else [_ON_TIME.format(what=what)]
+            on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
+            yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
             if _RUN.search(self._lasting()):
                 yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 
-    def _advice_on_first(self) -> str:
-        if not self.view.space.inputs:
-            return _FIRST["parameters"]
-        return _FIRST["jumping" if self._only_jumps else "inputs"]
-
-    def _advice_on_samples(self) -> Iterator[str]:
-        what = self.view.chosen
-        yield _ON_OUTPUTS.format(one=what[:-1])
-        if not self._is_flat():
-            yield _ON_TIME.format(what=what)
-        yield _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
-
     def _standings(self) -> Iterator[str]:
         """Which samples are the best, or got furthest; where robustness says little, what is missing."""
-        judged = [s for s in self._samples if s.robustness is not None]
-        levels = self._climb.levels
-        if len(judged) < 2:
+        ranked, levels = self._best_first(), self._climb.levels
+        if len(ranked) < 2:
             return
+        named = listed([f"sample {s.number}" for s in ranked[:_NAMED]])
         if self._is_flat():
-            ranked = sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
-            lowest = signed(levels.lowest, 3)
-            yield _FLAT.format(lowest=lowest, count=levels.simulations, named=_named(ranked))
+            yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations, named=named)
         else:
-            ranked = sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
-            yield f"Lowest robustness so far: {_named(ranked)}."
+            yield f"Lowest robustness so far: {named}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
@@ -278,6 +264,13 @@ class Questions:
         """Whether several samples had the same robustness, and none had another."""
         levels = self._climb.levels
         return levels.simulations > 1 and len(levels.found) == 1
+
+    def _best_first(self) -> list[_Sample]:
+        """Samples with a verdict by their robustness; where it is flat, by how far their signals got."""
+        judged = [s for s in self._samples if s.robustness is not None]
+        if self._is_flat():
+            return sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
+        return sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
 
     def _left(self, budget: int | None) -> str:
         if budget is None:
@@ -328,7 +321,7 @@ class Questions:
 
     def _shorten(self) -> None:
         """Tell less of samples if all of them together are too long."""
-        room = self._aim() - self._fixed
+        room = self._aim - self._fixed
         if self._size() <= _MOST_OF_SAMPLES * room:
             return
         for depth in (_SHORT, _LINE):
@@ -349,11 +342,8 @@ class Questions:
 
     def _lightest_first(self) -> list[_Sample]:
         """The oldest ones first; at the end those that were first somewhere, and the best or furthest one."""
-        judged = [s for s in self._samples if s.robustness is not None]
-        best = min(judged, key=lambda s: (s.robustness or 0.0, s.number), default=None)
-        furthest = max(judged, key=lambda s: (self._reached.rank(s.progress), -s.number), default=None)
-        kept = furthest if self._is_flat() else best
-        return sorted(self._samples, key=lambda s: (s is kept, s.is_first, s.number))
+        best = self._best_first()[:1]
+        return sorted(self._samples, key=lambda s: (s in best, s.is_first, s.number))
 
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
         if not self._variant.is_published:
@@ -361,10 +351,6 @@ class Questions:
         if not self._variant.has("names"):
             return as_point(self.view, candidate)
         return as_values(self.view, candidate)
-
-
-def _named(ranked: Sequence[_Sample]) -> str:
-    return listed([f"sample {s.number}" for s in ranked[:_NAMED]])
 
 
 def _text(inputs: Sequence[str], *lines: str) -> str:

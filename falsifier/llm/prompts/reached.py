@@ -34,13 +34,13 @@ class Progress:
     @classmethod
     def of(cls, view: View, trajectory: Trajectory) -> "Progress":
         """Look at a trajectory up to where the requirement looks."""
-        inside = trajectory.times <= view.looked_at + trajectory.step / 2
+        columns = view.inside(trajectory).columns
         stages: set[Stage] = set()
         ranges = {}
         for name in view.experiment.outputs:
-            if name not in trajectory.columns:
+            if name not in columns:
                 continue
-            column = trajectory[name][inside]
+            column = columns[name]
             if is_discrete(column, kind=view.kind(name)):
                 kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))].tolist()
                 stages |= {(name, None, value) for value in kept}

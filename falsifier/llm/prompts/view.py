@@ -8,9 +8,12 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
+
 from falsifier.context.values import Context
 from falsifier.core.model import Experiment, Kind, ModelInfo
 from falsifier.core.space import SearchSpace
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
@@ -84,6 +87,11 @@ class View:
             return stop_time
         horizon = formula.horizon(self.experiment.output_interval)
         return horizon if horizon < stop_time - self.experiment.output_interval else stop_time
+
+    def inside(self, trajectory: Trajectory) -> Trajectory:
+        """The part of a trajectory at which the requirement looks."""
+        end = int(np.searchsorted(trajectory.times, self.looked_at + trajectory.step / 2))
+        return Trajectory(trajectory.times[:end], {n: c[:end] for n, c in trajectory.columns.items()})
 
     @property
     def formula_outputs(self) -> tuple[str, ...]:

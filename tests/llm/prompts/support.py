@@ -1,6 +1,6 @@
 """Prompts in words."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -19,12 +19,17 @@ def transmission(name: str = "AT1") -> tuple[Problem, Evaluation]:
 
 
 def told(
-    view: Problem | View, variant: str, evaluations: Sequence[Evaluation] = (), *, count: int = 1, **more: Any
+    view: Problem | View,
+    variant: str,
+    evaluations: Sequence[Evaluation] = (),
+    *,
+    count: int = 1,
+    start: Mapping[str, tuple[float, float]] | None = None,
+    **more: Any,
 ) -> tuple[str, str]:
     """The constant part of the question after these samples, and the rest."""
     view = View.of(view) if isinstance(view, Problem) else view
-    made = {name: more.pop(name) for name in ("reply", "start", "tokens") if name in more}
-    questions = Questions(view, variant_named(variant), **made)
+    questions = Questions(view, variant_named(variant), start=start)
     for evaluation in evaluations:
         questions.tell(evaluation)
     standing, changing = questions.ask(count, **more)

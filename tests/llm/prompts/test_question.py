@@ -24,9 +24,9 @@ def sampled(problem: Problem, *points: Sequence[float]) -> list[Evaluation]:
     return [evaluate(problem, problem.space.decode(point)) for point in points]
 
 
-def asked_each(problem: Problem, evaluations: Sequence[Evaluation], **more: object) -> list[Message]:
+def asked_each(problem: Problem, evaluations: Sequence[Evaluation]) -> list[Message]:
     """The changing part of the question after each sample."""
-    questions = Questions(View.of(problem), VARIANTS["MP5"], **more)  # type: ignore[arg-type]
+    questions = Questions(View.of(problem), VARIANTS["MP5"])
     found = []
     for evaluation in evaluations:
         questions.tell(evaluation)
@@ -71,12 +71,14 @@ def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
     assert "the first to reach: gear " in text
 
 
-def test_what_does_not_fit_is_left_out_and_counted() -> None:
+def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 1900)
     rng = np.random.default_rng(3)
-    last = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (40, 5))), tokens=1900)[-1].content
+    last = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (40, 5))))[-1].content
     assert " of 40, in the order in which" in last and "Sample 40: " in last
+    monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 100)
     with pytest.raises(ChatError, match=r"needs \d+ tokens without any history, but the limit is 100"):
-        Questions(View.of(PROBLEM), VARIANTS["MP5"], tokens=100).ask()
+        Questions(View.of(PROBLEM), VARIANTS["MP5"]).ask()
 
 
 def test_what_decided_and_everything_there() -> None:
