@@ -247,5 +247,6 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
 
 def _judged(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
     """Return the robustness and the candidate of each recorded simulation with a verdict, in order."""
-    evaluations = recorded_evaluations(directory, read_journal(directory), requirement).values()
+    records = read_journal(directory)
+    evaluations = recorded_evaluations(directory, records, requirement, with_trajectories=False).values()
     return [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
