@@ -12,7 +12,7 @@
 import shutil
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -25,6 +25,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
 from falsifier.core.model import Variable
+from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export.tables import (
     InputTable,
     parameter_set,
@@ -34,6 +35,7 @@ from falsifier.counterexamples.export.tables import (
 )
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.process.network import SYSTEM, Link, Member, Network, Place
+from falsifier.fmu.systems.step_order import late_links
 from falsifier.problem.problem import Problem
 from falsifier.stl.lexer import name_text
 
@@ -54,25 +56,6 @@ FOLDER = "components"
 # Share by which the outputs may leave the range that they had in the system.
 _MARGIN = 1e-6
 
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Seen:
-    """What one component saw and did.
-
-    Attributes:
-        inputs: its inputs, by their names in the component.
-        outputs: its outputs at the ends of its steps.
-        start: its parameters and start values.
-        step: time between its steps in s.
-    """
-
-    inputs: InputTable
-    outputs: InputTable
-    start: Mapping[str, float | str]
-    step: float
-
 
 def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
     """Write a folder per component of a problem's system; return the files.
@@ -82,136 +65,106 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
         candidate: the inputs to simulate.
         directory: folder of the export, in which the folder ``components`` is written.
     """
-    assert isinstance(problem.model, System), "only systems have components"
+    system, experiment = problem.model, problem.experiment
+    assert isinstance(system, System), "only systems have components"
+    network = system.network
+    places = [
+        Place(k, variable.name)
+        for k, member in enumerate(network.members)
+        for variable in (*member.description.info.inputs, *member.description.info.outputs)
+        if variable.kind != "string"
+    ]
+    step = experiment.stop_time / round(
+        experiment.stop_time / (experiment.step_size or experiment.output_interval)
+    )
+    recorded = system.simulate(
+        candidate.signals,
+        {**problem.parameters, **candidate.parameters},
+        replace(experiment, outputs=tuple(map(network.title, places)), output_interval=step, step_size=None),
+    )
+    given = {**dict(system.frame.values), **start_values(problem, candidate)}
     files = []
-    reader = _Reader(problem, problem.model, candidate)
-    for position, member in enumerate(problem.model.network.members):
-        seen = reader.seen(position)
+    for position, member in enumerate(network.members):
+        inputs, outputs = _seen(network, position, recorded)
+        variables = member.description.info
+        own = [(place, v) for name, v in given.items() if (place := network.places.get(name))]
+        start = {
+            place.name: value
+            for place, value in own
+            if place.member == position and variables[place.name].causality != "input"
+        }
         folder = directory / FOLDER / file_name(member.name)
         folder.mkdir(parents=True, exist_ok=True)
         model = FmuModel(member.path, member.interface)
         shutil.copyfile(member.path, folder / member.path.name)
-        files += [folder / member.path.name, write_json(seen.start, folder / "start_values.json", model)]
-        if seen.inputs.columns:
-            files.append(write_csv(seen.inputs, folder / "input.csv", model))
-        if seen.outputs.columns:
-            files.append(write_csv(seen.outputs, folder / "outputs.csv", model))
-        text = _spec(member, seen, problem)
-        if text:
+        files += [folder / member.path.name, write_json(start, folder / "start_values.json", model)]
+        if inputs.columns:
+            files.append(write_csv(inputs, folder / "input.csv", model))
+        if outputs.columns:
+            files.append(write_csv(outputs, folder / "outputs.csv", model))
             files.append(folder / f"{file_name(member.name)}.toml")
-            files[-1].write_text(text, encoding="utf-8")
+            files[-1].write_text(_spec(member, outputs, start, problem), encoding="utf-8")
     return files
 
 
-class _Reader:
-    """Finds what a component saw in what is recorded at all communication points of one simulation."""
+def _seen(network: Network, position: int, recorded: Trajectory) -> tuple[InputTable, InputTable]:
+    """Return the inputs that a component had over each of its steps, and its outputs at their ends.
 
-    def __init__(self, problem: Problem, system: System, candidate: Candidate) -> None:
-        network, experiment = system.network, problem.experiment
-        self._problem, self._system, self._candidate, self._network = problem, system, candidate, network
-        self._position = {member: k for k, member in enumerate(network.order)}
-        self._links = {n.target: n for n in network.links}
-        stop_time = experiment.stop_time
-        self._step = stop_time / round(stop_time / (experiment.step_size or experiment.output_interval))
-        outputs = [v.name for v in system.info.outputs if v.kind != "string"]
-        outputs += [network.title(n.source) for n in network.links if n.source.member != SYSTEM]
-        everything = tuple(dict.fromkeys(outputs))
-        self._recorded = system.simulate(
-            candidate.signals,
-            {**problem.parameters, **candidate.parameters},
-            replace(experiment, outputs=everything, output_interval=self._step, step_size=None),
-        )
-
-    def seen(self, position: int) -> Seen:
-        """Return what the component at this position among the network's members saw."""
-        member, own = self._network.members[position], self._every(position)
-        ends = np.arange(own, len(self._recorded.times), own)
-        times = self._recorded.times
-        columns = {}
-        for variable in member.description.info.inputs:
-            values = None if variable.kind == "string" else self._values(position, variable, ends, own)
-            if values is not None:
-                columns[variable.name] = np.stack(values, axis=1).ravel()
-        grid = np.stack((times[ends - own], times[ends]), axis=1).ravel()
-        at = np.concatenate(([0], ends))
-        titles = {
-            v.name: self._network.title(Place(position, v.name))
-            for v in member.description.info.outputs
-            if v.kind != "string"
-        }
-        outputs = {name: self._recorded[title][at] for name, title in titles.items()}
-        return Seen(
-            InputTable(grid, columns),
-            InputTable(times[at], outputs),
-            self._start(position),
-            own * self._step,
-        )
-
-    def _every(self, position: int) -> int:
-        step = self._network.members[position].step
-        return 1 if step is None else round(step / self._step)
-
-    def _start(self, position: int) -> dict[str, float | str]:
-        named = {**dict(self._system.frame.values), **start_values(self._problem, self._candidate)}
-        places = ((self._network.places.get(name), value) for name, value in named.items())
-        variables = self._network.members[position].description.info
-        return {
-            place.name: value
-            for place, value in places
-            if place and place.member == position and variables[place.name].causality != "input"
-        }
-
-    def _values(
-        self, position: int, variable: Variable, ends: NDArray[np.intp], own: int
-    ) -> tuple[Floats, Floats] | None:
-        """Return an input at the start and at the end of each step; None if it keeps its start value."""
-        link = self._links.get(Place(position, variable.name))
-        if link is not None and link.source.member != SYSTEM:
-            return self._fed(link, ends, own)
-        name = self._network.title(link.source if link else Place(position, variable.name))
-        given = self._given(name, self._recorded.times)
-        if given is None:
-            return None
-        values = given if link is None else link.factor * given + link.offset
-        follows = self._network.members[position].interface == "model-exchange" and variable.is_continuous
-        return values[ends - own], values[ends if follows else ends - own]
-
-    def _given(self, name: str, times: Floats) -> Floats | None:
-        if name in self._candidate.signals:
-            return self._candidate.signals[name].sample(times)
-        value = self._problem.parameters.get(name, self._problem.info[name].start)
-        return np.full(times.shape, float(value)) if isinstance(value, int | float) else None
-
-    def _fed(self, link: Link, ends: NDArray[np.intp], own: int) -> tuple[Floats, Floats]:
-        """Return a connected input as the worker computes it."""
-        title = self._network.title(link.source)
-        column, times = self._recorded[title], self._recorded.times
-        known = ends - own if self._network.coupling.method == "jacobi" else ends - self._lateness(link)
-        every = self._every(link.source.member)
-        last = known - known % every
-        before = np.maximum(last - every, 0)
-        slope = np.zeros(len(ends))
-        if link.is_linear:
-            slope = (column[last] - column[before]) / np.where(last > 0, every * self._step, np.inf)
-        value, since = column[known], times[last]
-        starts, stops = times[ends - own], times[ends]
-        if self._network.members[link.target.member].interface == "co-simulation":
-            starts = stops = 0.5 * (starts + stops)
-        first = link.factor * (value + slope * (starts - since)) + link.offset
-        return first, link.factor * (value + slope * (stops - since)) + link.offset
-
-    def _lateness(self, link: Link) -> int:
-        source, target = self._position[link.source.member], self._position[link.target.member]
-        iterates = any(
-            first <= min(source, target) and max(source, target) < last for first, last in self._network.loops
-        )
-        return 0 if source < target or iterates else 1
+    Args:
+        network: the system's components and connections.
+        position: of the component among its members.
+        recorded: all inputs and outputs of all components at all communication points.
+    """
+    member = network.members[position]
+    every = 1 if member.step is None else round(member.step / recorded.step)
+    ends = np.arange(every, len(recorded.times), every)
+    starts, at = ends - every, np.concatenate(([0], ends))
+    links = {link.target: link for link in network.links}
+    inputs, outputs = {}, {}
+    for variable in member.description.info.inputs:
+        place = Place(position, variable.name)
+        if variable.kind == "string":
+            continue
+        # At the end of a step, the input is what the component had during it.
+        column, link = recorded[network.title(place)], links.get(place)
+        first = column[ends]
+        if member.interface == "model-exchange" and variable.is_continuous:
+            if link is None or link.source.member == SYSTEM:
+                first = column[starts]
+            elif link.is_linear:
+                length = recorded.times[ends] - recorded.times[starts]
+                first = column[ends] - link.factor * _slope(network, link, recorded, starts, ends) * length
+        inputs[variable.name] = np.stack((first, column[ends]), axis=1).ravel()
+    for variable in member.description.info.outputs:
+        if variable.kind != "string":
+            outputs[variable.name] = recorded[network.title(Place(position, variable.name))][at]
+    times = recorded.times
+    grid = np.stack((times[starts], times[ends]), axis=1).ravel()
+    return InputTable(grid, inputs), InputTable(times[at], outputs)
 
 
-def _spec(member: Member, seen: Seen, problem: Problem) -> str:
-    """Return a spec of the FMU alone, with the system's rights; empty without inputs or outputs."""
-    if not seen.outputs.columns or not len(seen.inputs.times):
-        return ""
+def _slope(
+    network: Network, link: Link, recorded: Trajectory, starts: NDArray[np.intp], ends: NDArray[np.intp]
+) -> NDArray[np.float64]:
+    """Return the slope with which a connection goes on in each step: that of its source's last step."""
+    column, times = recorded[network.title(link.source)], recorded.times
+    known = ends
+    if network.coupling.method == "jacobi":
+        known = starts
+    elif link in late_links(network.links, network.order, network.loops):
+        known = ends - 1
+    step = network.members[link.source.member].step
+    every = 1 if step is None else round(step / recorded.step)
+    last = known - known % every
+    before = np.maximum(last - every, 0)
+    slope: NDArray[np.float64] = (column[last] - column[before]) / np.where(
+        last > 0, times[last] - times[before], np.inf
+    )
+    return slope
+
+
+def _spec(member: Member, outputs: InputTable, start: Mapping[str, float | str], problem: Problem) -> str:
+    """Return a spec of the FMU alone, with the system's rights."""
     document = tomlkit.document()
     document.add(
         tomlkit.comment(f"The component {one_line(member.name)} alone, with what it saw in the system:")
@@ -220,16 +173,16 @@ def _spec(member: Member, seen: Seen, problem: Problem) -> str:
     model = {
         "fmu": member.path.name,
         "interface": member.interface,
-        "stop_time": float(seen.outputs.times[-1]),
-        "output_interval": seen.step,
+        "stop_time": float(outputs.times[-1]),
+        "output_interval": float(outputs.times[1]),
         "tolerance": problem.experiment.tolerance,
         "allow": list(getattr(problem.model, "allow", ())) or None,
         "deny": list(getattr(problem.model, "deny", ())) or None,
     }
     document["model"] = {key: value for key, value in model.items() if value is not None}
-    document["parameters"] = dict(seen.start)
+    document["parameters"] = dict(start)
     bounds = []
-    for name, column in seen.outputs.columns.items():
+    for name, column in outputs.columns.items():
         low, high = float(column.min()), float(column.max())
         low, high = low - _MARGIN * max(1.0, abs(low)), high + _MARGIN * max(1.0, abs(high))
         bounds.append(f"{name_text(name)} >= {low!r} and {name_text(name)} <= {high!r}")

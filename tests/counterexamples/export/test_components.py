@@ -25,6 +25,8 @@ from tests.fmu.small_systems import system as built
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
 LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 
+FOLLOWED = {"plant.u": Connection("pi.y", extrapolation="linear"), "pi.measured": "plant.y"}
+
 
 def problem_of(model: System) -> Problem:
     return Problem.from_fmu(
@@ -50,6 +52,8 @@ def recorded(file: Path) -> dict[str, list[float]]:
         ("Plant_3", "Gain_3", LINEAR, Coupling("jacobi")),
         ("Plant_2", component("Gain_2", 0.2), LINEAR, Coupling()),
         (solved("Lag_2"), "Gain_3", LINEAR, Coupling()),
+        (solved("Lag_2"), "Gain_3", FOLLOWED, Coupling("jacobi")),
+        (solved("Lag_2"), component("Gain_2", 0.2), FOLLOWED, Coupling()),
         ("Lead_2", component("Gain_2", 0.2), LOOP, Coupling(loops="delay")),
     ],
 )
