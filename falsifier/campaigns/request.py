@@ -38,7 +38,6 @@ class Method:
         parameterization: ``free`` or ``fixed``.
         profile: profile of the specs, or empty.
         anonymous: whether prompts use neutral names.
-        fallback: engine to switch to if the language model fails, or empty.
         together: whether several requirements shared one search.
     """
 
@@ -49,7 +48,6 @@ class Method:
     parameterization: str = "fixed"
     profile: str = ""
     anonymous: bool = False
-    fallback: str = ""
     together: bool = False
 
     @property
@@ -61,7 +59,6 @@ class Method:
             self.parameterization: self.parameterization != "fixed",
             self.profile: bool(self.profile),
             "neutral names": self.anonymous,
-            f"fallback {self.fallback}": bool(self.fallback),
             "shared search": self.together,
         }
         return ", ".join([name, *(text for text, applies in apart.items() if applies)])
@@ -140,7 +137,6 @@ def method_of(request: RunRequest) -> Method:
         parameterization=problem.parameterization,
         profile=problem.profile or "",
         anonymous=llm.anonymous,
-        fallback=llm.fallback or "",
         together=len(request.problems) > 1,
     )
 

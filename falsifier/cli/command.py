@@ -18,7 +18,7 @@ OPTION_GROUPS = {
     "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs"),
     "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),
     "Language model": (
-        *("--llm", "--variant", "--context", "--anonymous", "--fallback", "--api-base", "--llm-option"),
+        *("--llm", "--variant", "--context", "--anonymous", "--api-base", "--llm-option"),
         "--yes",
     ),
     "Output": ("--out", "--table", "--fmu-log", "--quiet", "--json", "--help"),

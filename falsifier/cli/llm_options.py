@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from falsifier.search.request import LLMSettings
 
 # Options that a command may have about a language model, and limits of a run, as it receives them.
-_ASKED = ("variant", "api_base", "fallback", "anonymous")
+_ASKED = ("variant", "api_base", "anonymous")
 _LIMITS = ("budget", "seconds", "max_tokens", "max_cost")
 # Names of --llm-option that the provider does not see, fields of LLMSettings, and what they expect.
 _EXPECTED = {
@@ -87,12 +87,7 @@ def connection_options(command: Function) -> Function:
 
 def asking_options(command: Function) -> Function:
     """Add how to ask a language model for candidates, whichever it is."""
-    return add(
-        command,
-        connection_options,
-        anonymous_option,
-        click.option("--fallback", metavar="ENGINE", help="Engine to switch to if the language model fails."),
-    )
+    return add(command, connection_options, anonymous_option)
 
 
 def llm_options(command: Function) -> Function:

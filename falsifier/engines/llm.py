@@ -1,7 +1,6 @@
 """A language model as a search engine."""
 
 import logging
-from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from textwrap import shorten
@@ -12,7 +11,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines.briefing import Briefing
-from falsifier.engines.protocol import RANDOM_CHANGE, Engine
+from falsifier.engines.protocol import RANDOM_CHANGE
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -43,8 +42,6 @@ class LLMEngine:
         on_exchange: called with every exchange until ``attach`` replaces it.
         sample: number that distinguishes runs with equal questions, so that cached replies are not shared.
         anonymous: whether the LLM gets neutral names instead of real ones.
-        fallback: engine to switch to if the LLM cannot be reached or gives no valid reply; None: the error
-            ends the run.
 
     Attributes:
         briefing: what the LLM is told.
@@ -62,7 +59,6 @@ class LLMEngine:
         on_exchange: OnExchange = lambda _: None,
         sample: int = 0,
         anonymous: bool = False,
-        fallback: Engine | None = None,
     ) -> None:
         self.briefing = Briefing(
             problem,
@@ -73,11 +69,10 @@ class LLMEngine:
         self._chat = chat
         self._on_exchange = on_exchange
         self._sample = sample
-        self._fallback = fallback
-        self._handed_over = False
         self._without_answer = 0
-        self._reasons: dict[str, str] = {}
-        self._stand_ins: dict[Hashable, str] = {}
+        # Random changes in place of an answer, and why the first of them was needed.
+        self._changes: set[Hashable] = set()
+        self._reason = ""
 
     @property
     def name(self) -> str:
@@ -99,31 +94,29 @@ class LLMEngine:
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return how many samples are not the LLM's, and why."""
-        sources = [self._stand_ins.get(e.candidate.key, "") for e in evaluations]
-        return tuple(
-            f"{count} of {counted(len(sources), 'sample')} from {source}, because {self._reasons[source]}"
-            for source, count in Counter(filter(None, sources)).items()
-        )
+        count = sum(e.candidate.key in self._changes for e in evaluations)
+        if not count:
+            return ()
+        samples = counted(len(evaluations), "sample")
+        return (f"{count} of {samples} from random changes of the best sample, because {self._reason}",)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n new candidates.
 
         Raises:
-            ChatError: if there is no fallback, and the LLM cannot be reached or gave no valid reply to
-                several questions in a row; after a single one a random change of the best sample is returned.
+            ChatError: if the LLM cannot be reached, or gave no valid reply to several questions in a row;
+                after a single one a random change of the best sample is returned.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
-            wanted = n - len(candidates)
-            if self._handed_over and self._fallback is not None:
-                found = self._fallback.ask(wanted)
-                self._stand_ins |= dict.fromkeys((c.key for c in found), _named(self._fallback))
-                return candidates + found
             try:
-                candidates += self.propose(wanted, dispensable=self._fallback is not None)
+                candidates += self.propose(n - len(candidates))
                 self._without_answer = 0
-            except ChatError as error:
-                candidates += self._instead(error)
+            except NoValidReplyError as error:
+                self._without_answer += 1
+                if self._without_answer >= _MOST_WITHOUT_ANSWER:
+                    raise
+                candidates.append(self._instead(error))
         return candidates
 
     def propose(
@@ -188,23 +181,10 @@ class LLMEngine:
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add evaluations to the history, including those of other engines' candidates."""
-        if self._fallback is not None:
-            self._fallback.tell(evaluations)
         self.briefing.tell(evaluations)
 
-    def _instead(self, error: ChatError) -> list[Candidate]:
-        """Return what is simulated in place of an answer; nothing if the fallback takes over.
-
-        Raises:
-            ChatError: if the LLM cannot be reached, or several questions in a row had no valid answer.
-        """
-        if self._fallback is not None:
-            self._handed_over = True
-            self._continue_with(_named(self._fallback), error)
-            return []
-        self._without_answer += 1
-        if not isinstance(error, NoValidReplyError) or self._without_answer >= _MOST_WITHOUT_ANSWER:
-            raise error
+    def _instead(self, error: NoValidReplyError) -> Candidate:
+        """Return what is simulated in place of an answer."""
         briefing = self.briefing
         seed = (self._sample, briefing.told, len(briefing.pending))
         changed = briefing.canonical(random_change(briefing.view.space, briefing.best, seed=seed))
@@ -213,15 +193,10 @@ class LLMEngine:
         changed = replace(changed, origin=RANDOM_CHANGE, rationale=rationale)
         briefing.pending.append(changed)
         real = briefing.revealed(changed)
-        source = "random changes of the best sample"
-        self._continue_with(source, error, what)
-        self._stand_ins[real.key] = source
-        return [real]
-
-    def _continue_with(self, source: str, error: ChatError, what: str = "") -> None:
-        """Announce what stands in for the LLM, and keep the first reason for a remark."""
-        _LOG.warning("%s. Continuing with %s.", error, what or source)
-        self._reasons.setdefault(source, shorten(str(error), _LONGEST_REASON, placeholder=" ..."))
+        _LOG.warning("%s. Continuing with %s.", error, what)
+        self._reason = self._reason or shorten(str(error), _LONGEST_REASON, placeholder=" ...")
+        self._changes.add(real.key)
+        return real
 
     def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:
         """Return the new ones of the proposed candidates, as they will be told.
@@ -255,7 +230,3 @@ def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int
     is_inside = (low <= old + noise) & (old + noise <= high)
     # A step across a limit is taken the other way, or a number at its limit would often not change at all.
     return space.decode(np.clip(np.where(is_inside, old + noise, old - noise), low, high))
-
-
-def _named(engine: Engine) -> str:
-    return f"the engine {engine.name!r}"

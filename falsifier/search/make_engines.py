@@ -107,9 +107,6 @@ def check_names(request: RunRequest) -> None:
     from falsifier.llm.prompts.view import variant_named
 
     variant_named(llm.variant)
-    if llm.fallback in _LLM_ENGINES:
-        raise SpecError(f"--fallback {llm.fallback}: choose an engine that does not use a language model")
-    check_engine(llm.fallback or DEFAULT_ENGINE)
 
 
 def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int | None = None) -> Chat:
@@ -163,14 +160,12 @@ def price_of(llm: LLMSettings) -> "Price | None":
 def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: int, chat: Chat) -> Engine:
     from falsifier.engines.llm import LLMEngine
 
-    fallback = make_engine(llm.fallback, problem, seed=seed) if llm.fallback else None
     led = LLMEngine(
         problem,
         chat,
         variant=llm.variant,
         sample=request.seed,
         anonymous=llm.anonymous,
-        fallback=fallback,
     )
     if request.engine == "hybrid":
         return make_engine("hybrid", problem, seed=seed, adviser=led)

@@ -26,9 +26,7 @@ def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Para
         return "fixed" if name in ENGINES and not ENGINES[name].is_free else "free"
     from falsifier.llm.prompts.view import variant_named
 
-    is_free = variant_named(llm.variant).has("freedom")
-    is_free |= llm.fallback is not None and engine_parameterization(llm.fallback, None) == "free"
-    return "free" if is_free else "fixed"
+    return "free" if variant_named(llm.variant).has("freedom") else "fixed"
 
 
 def searched_space(space: SearchSpace, engine: str | None, llm: LLMSettings | None) -> SearchSpace:

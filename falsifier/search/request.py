@@ -45,7 +45,6 @@ class LLMSettings(_Strict):
         default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
     )
     anonymous: bool = Field(default=False, description="Use neutral names and scales in prompts.")
-    fallback: str | None = Field(default=None, description="Engine to switch to if the LLM fails.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
     @model_validator(mode="after")

@@ -43,7 +43,7 @@ class Result:
         levels: if the inputs are refined step by step: all levels, coarse first.
         findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
-        remarks: what the engine says of how it worked, such as how many samples are a fallback's.
+        remarks: what the engine says of how it worked, such as how many samples are not an LLM's.
         unrecorded: why the end of the run could not be recorded, such as a full disk; empty if it was.
     """
 

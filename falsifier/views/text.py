@@ -77,7 +77,7 @@ def result_facts(result: Result) -> list[Fact]:
     if shown is not None:
         facts += margin_facts(shown.verdict, units_of(problem))
         facts += [("rationale", shown.candidate.rationale)] if shown.candidate.rationale else []
-    facts += [("fallback", remark) for remark in result.remarks]
+    facts += [("note", remark) for remark in result.remarks]
     facts += [("language model", llm_use(result.spent))] if result.spent.calls else []
     return facts
 
@@ -105,7 +105,7 @@ def results_text(results: Sequence[Result]) -> str:
         lines += [f"{'':{width}}{line}" for line in fact_lines(level_facts(result))]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  failed: {failure.text}" for failure in result.failures]
-        lines += [f"{'':{width}}  fallback: {remark}" for remark in result.remarks]
+        lines += [f"{'':{width}}  note: {remark}" for remark in result.remarks]
     held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
     lines += [f"not searched: {text}" for text in held if text]
     falsified = sum(result.counterexample is not None for result in results)

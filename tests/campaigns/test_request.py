@@ -54,9 +54,9 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
         "hybrid + gpt-5-mini high MP4, instance2"
     )
-    named = LLMSettings(name="openai/gpt-5-mini", anonymous=True, fallback="surrogate")
+    named = LLMSettings(name="openai/gpt-5-mini", anonymous=True)
     (run,) = cross([AT1], [named], seeds=[0], budget=Budget(1))
-    assert method_of(run).label == "gpt-5-mini, free, neutral names, fallback surrogate"
+    assert method_of(run).label == "gpt-5-mini, free, neutral names"
 
 
 def test_the_same_run_twice_is_refused() -> None:

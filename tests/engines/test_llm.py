@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.engines import make_engine
 from falsifier.engines.llm import LLMEngine, random_change
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import NoValidReplyError
 from falsifier.llm.messages import Chat, Exchange
@@ -125,23 +124,6 @@ def preview_of(chat: ScriptedChat, engine: Engine) -> str:
     with pytest.raises(ChatError):
         engine.ask()
     return chat.requests[-1].messages[1].content
-
-
-def test_hands_over_for_good_when_allowed() -> None:
-    problem = lag_problem()
-    fallback = make_engine("corners", problem, seed=0)
-    exchanges: list[Exchange] = []
-    chat = ScriptedChat([reply([0.1] * 4), ChatError("out of reach"), "never asked"])
-    engine = LLMEngine(problem, chat, variant="MP4", fallback=fallback, on_exchange=exchanges.append)
-    asked = []
-    for _ in range(4):
-        asked += engine.ask()
-        engine.tell([evaluate(problem, asked[-1])])
-    assert [c.origin for c in asked] == ["scripted MP4", "corners", "corners", "corners"]
-    simulated = [Evaluation(c, "failed", reason="x") for c in asked]
-    assert engine.remarks(simulated) == ("3 of 4 samples from the engine 'corners', because out of reach",)
-    assert [e.reply is None for e in exchanges] == [False, True]
-    assert exchanges[1].problem == "out of reach"
 
 
 class Killed(BaseException):

@@ -89,8 +89,6 @@ def test_engines_on_the_box_are_known_to_be_fixed(name: str) -> None:
 def test_a_language_model_chooses_control_points_if_its_prompt_offers_that() -> None:
     assert engine_parameterization(None, LLMSettings(name="a/b")) == "free"
     assert engine_parameterization(None, LLMSettings(name="a/b", variant="MP2")) == "fixed"
-    with_fallback = LLMSettings(name="a/b", variant="MP2", fallback="surrogate")
-    assert engine_parameterization(None, with_fallback) == "free"
     assert engine_parameterization("hybrid", LLMSettings(name="a/b", variant="MP2")) == "free"
     assert engine_parameterization("of my own", None) == "free"
 

@@ -52,8 +52,6 @@ def test_several_requirements_have_engines_that_draw_different_points() -> None:
         ("hybrid", None, {}, "--llm"),
         ("uniform", "script", {}, "uniform"),
         (None, "script", {"variant": "MP9"}, "MP9"),
-        (None, "script", {"fallback": "hybrid"}, "hybrid"),
-        (None, "script", {"fallback": "corner"}, "'corners'"),
     ],
 )
 def test_names_that_do_not_go_together_are_refused_before_anything_is_made(

@@ -239,5 +239,4 @@ def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
         ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
         ("--anonymous", True if llm.anonymous else None),
-        ("--fallback", llm.fallback),
     ]
