@@ -3,65 +3,32 @@
 from collections.abc import Mapping
 
 _SATURATION = ("LimitOutput", "UpperSaturationLimit", "LowerSaturationLimit")
-# Block types with the parameters that count, by the names that the format gives them; the sample time is
-# added to all.
-_LISTED = r"""
-    Abs Assertion DataTypeConversion Derivative Ground Mux Scope SignalConversion Signum SubSystem \
-        Terminator ZeroOrderHold:
-    Backlash: BacklashWidth InitialOutput
-    BusCreator Product Sum: Inputs
-    BusSelector: OutputSignals
-    Constant InitialCondition: Value
-    DataStoreMemory: DataStoreName InitialValue
-    DataStoreRead DataStoreWrite: DataStoreName
-    DeadZone: LowerValue UpperValue
-    Delay: DelayLength InitialCondition
-    Demux: Outputs
-    DiscreteFilter DiscreteTransferFcn: Numerator Denominator InitialStates
-    DiscreteIntegrator: gainval InitialCondition IntegratorMethod LimitOutput UpperSaturationLimit \
-        LowerSaturationLimit
-    DiscretePulseGenerator: Amplitude Period PulseWidth PhaseDelay
-    DiscreteStateSpace StateSpace: A B C D X0 InitialCondition
-    DiscreteZeroPole ZeroPole: Zeros Poles Gain
-    EnablePort: StatesWhenEnabling
-    Fcn: Expr
-    From: GotoTag
-    Gain: Gain
-    Goto: GotoTag TagVisibility
-    HitCross: HitCrossingOffset HitCrossingDirection
-    If: IfExpression ElseIfExpressions
-    Inport: OutMin OutMax
-    Integrator: InitialCondition ExternalReset LimitOutput UpperSaturationLimit LowerSaturationLimit
-    Logic Math RelationalOperator Rounding Trigonometry: Operator
-    Lookup: InputValues OutputValues Table
-    Lookup2D: RowIndex ColumnIndex Table
-    Lookup_n-D: BreakpointsForDimension1 BreakpointsForDimension2 BreakpointsForDimension3 \
-        BreakpointsForDimension4 BreakpointsForDimension5 Table InterpMethod ExtrapMethod
-    Memory UnitDelay: X0 InitialCondition
-    Merge: InitialOutput
-    MinMax: Function
-    MultiPortSwitch: DataPortIndices
-    Outport: InitialOutput OutMin OutMax
-    Quantizer: QuantizationInterval
-    RateLimiter: RisingSlewLimit FallingSlewLimit risingSlewLimit fallingSlewLimit
-    RateTransition: OutPortSampleTime
-    Relay: OnSwitchValue OffSwitchValue OnOutputValue OffOutputValue
-    Saturate Saturation: UpperLimit LowerLimit
-    Selector: Indices IndexOptions
-    Sin: Amplitude Frequency Phase Bias
-    Step: Time Before After
-    Switch: Criteria Threshold
-    ToWorkspace: VariableName
-    TransferFcn: Numerator Denominator
-    TransportDelay: DelayTime InitialOutput
-    TriggerPort: TriggerType
-    VariableTransportDelay: MaximumDelay InitialOutput
+# Of these types of blocks, only the parameters below count.
+_BLOCKS = """
+    Abs Assertion Backlash BusCreator BusSelector Constant DataStoreMemory DataStoreRead DataStoreWrite
+    DataTypeConversion DeadZone Delay Demux Derivative DiscreteFilter DiscreteIntegrator
+    DiscretePulseGenerator DiscreteStateSpace DiscreteTransferFcn DiscreteZeroPole EnablePort Fcn From
+    Gain Goto Ground HitCross If InitialCondition Inport Integrator Logic Lookup Lookup2D Lookup_n-D
+    Math Memory Merge MinMax MultiPortSwitch Mux Outport Product Quantizer RateLimiter RateTransition
+    RelationalOperator Relay Rounding Saturate Saturation Scope Selector SignalConversion Signum Sin
+    StateSpace Step SubSystem Sum Switch Terminator ToWorkspace TransferFcn TransportDelay TriggerPort
+    Trigonometry UnitDelay VariableTransportDelay ZeroOrderHold ZeroPole
 """
-_MEANINGFUL: Mapping[str, tuple[str, ...]] = {
-    kind: tuple(names.split())
-    for kinds, _, names in (line.partition(":") for line in _LISTED.replace("\\\n", "").splitlines())
-    for kind in kinds.split()
-}
+# Parameters that count, by the names that the format gives them; the sample time is added to all.
+_NAMES = """
+    A After Amplitude B BacklashWidth Before Bias BreakpointsForDimension1 BreakpointsForDimension2
+    BreakpointsForDimension3 BreakpointsForDimension4 BreakpointsForDimension5 C ColumnIndex Criteria D
+    DataPortIndices DataStoreName DelayLength DelayTime Denominator ElseIfExpressions Expr ExternalReset
+    ExtrapMethod FallingSlewLimit Frequency Function Gain GotoTag HitCrossingDirection HitCrossingOffset
+    IfExpression IndexOptions Indices InitialCondition InitialOutput InitialStates InitialValue
+    InputValues Inputs IntegratorMethod InterpMethod LimitOutput LowerLimit LowerSaturationLimit
+    LowerValue MaximumDelay Numerator OffOutputValue OffSwitchValue OnOutputValue OnSwitchValue Operator
+    OutMax OutMin OutPortSampleTime OutputSignals OutputValues Outputs Period Phase PhaseDelay Poles
+    PulseWidth QuantizationInterval RisingSlewLimit RowIndex StatesWhenEnabling Table TagVisibility
+    Threshold Time TriggerType UpperLimit UpperSaturationLimit UpperValue Value VariableName X0 Zeros
+    fallingSlewLimit gainval risingSlewLimit
+"""
+_LISTED, _MEANINGFUL = frozenset(_BLOCKS.split()), frozenset(_NAMES.split())
 # Of blocks that are not listed (masks, references, S-functions), everything counts but these.
 _DRAWN_NAMES = """
     BlockType Name SID Position ZOrder Ports FontName FontSize FontWeight FontAngle ForegroundColor
@@ -94,12 +61,11 @@ def meaningful(
         stated: what the file states of the block.
         defaults: what it states of all blocks of this type.
     """
-    names = _MEANINGFUL.get(kind)
-    if names is None:
-        found = {name: value for name, value in stated.items() if not _is_drawn(name, value)}
+    if kind in _LISTED:
+        everything = {**stated, **defaults, **stated}  # what is stated comes first, and counts
+        found = {name: value for name, value in everything.items() if name in _MEANINGFUL}
     else:
-        everything = {**defaults, **stated}
-        found = {name: everything[name] for name in names if name in everything}
+        found = {name: value for name, value in stated.items() if not _is_drawn(name, value)}
     if (found.get("LimitOutput") or "off") == "off":
         found = {name: value for name, value in found.items() if name not in _SATURATION}
     sample = stated.get("SampleTime", "")
