@@ -7,8 +7,19 @@ from dataclasses import replace
 from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram
 from falsifier.context.thresholds import Threshold, thresholds
 
-# Of an If block, u1 is what leads to its first port, not a signal of that name.
-_PORT = re.compile(r"\bu(\d+)\b")
+# What blocks compare, by type: words are their parameters, u or u1 is what leads to the first port.
+_COMPARING: Mapping[str, str] = {
+    "Fcn": "Expr",
+    "If": "IfExpression, ElseIfExpressions",
+    "Reference": "u1 relop const",  # Compare To Constant
+    "RelationalOperator": "u1 Operator u2",
+    "Relay": "u1 >= OnSwitchValue, u1 <= OffSwitchValue",
+    "Saturate": "u1 < UpperLimit, u1 > LowerLimit",
+    "Saturation": "u1 < UpperLimit, u1 > LowerLimit",
+    "Switch": "Criteria",
+}
+_WORD = re.compile(r"\b[A-Za-z]\w*+")
+_PORT = re.compile(r"\bu(\d*+)\b(?!\()")
 _NUMBER = re.compile(r"[-+]?(\d++\.?\d*+|\.\d++)([eE][-+]?\d++)?$")
 # A constant may state its type: single(5), int8(3).
 _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
@@ -40,8 +51,7 @@ def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = No
             if block.is_off or (only is not None and place not in only):
                 continue
             shown = f"{diagram.name}/{'/'.join(place)}"
-            for text in _compared(block, inputs):
-                yield from thresholds(text, {}, shown)
+            yield from thresholds(_compared(block, inputs), {}, shown)
     for chart in diagram.charts:
         place = tuple(chart.name.split("/"))
         if only is None or place in only:
@@ -96,30 +106,10 @@ def _quoted(name: str) -> str:
     return "'" + name.replace("'", " ").replace("\\", "/") + "'"
 
 
-def _compared(block: Block, inputs: Mapping[str, str]) -> Iterator[str]:
-    first = inputs.get("1", "u")
-    if block.type == "RelationalOperator":
-        yield f"{first} {_relation(block.parameter('Operator'))} {inputs.get('2', 'u2')}"
-    elif block.type == "Switch":
-        threshold = block.parameter("Threshold") or "0"
-        stated = {"u2": inputs.get("2", "u2"), "Threshold": threshold}
-        yield _relation(
-            re.sub(r"\b(u2|Threshold)\b", lambda word: stated[word[0]], block.parameter("Criteria"))
-        )
-    elif block.type == "Relay":
-        yield f"{first} >= {block.parameter('OnSwitchValue')}"
-        yield f"{first} <= {block.parameter('OffSwitchValue')}"
-    elif block.type in ("Saturate", "Saturation"):
-        yield f"{first} < {block.parameter('UpperLimit')}"
-        yield f"{first} > {block.parameter('LowerLimit')}"
-    elif block.type == "Reference" and block.parameter("relop"):  # Compare To Constant
-        yield f"{first} {_relation(block.parameter('relop'))} {block.parameter('const')}"
-    elif block.type == "If":
-        for text in (block.parameter("IfExpression"), *block.parameter("ElseIfExpressions").split(",")):
-            yield _relation(_PORT.sub(lambda port: inputs.get(port[1], port[0]), text))
-    elif block.type == "Fcn":
-        yield _relation(re.sub(r"\bu\b(?!\()", lambda _: first, block.parameter("Expr")))
-
-
-def _relation(operator: str) -> str:
-    return operator.replace("~=", "!=")
+def _compared(block: Block, inputs: Mapping[str, str]) -> str:
+    """Return what a block compares, separated by commas; empty if it compares nothing."""
+    stated = {"Threshold": "0", **dict(block.parameters)}
+    text = _COMPARING.get(block.type, "")
+    for _ in range(2):  # the criteria of a switch name its threshold
+        text = _WORD.sub(lambda word: stated.get(word[0], word[0]), text)
+    return _PORT.sub(lambda port: inputs.get(port[1] or "1", port[0]), text).replace("~=", "!=")
