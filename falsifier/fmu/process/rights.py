@@ -135,7 +135,6 @@ def encoded(
     hidden: Sequence[str],
     *,
     memory: int,
-    readable: Sequence[Path] = (),
     command: Sequence[str] = (),
 ) -> bytes:
     """Return what the guard of a worker is told; see worker/guard.c.
@@ -145,12 +144,11 @@ def encoded(
         folders: its own folders, the working folder first.
         hidden: what it may not read.
         memory: bytes that its processes may use together; 0: no limit.
-        readable: further places that it needs to read.
         command: the program that the process becomes, which is Wine; empty: the worker itself.
     """
     own = [str(path) for path in (*map(Path.resolve, folders), *rights.writable)]
     parts = [bytes([_WRITABLE]) + os.fsencode(path) for path in own]
-    parts += [bytes([_READABLE]) + os.fsencode(path.resolve()) for path in (*rights.readable, *readable)]
+    parts += [bytes([_READABLE]) + os.fsencode(path.resolve()) for path in rights.readable]
     parts += [bytes([_HIDDEN]) + os.fsencode(path) for path in hidden]
     parts += [bytes([_COMMAND]) + os.fsencode(word) for word in command]
     parts += [bytes([_PROGRAMS])] * (rights.programs or bool(command))

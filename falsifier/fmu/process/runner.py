@@ -154,7 +154,8 @@ class Runner:
         self, worker: Worker, plan: Plan, given: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         try:
-            worker = self._started(worker, plan, given)
+            self._check_wanted()  # it may have been stopped while the worker was being started
+            worker.start(given)
             reply = worker.wait()
         except TimeoutError:
             reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
@@ -184,17 +185,6 @@ class Runner:
             self._drop()
         return outputs, log
 
-    def _started(self, worker: Worker, plan: Plan, given: NDArray[np.float64]) -> Worker:
-        """Start the simulation, in a new worker if this one has died since its last simulation."""
-        self._check_wanted()  # it may have been stopped while the worker was being started
-        try:
-            worker.start(given)
-        except Closed:
-            self._drop()
-            worker = self._worker_for(plan)
-            worker.start(given)
-        return worker
-
     def _check_wanted(self) -> None:
         if self._is_stopped:
             raise SimulationError("stopped, because its result is no longer needed")
@@ -203,6 +193,8 @@ class Runner:
         self._check_wanted()
         if self._worker is not None and self._worker.awaits_test:
             self._await_test(self._worker)
+        if self._worker is not None and not self._worker.is_alive:  # it has died since its last simulation
+            self._drop()
         worker, known = self._worker, self._experience
         is_new = worker is None
         if worker is None:
@@ -212,31 +204,26 @@ class Runner:
         if worker.plan is plan:
             return worker
         try:
-            is_prepared = self._prepare(worker, plan, is_new=is_new)
+            self._prepare(worker, plan, is_new=is_new)
         except ModelError:
             if worker.logging or not known.is_worth_repeating():
                 raise
             # Once more, to hear why.
             return self._speaking_worker(plan)
-        return worker if is_prepared else self._worker_for(plan)
+        return worker
 
-    def _prepare(self, worker: Worker, plan: Plan, *, is_new: bool) -> bool:
-        """Prepare a worker; return False if an old one has died since its last simulation."""
+    def _prepare(self, worker: Worker, plan: Plan, *, is_new: bool) -> None:
         limit = plan.time_limit + GRACE_SECONDS
         try:
             if is_new:
                 self._check(worker, worker.load(limit), may_load_later=True)
             self._check(worker, worker.prepare(plan, limit), may_load_later=False)
         except (Closed, TimeoutError) as error:
-            if isinstance(error, Closed) and not is_new:
-                self._drop()
-                return False
             raise self._not_loaded(worker, error, plan.time_limit) from None
         except BaseException:
             self._drop()
             raise
         self._has_loaded = True
-        return True
 
     def _check(self, worker: Worker, reply: Reply, *, may_load_later: bool) -> None:
         if reply.is_done:

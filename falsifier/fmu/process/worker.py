@@ -163,6 +163,11 @@ class Worker:
         """Process id."""
         return self._started.program.pid
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether the process is running."""
+        return self._started.program.is_alive
+
     def load(self, limit: float) -> Reply:
         """Connect and load the library; the limit is in s.
 
