@@ -181,7 +181,10 @@ def formalized_text(found: Formalized) -> str:
         lines += _reading_lines(number, reading)
     for difference in found.differences:
         lines += _difference_lines(difference)
-    lines += [f"rejected: {one_line(reason)}" for reason in found.rejected]
+    for reason in dict.fromkeys(found.rejected):
+        # In one line, without the formula with a caret below it that errors of its syntax have.
+        said = "; ".join(line for line in reason.splitlines() if not line.startswith("  "))
+        lines.append(f"rejected: {one_line(said)}")
     lines.append(f"language model: {llm_use(found.spent)}")
     return "\n".join(lines)
 

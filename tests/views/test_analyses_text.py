@@ -70,6 +70,14 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
     assert json.loads(json.dumps(content)) == content
 
 
+def test_a_reason_that_occurred_again_is_told_once_in_one_line() -> None:
+    wrong = json.dumps({"readings": [{**READINGS[0], "formula": "F[0,10] (speed >= 80"}, READINGS[0]]})
+    found = formalize("AT1", "Fast.", ScriptedChat([wrong] * 3), nominal=False)
+    assert len(found.rejected) > 1
+    (line,) = (line for line in formalized_text(found).splitlines() if line.startswith("rejected"))
+    assert line.endswith("(position 21); hint: it closes the '(' at position 9")
+
+
 def test_each_signal_has_its_name_and_range() -> None:
     times = np.linspace(0, 1, 4)
     found = trace_lines(
