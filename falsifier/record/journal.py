@@ -64,9 +64,6 @@ _SYNC_PERIOD = 1.0
 _AT_ONCE = (ExchangeRecord, ConfirmedRecord, EndedRecord)
 # With Keep "history" the first so many trajectories are kept, then each that improves on the best.
 _KEPT_TRAJECTORIES = 200
-# Lines with candidates are long; readers that only count skip them by their beginning, without parsing.
-_ASKED = b'"kind":"asked"'
-_KIND_WITHIN = 40
 
 
 class Journal:
@@ -229,17 +226,13 @@ def holds_lines(directory: Path) -> bool:
     return path.exists() and path.stat().st_size > 0
 
 
-def read_journal(directory: Path, *, with_candidates: bool = True) -> list[Record]:
+def read_journal(directory: Path) -> list[Record]:
     """Read all complete records of a run directory in order; empty if there is no journal.
-
-    Args:
-        directory: run directory.
-        with_candidates: False: skip the records of what engines suggested, which are long.
 
     Raises:
         JournalError: if a line is invalid, unless it is an incomplete last line.
     """
-    return list(JournalReader(directory, with_candidates=with_candidates).new())
+    return list(JournalReader(directory).new())
 
 
 class JournalReader:
@@ -247,24 +240,17 @@ class JournalReader:
 
     Args:
         directory: run directory; the run need not have started.
-        with_candidates: see read_journal.
     """
 
-    def __init__(self, directory: Path, *, with_candidates: bool = True) -> None:
+    def __init__(self, directory: Path) -> None:
         self.path = directory / JOURNAL
         self.offset = 0
         self.line = 0
-        self._with_candidates = with_candidates
 
     @property
     def shrank(self) -> bool:
         """Whether the file is shorter than what was read; then start again with a new reader."""
         return self.path.exists() and self.path.stat().st_size < self.offset
-
-    @property
-    def begun(self) -> bool:
-        """Whether anything has been read."""
-        return self.offset > 0
 
     def new(self) -> Iterator[Record]:
         """Yield the complete records written since the last call.
@@ -280,18 +266,16 @@ class JournalReader:
                 if not line.endswith(b"\n"):  # cut off by a crash, or still being written
                     return
                 self.line += 1
-                skipped = not self._with_candidates and _ASKED in line[:_KIND_WITHIN]
                 try:
                     check_seal(line)
-                    record = None if skipped else parse_line(line, self.line)
+                    record = parse_line(line, self.line)
                 except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
                         f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
                     ) from None
                 self.offset += len(line)
-                if record is not None:
-                    yield record
+                yield record
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:

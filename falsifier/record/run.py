@@ -370,7 +370,7 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
     """The limits of a run that is continued with others; what it has spent stays spent."""
     if not isinstance(given, Budget):
         given = replace(budget, simulations=whole("budget", given, least=1))
-    records = read_journal(place, with_candidates=False)
+    records = read_journal(place)
     spent = sum(isinstance(record, EvaluatedRecord) for record in records)
     if given.simulations is not None and given.simulations < spent:
         raise SpecError(

@@ -148,20 +148,19 @@ class RunFollower(Generic[S]):
     Args:
         directory: run directory; the run need not have started.
         empty: the summaries before the first record, one per requirement that is of interest.
-        with_candidates: see read_journal.
 
     Attributes:
         summaries: what was read so far.
     """
 
-    def __init__(self, directory: Path, empty: Sequence[S], *, with_candidates: bool = False) -> None:
+    def __init__(self, directory: Path, empty: Sequence[S]) -> None:
         self.directory = directory
-        self._empty, self._with_candidates = empty, with_candidates
+        self._empty = empty
         self._begin()
 
     def _begin(self) -> None:
         self.summaries = deepcopy(list(self._empty))
-        self._reader = JournalReader(self.directory, with_candidates=self._with_candidates)
+        self._reader = JournalReader(self.directory)
 
     def read(self) -> Iterator[Record]:
         """Yield the records that are new, after they were added to the summaries.
@@ -175,10 +174,6 @@ class RunFollower(Generic[S]):
             for summary in self.summaries:
                 summary.add(record)
             yield record
-        if self._reader.begun:  # even if the first record was skipped
-            for summary in self.summaries:
-                if summary.status == "waiting":
-                    summary.status = "running"
 
     def look(self) -> list[S]:
         """Read all that is new, and return the summaries."""

@@ -23,7 +23,7 @@ from tests.record.test_summary import evaluated
 
 def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
     reader = JournalReader(tmp_path)
-    assert list(reader.new()) == [] and not reader.begun
+    assert list(reader.new()) == []
     path = tmp_path / "journal.jsonl"
     lines = [line_of(evaluated(i, float(i)), i + 1) for i in range(3)]
     path.write_bytes(lines[0] + lines[1][:20])

@@ -128,7 +128,7 @@ class Watch:
             seconds = _READING_ON
             if place not in self._watched:
                 seconds = _READING
-                run = RunFollower(place, unread_runs(place), with_candidates=True)
+                run = RunFollower(place, unread_runs(place))
                 self._watched = {place: _Watched(run)}  # one at a time is in memory
             watched = self._watched[place]
             watched.read(monotonic() + seconds)
