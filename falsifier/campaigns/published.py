@@ -3,8 +3,7 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
-from pathlib import Path
+from functools import cache
 from typing import Any
 
 from falsifier.core.files import bundled
@@ -88,29 +87,22 @@ def is_tied(score: Score, others: Iterable[Score]) -> bool:
     return any(other.falsified > 0 and other.key == score.key for other in others)
 
 
-@lru_cache(maxsize=4)
-def read_published(path: Path | None = None) -> Published:
-    """Read a table of published results; without a path, the bundled one.
+@cache
+def read_published() -> Published:
+    """Read the bundled table of published results."""
+    data = tomllib.loads((bundled("specs") / "published.toml").read_text(encoding="utf-8"))
 
-    Raises:
-        SpecError: if the file is not such a table.
-    """
-    file = path or bundled("specs") / "published.toml"
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-        runs = int(data["runs"])
-        return Published(
-            {name: _scores(data[name], runs) for name in COLUMNS},
-            {name: _scores(column, runs) for name, column in data.get("ablation", {}).items()},
-            {name: _scores(column, runs) for name, column in data.get("llms", {}).items()},
-            {name: _scores(column, runs) for name, column in data.get("tools", {}).items()},
-            {
-                **{name: data[name].get("source", "") for name in COLUMNS},
-                **{name: column.get("source", "") for name, column in data.get("tools", {}).items()},
-            },
-        )
-    except (OSError, tomllib.TOMLDecodeError, KeyError, TypeError, AttributeError) as error:
-        raise SpecError(f"not a table of published results: {error!r}", file=str(file)) from None
+    def columns(found: Mapping[str, Any]) -> dict[str, dict[str, Score]]:
+        return {name: _scores(column, int(data["runs"])) for name, column in found.items()}
+
+    best, tools = {name: data[name] for name in COLUMNS}, data["tools"]
+    return Published(
+        columns=columns(best),
+        ablation=columns(data["ablation"]),
+        llms=columns(data["llms"]),
+        tools=columns(tools),
+        sources={name: column.get("source", "") for name, column in (best | tools).items()},
+    )
 
 
 def _scores(column: Mapping[str, Any], runs: int) -> dict[str, Score]:

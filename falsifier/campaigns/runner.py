@@ -72,14 +72,14 @@ def run_campaign(
         ModelError: if an FMU cannot be used.
     """
     jobs = whole("jobs", jobs, least=1)
-    problems = check_request(request)
+    hashes = check_request(request)
     with campaign_lock(directory):
         if is_campaign(directory):
             raise JournalError(
                 f"{directory} already contains a campaign: choose another --out, or to continue it: "
                 f"falsifier resume {directory}"
             )
-        record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
+        record = CampaignRecord(**environment(), request=request, hashes=hashes)
         write_campaign(directory, record)
         return _work(directory, record, jobs, tuple(listeners))
 
@@ -107,8 +107,7 @@ def resume_campaign(
     jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
-        problems = _load(record.runs.values())
-        check_unchanged(directory, record.hashes, _hashes(problems))
+        check_unchanged(directory, record.hashes, _hashes(_load(record.runs.values())))
         if limits is not None:
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
@@ -119,16 +118,29 @@ def resume_campaign(
 def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[Listener, ...]) -> CampaignEnd:
     stop = directory / STOP
     stop.unlink(missing_ok=True)
-    watch = _Watch(directory, record.request.limits, listeners)
-    runs = watch.follower.look().runs
-    for run in runs:  # if the process was killed just after a run ended, the counterexample's file is missing
-        if run.status == "falsified":
-            keep_recorded(run_directory(directory, run.name))
-    tasks = [
-        RunTask(run.name, record.runs[run.name], directory.absolute(), record.hashes)
-        for run in runs
-        if not run.finished
-    ]
+    limits, follower, began, reason = record.request.limits, Follower(directory), perf_counter(), ""
+
+    def stop_all(why: str) -> None:
+        nonlocal reason
+        reason = why
+        stop.write_text(f"{why}\n", encoding="utf-8")  # workers look for this file
+
+    def tick() -> bool:
+        """Update listeners and limits; return whether the campaign may continue."""
+        nonlocal reason
+        progress = follower.look()
+        for listener in listeners:
+            listener(progress)
+        if limits is not None and not reason:
+            try:
+                reached = limits.exceeded(replace(progress.spent, seconds=perf_counter() - began))
+            except SpecError as error:  # a price is unknown
+                reached = str(error)
+            if reached is not None:
+                stop_all(reached)
+        if not reason and stop.exists():
+            reason = stop.read_text(encoding="utf-8").strip() or "stopped by the user"
+        return not reason
 
     def report(task: RunTask, failure: str) -> None:
         place = run_directory(directory, task.name)
@@ -136,62 +148,31 @@ def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[L
             _record_failure(place, task.request, failure)
         keep_recorded(place)
 
+    tasks = []
+    for run in follower.look().runs:
+        if not run.finished:
+            tasks.append(RunTask(run.name, record.runs[run.name], directory.absolute(), record.hashes))
+        elif run.falsified:  # its counterexample is missing if the process was killed just after it ended
+            keep_recorded(run_directory(directory, run.name))
     with open_workers(jobs) as workers:
         schedule = Schedule(tasks, workers)
         try:
-            schedule.run(report, watch.tick)
+            schedule.run(report, tick)
         except KeyboardInterrupt:
-            watch.stop("stopped by the user")
+            stop_all("stopped by the user")
             schedule.run(report, lambda: False)
-    progress = watch.follower.look()
+    progress = follower.look()
     for listener in listeners:
         listener(progress)
     stop.unlink(missing_ok=True)
-    if watch.error is not None:
-        raise watch.error
-    return CampaignEnd(progress, watch.reason)
+    return CampaignEnd(progress, reason)
 
 
-class _Watch:
-    """Observes a running campaign, informs the listeners, and stops it at its limits or if it is asked to."""
-
-    def __init__(self, directory: Path, limits: Budget | None, listeners: tuple[Listener, ...]) -> None:
-        self.follower = Follower(directory)
-        self.reason = ""
-        self.error: SpecError | None = None
-        self._stop = directory / STOP
-        self._limits = limits
-        self._listeners = listeners
-        self._started = perf_counter()
-
-    def tick(self) -> bool:
-        """Update listeners and limits; return whether the campaign may continue."""
-        progress = self.follower.look()
-        for listener in self._listeners:
-            listener(progress)
-        if self._limits is not None and not self.reason:
-            spent = replace(progress.spent, seconds=perf_counter() - self._started)
-            try:
-                reached = self._limits.exceeded(spent)
-            except SpecError as error:
-                self.error, reached = error, str(error)
-            if reached is not None:
-                self.stop(reached)
-        if not self.reason and self._stop.exists():
-            self.reason = self._stop.read_text(encoding="utf-8").strip() or "stopped by the user"
-        return not self.reason
-
-    def stop(self, reason: str) -> None:
-        """Stop all runs: workers look for this file."""
-        self.reason = reason
-        self._stop.write_text(f"{reason}\n", encoding="utf-8")
-
-
-def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
+def check_request(request: CampaignRequest) -> dict[str, str]:
     """Check names and keys, load all problems and read their context files before anything is written.
 
     Returns:
-        The problems, without what context files say.
+        SHA-256 of all FMUs and specs, by path.
 
     Raises:
         SpecError: for an unknown engine or prompt variant, or a problem or context file that is not valid.
@@ -211,7 +192,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})
-    return problems
+    return _hashes(problems)
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:

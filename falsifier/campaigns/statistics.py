@@ -2,8 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import sqrt
-from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,24 +86,22 @@ def group(runs: Iterable[Run]) -> dict[tuple[str, Method], list[Run]]:
     return groups
 
 
-def wilson(successes: int, trials: int, confidence: float = _CONFIDENCE) -> Interval:
-    """Score interval of a share (E. B. Wilson, 1927): within [0, 1], and not empty for shares of 0 and 1.
+def wilson(successes: int, trials: int) -> Interval:
+    """95 % score interval of a share (E. B. Wilson, 1927): not empty for shares of 0 and 1, either.
 
     >>> low, high = wilson(10, 10)
     >>> round(low, 4), high
     (0.7225, 1.0)
     """
-    z = NormalDist().inv_cdf(0.5 + confidence / 2)
-    p = successes / trials
-    centre = (p + z * z / (2 * trials)) / (1 + z * z / trials)
-    half = z / (1 + z * z / trials) * sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
-    low = 0.0 if successes == 0 else max(0.0, centre - half)
-    return low, 1.0 if successes == trials else min(1.0, centre + half)
+    from scipy.stats import binomtest
+
+    low, high = binomtest(successes, trials).proportion_ci(_CONFIDENCE, method="wilson")
+    return float(low), float(high)
 
 
-def bootstrap(values: NDArray[np.float64], confidence: float = _CONFIDENCE) -> Interval:
-    """Percentile bootstrap interval of the mean; seeded, so the same values give the same interval."""
+def bootstrap(values: NDArray[np.float64]) -> Interval:
+    """95 % percentile bootstrap interval of the mean; seeded, so the same values give the same interval."""
     draws = np.random.default_rng(0).choice(values, size=(_RESAMPLES, len(values)))
-    tail = 50 * (1 - confidence)
+    tail = 50 * (1 - _CONFIDENCE)
     low, high = np.percentile(draws.mean(axis=1), [tail, 100 - tail])
     return float(low), float(high)

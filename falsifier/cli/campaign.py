@@ -175,34 +175,29 @@ def bench(
 
 @command()
 @directory_argument
-@click.option("--once", is_flag=True, help="Print the current progress and exit.")
 @click.option("--page", is_flag=True, help="Serve a web page of it, on this machine only, until Ctrl-C.")
 @click.option("--allow-stop", is_flag=True, help="With --page: add a button that stops the run, like Ctrl-C.")
-def watch(*, directory: Path, once: bool, page: bool, allow_stop: bool) -> None:
+def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
     This writes nothing to DIRECTORY unless somebody presses the button of --allow-stop. The page of --page
     can also be opened after the run has ended.
     """
     if page:
-        refuse("cannot be combined with --page", once=once)
         _serve(directory, allow_stop=allow_stop)
         return
     refuse("applies to --page only", allow_stop=allow_stop)
     follower = Follower(directory)
-    working = follower.is_worked_on
-    if not once:
-        with campaign_display() as show:
-            while working:
-                show(follower.look())
-                time.sleep(_WATCH_PERIOD)
-                working = follower.is_worked_on
+    with campaign_display() as show:
+        while follower.is_worked_on:
             show(follower.look())
-    progress = follower.look()  # after the lock was released: by then everything has been written
+            time.sleep(_WATCH_PERIOD)
+        progress = follower.look()  # after the lock was released: by then everything has been written
+        show(progress)
     for run in () if is_campaign(directory) else progress.runs:
         say(run_line(run))
-    say(overall_line(progress, None, stopped=not working))
-    if not working and progress.finished < len(progress.runs):
+    say(overall_line(progress, None, stopped=True))
+    if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
 
 
