@@ -1,6 +1,5 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
-import json
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -13,7 +12,6 @@ from falsifier.cli.command import command, refuse
 from falsifier.cli.options import (
     budget_option,
     json_option,
-    out_option,
     problem_options,
     problem_source,
     quiet_option,
@@ -24,7 +22,6 @@ from falsifier.cli.options import (
 )
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.core.arguments import finite
-from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import JournalError, SpecError
@@ -49,7 +46,6 @@ _SAID_EVERY = 100
 @requirement_option
 @seed_option()
 @quiet_option
-@out_option("Directory for assurance.json.", metavar="DIR")
 @json_option
 def assess(
     *,
@@ -57,7 +53,6 @@ def assess(
     requirement: str | None,
     seed: int,
     quiet: bool,
-    out: Path | None,
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -83,9 +78,6 @@ def assess(
     content = assurance_json(found) | {"budget": budget, "seed": seed}
     lines = [f"{problem.name}: {problem.requirement.formula}"]
     lines += [f"  {line}" for line in found.text.splitlines()]
-    if out:
-        file = write_whole(out / "assurance.json", json.dumps(content, indent=2))
-        lines.append(f"  file: {file}")
     code = INTERRUPTED if found.interrupted else 1 if found.violations else 0
     conclude(as_shown("\n".join(map(one_line, lines)), content, as_json=as_json), code)
 
