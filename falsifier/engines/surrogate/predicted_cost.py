@@ -24,12 +24,12 @@ from falsifier.stl.formula import (
     Formula,
     Iff,
     Implies,
-    Next,
     Not,
     Or,
     Predicate,
     Until,
     Window,
+    replaced,
 )
 
 Margins = list[Array]
@@ -76,7 +76,9 @@ class PredictedCost:
     ) -> "PredictedCost":
         """Return the cost for a formula, with all scales 1 until ``rescaled``."""
         predicates = formula.predicates
-        on_grid = _on_grid(formula, grid.step, {p: _signal(i) for i, p in enumerate(predicates)})
+        # Over the predicates' margins, with windows that count cells.
+        parts: dict[object, object] = {p: _signal(i) for i, p in enumerate(predicates)}
+        on_grid = replaced(formula, parts | {w: _in_cells(w, grid.step) for w in formula.windows})
         # Rounded windows may end beyond the grid; the last values then continue.
         samples = max(grid.cells, round(on_grid.horizon(1.0))) + 1
         return cls(
@@ -178,27 +180,7 @@ def _signal(index: int) -> Predicate:
     return Predicate(">", Name(f"p{index}"), Number(0.0))
 
 
-def _on_grid(formula: Formula, step: float, signals: Mapping[Predicate, Predicate]) -> Formula:
-    """Return a formula over the predicates' margins, whose windows count cells."""
-    if isinstance(formula, Predicate):
-        return signals[formula]
-    match formula:
-        case Not(operand) | Next(operand):
-            return type(formula)(_on_grid(operand, step, signals))
-        case Always(operand, window) | Eventually(operand, window):
-            return type(formula)(_on_grid(operand, step, signals), _in_cells(window, step))
-    left, right = (_on_grid(child, step, signals) for child in formula.children)
-    match formula:
-        case Until(_, _, window):
-            return Until(left, right, _in_cells(window, step))
-        case And() | Or() | Implies() | Iff():
-            return type(formula)(left, right)
-    raise TypeError(f"no predicted robustness for {type(formula).__name__}")
-
-
-def _in_cells(window: Window | None, step: float) -> Window | None:
-    if window is None:
-        return None
+def _in_cells(window: Window, step: float) -> Window:
     if 0 < window.end < step:
         return Window(1.0, 1.0)  # a window shorter than a cell is approximated by the next grid point
     first = ceil(window.start / step - _ROUNDING)
