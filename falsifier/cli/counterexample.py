@@ -24,7 +24,7 @@ from falsifier.cli.options import (
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_lines, counted, in_one_line
+from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.store import EXPLANATION, beside
@@ -231,7 +231,7 @@ def _shrink(
     lines.append(
         f"  robustness     {signed(found.robustness)}; up to {signed(shrunk.at_most)} was allowed{changed}"
     )
-    lines += [f"  {line}" for line in candidate_lines(found.candidate, problem.space)]
+    lines += fact_lines(candidate_facts(found.candidate, problem.space))
     lines.append(f"  files          {', '.join(map(str, files))}")
     say(as_shown("\n".join(map(one_line, lines)), content, as_json=as_json))
 
@@ -305,8 +305,8 @@ def _about(case: Case, problem: Problem, named: Path) -> list[str]:
         return [one_line(case.text)]
     if case.file == named or not case.is_shrunk:
         return []
-    lines = candidate_lines(case.candidate, problem.space)
-    return [f"This is about {case.place}, the shrunk counterexample:", *(f"  {line}" for line in lines)]
+    lines = fact_lines(candidate_facts(case.candidate, problem.space))
+    return [f"This is about {case.place}, the shrunk counterexample:", *lines]
 
 
 @contextmanager

@@ -1,8 +1,6 @@
 """Candidates in words, the same on the terminal, in notebooks, in reports and in messages to an LLM."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -12,52 +10,24 @@ from falsifier.core.space import InputRange, SearchSpace
 _SHOWN_POINTS = 12
 
 
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """A candidate's choice for one input or parameter.
+def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
+    """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
-    Attributes:
-        role: ``input`` or ``parameter``.
-        name: name of the input or parameter.
-        unit: unit of its values, empty if unknown.
-        text: its values in words.
+    Args:
+        candidate: the candidate.
+        space: search space with the units; without one, none are told.
     """
-
-    role: Literal["input", "parameter"]
-    name: str
-    unit: str
-    text: str
-
-    @property
-    def label(self) -> str:
-        """Name, with the unit in brackets if known."""
-        return f"{self.name} [{self.unit}]" if self.unit else self.name
-
-
-def choices(candidate: Candidate, space: SearchSpace | None = None) -> list[Choice]:
-    """Return a candidate's choices, inputs first; the units come from the search space."""
-    units: dict[str, str] = {}
-    if space is not None:
-        units |= {r.name: r.unit for r in space.inputs} | {p.name: p.unit for p in space.parameters}
+    units = {r.name: r.unit for r in (*space.inputs, *space.parameters)} if space is not None else {}
+    labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
     return [
-        *(Choice("input", n, units.get(n, ""), signal_text(s)) for n, s in candidate.signals.items()),
-        *(Choice("parameter", n, units.get(n, ""), f"{v:.10g}") for n, v in candidate.parameters.items()),
+        *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in candidate.signals.items()),
+        *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),
     ]
 
 
-def candidate_lines(candidate: Candidate, space: SearchSpace) -> list[str]:
-    """Return one aligned line per input and parameter."""
-    return [
-        f"{c.role:<14} {c.label}{' =' if c.role == 'parameter' else ''} {c.text}"
-        for c in choices(candidate, space)
-    ]
-
-
-def in_one_line(candidate: Candidate, space: SearchSpace | None = None) -> str:
+def in_one_line(candidate: Candidate) -> str:
     """Return a candidate in one line."""
-    return "; ".join(
-        f"{c.label}{' =' if c.role == 'parameter' else ''} {c.text}" for c in choices(candidate, space)
-    )
+    return "; ".join(text for _, text in candidate_facts(candidate))
 
 
 def signal_text(signal: Signal) -> str:

@@ -11,14 +11,14 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted
+from falsifier.core.words import candidate_facts, counted
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import Verdict, in_words
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import el, join, picture, table
-from falsifier.views.text import Fact, broken_facts, candidate_facts, margin_facts, result_facts, seconds_text
+from falsifier.views.text import Fact, broken_facts, margin_facts, result_facts, seconds_text
 
 # Images are stored in the notebook file; at this resolution about 20 kB each.
 _DPI = 80

@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
-from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.space import SearchSpace
-from falsifier.core.words import choices, counted
+from falsifier.core.words import candidate_facts, counted
 from falsifier.counterexamples.store import file_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
@@ -187,14 +185,6 @@ def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
 def units_of(problem: Problem) -> dict[str, str]:
     """Return the units of a model's variables, by name."""
     return {variable.name: variable.unit for variable in problem.info.variables}
-
-
-def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[Fact]:
-    """Return what a candidate chooses for each input and parameter; the units come from the search space."""
-    return [
-        (c.role, f"{c.label}{' =' if c.role == 'parameter' else ''} {c.text}")
-        for c in choices(candidate, space)
-    ]
 
 
 def broken_facts(verdict: Verdict | None) -> list[Fact]:
