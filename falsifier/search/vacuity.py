@@ -5,29 +5,26 @@ Parts of the requirement that never had a say, and inputs and parameters without
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
-from falsifier.stl.formula import Always, Eventually, Formula, Iff, Implies, Next, Not, Or, Predicate, Until
-from falsifier.stl.intervals import Interval, margins
+from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Or, Predicate, Until
 from falsifier.stl.margins import is_on_limit, shown, signed
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
 _FAR = 3.0
 # Number of simulations from which on a robustness that never changes means something.
 _FEWEST = 2
-# Maximum number of signals that are named or combined.
+# Maximum number of signals that are named.
 _MOST_NAMED = 4
 
 
@@ -224,37 +221,16 @@ def _hidden(problem: Problem) -> Iterator[Finding]:
 
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:
     """Return why Booleans leave a requirement's robustness without a margin, and what to do; None if not."""
-    formula, info = problem.requirement.formula, problem.info
-    found = _truth_margins(formula, info)
-    if not found:
+    signals, info = problem.requirement.formula.signals, problem.info
+    if not signals or any(info.kind(name) != "boolean" for name in signals):
         return None
-    values = " or ".join(f"{value:g}" for value in sorted({shown(value) for value in found}))
-    names_are = f"{listed(formula.signals)} {'is' if len(formula.signals) == 1 else 'are'}"
+    names_are = f"{listed(signals)} {'is' if len(signals) == 1 else 'are'}"
     numbers = [v.name for v in info.observables if v.kind == "real"][:_MOST_NAMED]
     known = f"the model has {listed(numbers)}" if numbers else "make them outputs of the model"
     return (
-        f"the robustness can only be {values}, because {names_are} Boolean: no value says how near a "
-        "violation is",
+        f"the robustness has few values, because {names_are} Boolean: none says how near a violation is",
         f"compare the numbers of which {names_are} made instead ({known})",
     )
-
-
-def _truth_margins(formula: Formula, info: ModelInfo) -> set[float]:
-    """Return all values of the robustness of a formula about Booleans alone; empty for any other."""
-    if isinstance(formula, Predicate):
-        names = formula.signals
-        if not 0 < len(names) <= _MOST_NAMED or any(info.kind(n) != "boolean" for n in names):
-            return set()
-        points = product((Interval(0.0, 0.0), Interval(1.0, 1.0)), repeat=len(names))
-        return {margins(formula, dict(zip(names, point, strict=True))).low for point in points}
-    found = [_truth_margins(child, info) for child in formula.children]
-    if not all(found):
-        return set()
-    if isinstance(formula, Not | Implies):
-        found[0] = {-value for value in found[0]}
-    if isinstance(formula, Iff):
-        found += [{-value for value in values} for values in found]
-    return set().union(*found)
 
 
 class Effects:
