@@ -206,7 +206,7 @@ def _setting(config: pytest.Config, name: str) -> Any:
 def _message(item: pytest.Item, checked: "Checked") -> str:
     """The counterexample, its picture, the command that replays it, and the explanation."""
     from falsifier.core.files import file_name
-    from falsifier.core.words import candidate_lines
+    from falsifier.core.words import candidate_facts
     from falsifier.counterexamples.explain import explain
     from falsifier.views.plotting import plot_evaluation, save_figure
     from falsifier.views.text import broken_facts, fact_lines
@@ -225,7 +225,7 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
         *fact_lines(broken_facts(found.evaluation.verdict)),
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
-        *(f"  {line}" for line in candidate_lines(found.evaluation.candidate, problem.space)),
+        *fact_lines(candidate_facts(found.evaluation.candidate, problem.space)),
         f"  picture        {_short(picture)}",
     ]
     if checked.file is not None:
