@@ -24,7 +24,6 @@ from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.export.tables import matlab_names
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.store import file_of, to_store
 from falsifier.errors import SpecError
@@ -67,8 +66,6 @@ def test_file_names_are_one_component(name: str) -> None:
 @given(st.lists(names, unique=True))
 def test_different_names_are_different_files(several: list[str]) -> None:
     assert len({file_name(name) for name in several}) == len(several)
-    assert len(set(matlab_names(several).values())) == len(several)
-    assert all(re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name) for name in matlab_names(several).values())
 
 
 @given(names)

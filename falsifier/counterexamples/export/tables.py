@@ -1,10 +1,8 @@
 """Inputs as they were applied, and start values, as tables in the formats of other tools."""
 
 import json
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -19,11 +17,6 @@ from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
 
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
-_MATLAB_NAME_LENGTH = 63
-_MATLAB_KEYWORDS = (
-    "break", "case", "catch", "classdef", "continue", "else", "elseif", "end", "for", "function", "global",
-    "if", "otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "while",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,41 +147,21 @@ def parameter_set(start: Mapping[str, float | str], name: str) -> ElementTree.El
 
 
 def write_mat(table: InputTable, start: Mapping[str, float | str], path: Path) -> Path:
-    """Write inputs and start values for MATLAB, under valid MATLAB names.
+    """Write inputs and start values for MATLAB, whose names of variables cannot be the model's.
 
-    Each input is a matrix with the columns time and value, the format of From Workspace blocks and root
-    inports; a repeated time is a step. ``start_values`` is a structure; ``names`` maps the MATLAB names to
-    the model's own names.
+    ``inputs`` is a matrix of the time and one column per input, as Simulink takes it for root inports; a
+    repeated time is a step. ``input_names`` names the columns after the time. ``start_values`` belong to
+    ``start_names``.
     """
     from scipy.io import savemat
 
-    short = matlab_names((*table.columns, *start))
-    inputs = {short[n]: np.stack((table.times, column), axis=1) for n, column in table.columns.items()}
-    structure = {short[n]: v if isinstance(v, str) else float(v) for n, v in start.items()}
-    names = np.array([[matlab, plain(n)] for n, matlab in short.items()], dtype=object)
-    savemat(
-        path, {**inputs, "start_values": structure or np.empty((0, 0)), "names": names}, long_field_names=True
-    )
+    content = {"input_names": table.columns, "start_names": start, "start_values": start.values()}
+    cells = {
+        name: np.array([plain(v) if isinstance(v, str) else v for v in values], dtype=object)
+        for name, values in content.items()
+    }
+    savemat(path, {"inputs": np.stack((table.times, *table.columns.values()), axis=1), **cells})
     return path
-
-
-def matlab_names(names: Iterable[str]) -> dict[str, str]:
-    """Return the closest valid MATLAB name for each name; different names stay different.
-
-    >>> matlab_names(["car.x[1]", "car.x(1)"])
-    {'car.x[1]': 'car_x_1_', 'car.x(1)': 'car_x_1__2'}
-    """
-    found: dict[str, str] = {}
-    taken = {"start_values", "names", *_MATLAB_KEYWORDS}
-    for name in dict.fromkeys(names):
-        base = re.sub(r"\W", "_", name, flags=re.ASCII)
-        base = base if base[:1].isalpha() else f"x{base}"
-        numbered = (f"_{i}" if i > 1 else "" for i in count(1))
-        found[name] = next(
-            new for end in numbered if (new := base[: _MATLAB_NAME_LENGTH - len(end)] + end) not in taken
-        )
-        taken.add(found[name])
-    return found
 
 
 def _by_declaration(model: Model, names: Iterable[str]) -> dict[str, tuple[str, ...]]:

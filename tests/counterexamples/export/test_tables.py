@@ -11,7 +11,6 @@ from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.tables import (
     InputTable,
     input_table,
-    matlab_names,
     write_csv,
     write_mat,
     write_ssv,
@@ -28,15 +27,17 @@ def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:
     assert {p.name: float(p.value) for p in read.parameters} == {"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}
 
 
-def test_the_mat_file_holds_time_and_value_by_names_that_matlab_accepts(tmp_path: Path) -> None:
-    problem = lag_problem(free=Freedom(10, 0.1))
-    table = input_table(problem, Candidate({"u": Signal((0.0, 5.0), (0.0, 1.0), "constant")}))
-    content = loadmat(write_mat(table, {"a.b[2]": 3.0}, tmp_path / "i.mat"))
-    assert content["u"].tolist() == [[0.0, 0.0], [5.0, 0.0], [5.0, 1.0], [10.0, 1.0]]
-    assert content["start_values"]["a_b_2_"][0, 0].item() == 3.0
-    assert [[cell.item() for cell in row] for row in content["names"]] == [["u", "u"], ["a_b_2_", "a.b[2]"]]
-    names = {"1 x": "x1_x", "1_x": "x1_x_2", "end": "end_2", "größe": "gr__e", "a" * 80: "a" * 63}
-    assert matlab_names(list(names)) == names
+def test_the_mat_file_holds_a_matrix_of_inputs_and_the_models_own_names(tmp_path: Path) -> None:
+    problem = lag_problem(free=Freedom(10, 0.1), inputs=2)
+    steps = {"u": Signal((0.0, 5.0), (0.0, 1.0), "constant"), "v": Signal((0.0,), (0.5,))}
+    start: dict[str, float | str] = {"a.b[2]": 3.0, "file": "größe"}
+    content = loadmat(write_mat(input_table(problem, Candidate(steps)), start, tmp_path / "i.mat"))
+    assert content["inputs"].tolist() == [[0.0, 0.0, 0.5], [5.0, 0.0, 0.5], [5.0, 1.0, 0.5], [10.0, 1.0, 0.5]]
+    cells = {name: [cell.item() for cell in content[name].ravel()] for name in content if "_n" in name}
+    assert cells == {"input_names": ["u", "v"], "start_names": ["a.b[2]", "file"]}
+    assert [cell.item() for cell in content["start_values"].ravel()] == [3.0, "größe"]
+    write_mat(InputTable(np.array([0.0, 1.0]), {}), {}, tmp_path / "empty.mat")
+    assert loadmat(tmp_path / "empty.mat")["inputs"].tolist() == [[0.0], [1.0]]
 
 
 def test_the_csv_reads_back_exactly(tmp_path: Path) -> None:
