@@ -100,7 +100,7 @@ def _read_values(text: str) -> None:
 
 def _on_tools(reply: ChatReply) -> tuple[bool, str]:
     if not reply.parameters.get("tools"):
-        return False, "refused by the server; the hybrid engine tells predictions afterwards"
+        return False, "not taken; the hybrid engine tells predictions afterwards"
     if not reply.tool_calls:
         return False, "offered, but not called"
     arguments = reply.tool_calls[0].arguments

@@ -22,7 +22,6 @@ from falsifier.llm.litellm_adapter import (
     dropped_parameters,
     listed_price,
     load_litellm,
-    may_take_tools,
 )
 from falsifier.llm.messages import (
     MODES,
@@ -86,7 +85,7 @@ class LiteLLMChat:
     attempts: int = DEFAULT_ATTEMPTS
     first_delay: float = FIRST_DELAY
     _mode_with_tools: Mode = field(init=False)
-    _takes_tools: bool | None = field(init=False, default=None)
+    _takes_tools: bool = field(init=False, default=True)
     _unreadable: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
@@ -118,8 +117,6 @@ class LiteLLMChat:
         """Do nothing; storing replies is CachedChat's concern."""
 
     def _asked(self, request: ChatRequest) -> ChatReply:
-        if request.tools and self._takes_tools is None:
-            self._takes_tools = may_take_tools(self.llm, api_base=self.api_base)
         while True:
             if not self._takes_tools:
                 request = request.model_copy(update={"tools": ()})
@@ -289,7 +286,7 @@ class LiteLLMChat:
         omitted = {own_names.get(name, name) for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
         effective["mode"] = mode if "response_format" in arguments else "prompt"
-        if "tools" in arguments:
+        if "tools" in arguments and "tools" not in omitted:
             effective["tools"] = [tool["function"]["name"] for tool in arguments["tools"]]
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]

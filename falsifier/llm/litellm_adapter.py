@@ -45,7 +45,7 @@ _ROUTERS = frozenset({"openrouter", "huggingface"})
 # Parameters that litellm drops for LLMs that do not accept them.
 _DROPPABLE = frozenset(
     {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
-     "frequency_penalty"}
+     "frequency_penalty", "tools"}
 )  # fmt: skip
 
 
@@ -132,21 +132,6 @@ def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
     if prompt is None or completion is None or (not prompt and not completion and not known(llm).local):
         return None
     return Price(1e6 * prompt, 1e6 * completion)
-
-
-def may_take_tools(llm: str, *, api_base: str | None = None) -> bool:
-    """Whether to offer tools: False only if litellm lists the LLM as one without tool support.
-
-    For the user's own server the answer is always True: only a request can show what it supports.
-    """
-    if api_base is not None or known(llm).local:
-        return True
-    litellm = load_litellm()
-    try:
-        litellm.get_model_info(llm)
-    except Exception:  # not in the table
-        return True
-    return bool(litellm.supports_function_calling(llm))
 
 
 def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None = None) -> None:

@@ -67,7 +67,7 @@ def test_tools_and_limits_that_are_not_taken() -> None:
     assert [f.works for f in found.values()] == [True, False, False]
     assert "not called" in found["tools"].said
     refused, _ = checked(GOOD, Step(status=400, message="tools are not supported"), Step("It is warm."), CUT)
-    assert "refused by the server" in refused["tools"].said
+    assert "not taken" in refused["tools"].said
     wrong, _ = checked(GOOD, Step(None, calls=(("measure", {"town": "Paris"}),)), CUT)
     assert "wrong arguments" in wrong["tools"].said
 

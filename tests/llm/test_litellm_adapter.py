@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.llm.client import LiteLLMChat, sent_message
 from falsifier.llm.conversation import converse
-from falsifier.llm.litellm_adapter import listed_price, may_take_tools
+from falsifier.llm.litellm_adapter import listed_price
 from falsifier.llm.messages import Message, ToolCall
 from tests.llm.server import Step, serving
 from tests.llm.support import ADD, QUESTION, SCHEMA, add
@@ -78,8 +78,9 @@ def test_prices() -> None:
     assert listed_price("openai/never-heard-of") is None
 
 
-def test_the_table_is_believed_where_it_knows_the_model() -> None:
-    assert may_take_tools("openai/gpt-5-mini")
-    assert not may_take_tools("perplexity/sonar")
-    assert may_take_tools("openai/never-heard-of")
-    assert may_take_tools("perplexity/sonar", api_base="http://127.0.0.1:1/v1")
+def test_tools_that_litellm_drops_are_not_recorded_as_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PERPLEXITYAI_API_KEY", "some-secret-key")
+    with serving(Step('{"sum": 3}')) as server:
+        sent = LiteLLMChat("perplexity/sonar", api_base=server.url).complete(QUESTION).parameters
+    assert "tools" not in sent and sent["dropped"] == ["tools"]
+    assert "tools" not in server.received[0].body
