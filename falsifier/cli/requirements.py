@@ -1,7 +1,6 @@
 """``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import shlex
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +21,7 @@ from falsifier.cli.options import (
     target_argument,
 )
 from falsifier.cli.output import as_shown, conclude, say
-from falsifier.core.files import write_whole
+from falsifier.core.files import bundled, write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, parameterization_text
 from falsifier.errors import SpecError
@@ -99,10 +98,7 @@ def _lines(finding: LintFinding) -> list[str]:
 @click.argument("sentence")
 @llm_option()
 @connection_options
-@click.option(
-    "--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec without asking."
-)
-@click.option("--name", help="Name of the requirement in the spec; default: the first unused of R1, R2, ...")
+@click.option("--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec.")
 @out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
 @json_option
 def formalize(
@@ -110,7 +106,6 @@ def formalize(
     target: str,
     sentence: str,
     choose: int | None,
-    name: str | None,
     out: Path | None,
     as_json: bool,
     **options: Any,
@@ -121,7 +116,7 @@ def formalize(
     checked, restated in words, distinguished from the others by an example and judged on one simulation.
     Without --llm, the template that fits a simple English sentence is shown, and nothing is written.
     """
-    from falsifier.problem.writing import subject_of, with_requirement
+    from falsifier.problem.writing import subject_of
     from falsifier.views.analyses_text import formalized_json, formalized_text
 
     settings = llm_settings(options)
@@ -129,23 +124,20 @@ def formalize(
         refuse("requires --llm NAME, which proposes the readings", choose=choose)
         _advise(target, sentence, as_json=as_json)
         return
-    if choose is not None or name is not None or out is not None:  # before anything is paid for
-        subject = subject_of(target)
-        with_requirement(subject, _file(subject, out), "true", name=name)
+    if choose is not None or out is not None:  # before anything is paid for
+        _file(subject_of(target), out)
     from falsifier.analyses.formalize import formalize as ask
 
     found = ask(target, sentence, settings)
     if as_json:
-        written = None if choose is None else _write(found, choose, name, out)
+        written = None if choose is None else _write(found, choose, out)
         say(as_shown("", formalized_json(found) | {"written": written}, as_json=True))
         return
     say(formalized_text(found))
-    if choose is None and _may_ask() and _can_write(found.subject, out):
-        choose = _asked(len(found.readings))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
     else:
-        file, given = _write(found, choose, name, out)
+        file, given = _write(found, choose, out)
         say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
 
 
@@ -171,57 +163,23 @@ def _advise(target: str, sentence: str, *, as_json: bool) -> None:
     say(as_shown("\n".join(lines), asdict(advice), as_json=as_json))
 
 
-def _may_ask() -> bool:
-    """Whether somebody sits at a terminal."""
-    return sys.stdin.isatty()
-
-
-def _asked(count: int) -> int | None:
-    """Ask which reading to write."""
-    number: int = click.prompt(
-        f"Which one to write into the spec (1 to {count}, 0 for none)",
-        type=click.IntRange(0, count),
-        default=0,
-    )
-    return number or None
-
-
-def _write(found: "Formalized", number: int, name: str | None, out: Path | None) -> tuple[str, str]:
+def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str]:
     """Write a reading into the spec; return the file and the requirement's name."""
     from falsifier.problem.writing import with_requirement
 
     if number > len(found.readings):
         raise SpecError(f"--choose {number}: expected 1 to {len(found.readings)}, the number of a reading")
     file = _file(found.subject, out)
-    text, given = with_requirement(
-        found.subject,
-        file,
-        str(found.readings[number - 1].formula),
-        name=name,
-        description=found.sentence,
-    )
+    formula = str(found.readings[number - 1].formula)
+    text, given = with_requirement(found.subject, file, formula, description=found.sentence)
     write_whole(file, text)
     return str(file), given
 
 
 def _file(subject: "Subject", out: Path | None) -> Path:
-    if out is None and subject.spec is None:
+    if out is None and subject.path.parent == bundled("specs"):
         raise SpecError("a bundled spec is not changed: give another file with --out")
-    file = out or subject.spec or Path()
-    if out is None and subject.is_new and file.exists():
-        raise SpecError(
-            f"{file} belongs to this FMU: name it in place of the FMU, so that the choice is added, or "
-            "write to another file with --out"
-        )
-    is_same = not subject.is_new and subject.spec is not None and file.resolve() == subject.spec.resolve()
-    if not is_same and file.exists():
+    file = out or subject.path
+    if file.exists() and (subject.is_new or file.resolve() != subject.path.resolve()):
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
     return file
-
-
-def _can_write(subject: "Subject", out: Path | None) -> bool:
-    try:
-        _file(subject, out)
-    except SpecError:
-        return False
-    return True

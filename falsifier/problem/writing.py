@@ -11,7 +11,6 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Item
 
-from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
@@ -23,7 +22,7 @@ from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS, items_text
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
-from falsifier.problem.sections import FreeSection
+from falsifier.problem.sections import FreeSection, RequirementSection
 from falsifier.problem.source import MODEL_FILES, ProblemSource
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
@@ -36,6 +35,8 @@ _SHOWN_PARAMETERS = 10
 _SHOWN_VARIABLES = 20
 # Name of the requirement in a starter spec, which is to be replaced.
 _STARTED = "R1"
+# A requirement in place of one that is still to be written.
+_ANY = "0 <= 1"
 
 
 def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
@@ -192,16 +193,14 @@ class Subject:
 
     Attributes:
         problem: model, ranges and experiment; its requirement is another one.
-        spec: spec file to write to; None for a bundled spec, which stays as it is.
-        folder: folder to which paths in the spec are relative.
-        text: content of that file, or of a starter spec.
-        is_new: whether the file is a starter, whose requirement is a placeholder.
+        path: the spec file, to whose folder its paths are relative.
+        text: content of that file, or of a starter spec for it.
+        is_new: whether that is a starter, which is not written yet.
         free_grid: whether the output interval may follow the formula.
     """
 
     problem: Problem
-    spec: Path | None
-    folder: Path
+    path: Path
     text: str
     is_new: bool
     free_grid: bool
@@ -239,13 +238,10 @@ def subject_of(target: str) -> Subject:
     path, requirement = find_spec(target)
     spec = read_spec(path)
     name = requirement or next(iter(spec.requirements))
-    text = path.read_text(encoding="utf-8-sig")
-    is_started = name == _STARTED and _has_placeholder(tomllib.loads(text))
     return Subject(
-        problem_of_starter(text, path) if is_started else load_source(ProblemSource(target=f"{path}:{name}")),
-        None if path.parent == bundled("specs") else path,
-        path.parent,
-        text,
+        load_source(ProblemSource(target=f"{path}:{name}", stl=_ANY)),
+        path,
+        path.read_text(encoding="utf-8-sig"),
         is_new=False,
         free_grid=spec.model.output_interval is None and spec.requirements[name].output_interval is None,
     )
@@ -256,11 +252,11 @@ def _of_model(fmu: Path) -> Subject:
         raise SpecError(f"{fmu}: no such file; give the path of an .fmu file, or a spec")
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
     path, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
-    return Subject(problem_of_starter(text, path), path, path.parent, text, is_new=True, free_grid=True)
+    return Subject(problem_of_starter(text, path), path, text, is_new=True, free_grid=True)
 
 
 def problem_of_starter(text: str, path: Path) -> Problem:
-    """Return the problem of a starter spec, with a number in place of its placeholder.
+    """Return the problem of a starter spec, with another requirement than its placeholder.
 
     Args:
         text: the spec.
@@ -269,10 +265,8 @@ def problem_of_starter(text: str, path: Path) -> Problem:
     Raises:
         SpecError: if anything else of it is not valid.
     """
-    content = tomllib.loads(text)
-    requirement = content["requirements"][_STARTED]
-    requirement["formula"] = requirement["formula"].removesuffix(f"{PLACEHOLDER})") + "0)"
-    return Problem.of(join(parse_spec(content, file=str(path)), _STARTED, path=path))
+    spec, stated = parse_spec(tomllib.loads(text), file=str(path)), RequirementSection(formula=_ANY)
+    return Problem.of(join(spec, _STARTED, path=path, stated=stated))
 
 
 def _has_placeholder(content: dict[str, Any]) -> bool:
@@ -288,31 +282,24 @@ def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
             section["fmu"] = Path(relpath(fmu, out.resolve().parent)).as_posix()
 
 
-def with_requirement(
-    subject: Subject, out: Path, formula: str, *, name: str | None = None, description: str = ""
-) -> tuple[str, str]:
-    """Return the spec's text with one more requirement, and the name that it has; comments are kept.
+def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
+    """Return the spec's text with one more requirement, and its name; comments are kept.
+
+    The name is the first free one of R1, R2, ...
 
     Args:
         subject: the spec.
         out: file that it will be written to; the path of the FMU is changed accordingly.
         formula: the requirement's formula.
-        name: its name; None: the first free one of R1, R2, ...
         description: the sentence that it stands for.
-
-    Raises:
-        SpecError: if the spec has a requirement of this name.
     """
     document = tomlkit.parse(subject.text)
-    if subject.folder.resolve() != out.resolve().parent:
-        _relocate(document, subject.folder, out)
+    if subject.path.parent.resolve() != out.resolve().parent:
+        _relocate(document, subject.path.parent, out)
     requirements: Any = document["requirements"]
     if subject.is_started:
         del requirements[_STARTED]
-    if name is None:
-        name = next(f"R{k}" for k in range(1, len(requirements) + 2) if f"R{k}" not in requirements)
-    if name in requirements:
-        raise SpecError(f"the spec has a requirement {name!r} already; choose another --name")
+    name = next(f"R{k}" for k in range(1, len(requirements) + 2) if f"R{k}" not in requirements)
     table = tomlkit.table()
     table.add("formula", _formula_item(formula))
     table.add("description", description)
