@@ -162,12 +162,6 @@ def join_formula(
     if not searched:
         connected = {target for _, target in info.connections}
         bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}
-        if searches and not bounded:
-            inputs = [v.name for v in info.inputs]
-            why = "its inputs are unbounded" if inputs else "it has no inputs"
-            raise SpecError(
-                f"{path}: nothing to search: {why}; add --search NAME=LOW:HIGH; {did_you_mean('', inputs)}"
-            )
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(
         spec,
@@ -276,19 +270,13 @@ def _with_points(
 
 
 def _nothing_to_search(info: ModelInfo, changes: ModelChanges | None) -> SpecError:
-    """Return the error that says which key of the spec, or which option, lets something vary."""
+    """Return the error that says what keeps everything constant, and what lets something vary."""
     kept = [*changes.inputs, *changes.parameters] if changes else []
-    if not kept:
-        return SpecError(
-            "nothing to search; add [inputs.NAME] with range and control_points, or [parameters.NAME] with "
-            "range",
-            key="inputs",
-        )
-    low, high = info[kept[0]].limits
-    limits = "LOW:HIGH" if low is None or high is None else f"{low:g}:{high:g}"
+    why = f"--set keeps {listed(kept)} constant" if kept else "no input has a range"
     return SpecError(
-        f"nothing is left to search: --set keeps {listed(kept)} constant, and nothing else varies; leave one "
-        f"of them out, or search it: --search {kept[0]}={limits}"
+        f"nothing to search: {why}, and nothing else varies; add --search NAME=LOW:HIGH, or to a spec "
+        "[inputs.NAME] with range and control_points, or [parameters.NAME] with range; inputs "
+        f"{did_you_mean('', (v.name for v in info.inputs))}"
     )
 
 

@@ -45,7 +45,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "nothing is left to search: --set keeps"),
+        ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "nothing to search: --set keeps"),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
         (
             (*SPEED, "--search", "throttle=0-100"),

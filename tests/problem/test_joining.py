@@ -79,7 +79,7 @@ def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
         ({"options": {"values": ["speed=3"]}}, "parameters.speed"),
         (
             {"options": {"values": ["throttle=3", "finalDrive=3"]}},
-            "nothing is left to search: --set keeps throttle and finalDrive constant",
+            "nothing to search: --set keeps throttle and finalDrive constant",
         ),
         ({"options": {"output_interval": 0.03}}, "model.output_interval"),
     ],
