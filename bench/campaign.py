@@ -145,7 +145,7 @@ def full_report(folder: Path) -> tuple[float, int, int]:
         Time in s, number of runs, size of the report in bytes.
     """
     runs = cross(suite("arch-comp"), ["uniform"], seeds=range(10), budget=Budget(BUDGET))
-    request = CampaignRequest(runs=runs, suite="arch-comp")
+    request = CampaignRequest(runs=runs)
     directory = folder / "suite"
     write_campaign(directory, CampaignRecord(**environment(), request=request, hashes={}))
     for name, run in request.named().items():

@@ -70,14 +70,12 @@ class CampaignRequest(BaseModel):
     Attributes:
         runs: all runs.
         limits: what all runs together may spend; None: no limit in addition to the runs' own.
-        suite: name of the suite that the runs come from, or None.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     runs: tuple[RunRequest, ...] = Field(min_length=1)
     limits: Budget | None = None
-    suite: str | None = None
 
     def named(self) -> dict[str, RunRequest]:
         """Runs by the name of their directory, in order.

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from falsifier.campaigns.directory import run_directories
 from falsifier.campaigns.request import Method, method_of_run
 from falsifier.counterexamples.store import file_of
-from falsifier.errors import JournalError
 from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
@@ -115,11 +114,7 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
     Raises:
         JournalError: if a file is invalid, or several requirements share the search and none is named.
     """
-    manifest = manifests.read(directory)
-    if requirement is None and manifest.shared:
-        names = ", ".join(manifest.names)
-        raise JournalError(f"{directory}: several requirements share this run; choose one of {names}")
-    name = manifest.of(requirement or manifest.names[0]).requirement.name  # which refuses an unknown one
+    name = manifests.read(directory).of(requirement).requirement.name
     (run,) = (run for run in RunFollower(directory, unread_runs(directory)).look() if run.requirement == name)
     return run
 

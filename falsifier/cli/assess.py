@@ -137,9 +137,8 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     """Load the problem of a target or a run; of a run, return what it evaluated, too.
 
     Raises:
-        click.UsageError: if options change the problem of a run, a requirement is chosen from no run, or none
-            of a run that searched several.
-        JournalError: if the target is a folder without a run.
+        click.UsageError: if options change the problem of a run, or a requirement is chosen from no run.
+        JournalError: if the target is a folder without a run, or no requirement is chosen of several.
         SpecError: if the run's problem was made in Python.
     """
     place = Path(options["target"])
@@ -165,12 +164,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         raise click.UsageError(
             f"{place}: the search space of a run cannot be changed; drop {', '.join(changed)}"
         )
-    described = read_manifest(place)
-    if requirement is None and described.shared:
-        raise click.UsageError(
-            f"{place}: this run searched {', '.join(described.names)}; choose one with --requirement NAME"
-        )
-    described = described.of(requirement or described.requirement.name)
+    described = read_manifest(place).of(requirement)
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")

@@ -158,7 +158,6 @@ def bench(
     request = CampaignRequest(
         runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget),
         limits=totals,
-        suite=suite_name,
     )
     check_request(request)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
@@ -196,7 +195,7 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
         show(progress)
     for run in () if is_campaign(directory) else progress.runs:
         say(run_line(run))
-    say(overall_line(progress, None, stopped=True))
+    say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
 

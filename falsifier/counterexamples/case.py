@@ -146,7 +146,8 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
         shrunk: whether to return what a run's counterexample was shrunk to, if it was.
 
     Raises:
-        SpecError: if there is neither, or a run searched several requirements and none is named.
+        SpecError: if there is neither.
+        JournalError: if a run searched several requirements and none is named.
     """
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
@@ -192,16 +193,10 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
 
 def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     """Return the requirement that was named, the only one, or the only one with a counterexample."""
-    if requirement is not None:
-        return described.of(requirement).requirement.name
-    if not described.shared:
-        return described.requirement.name
     found = [name for name in described.names if (place / file_of(name)).exists()]
-    if len(found) == 1:
+    if requirement is None and len(found) == 1:
         return found[0]
-    raise SpecError(
-        f"this run searched {', '.join(described.names)}; choose one with --requirement NAME", file=str(place)
-    )
+    return described.of(requirement).requirement.name
 
 
 def known_inputs(place: Path, problem: Problem) -> Fitted:

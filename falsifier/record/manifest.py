@@ -139,12 +139,15 @@ class Manifest(Surroundings):
         """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
         return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
 
-    def of(self, name: str) -> "Manifest":
-        """Return the manifest reduced to one requirement.
+    def of(self, name: str | None) -> "Manifest":
+        """Return the manifest reduced to one requirement; None: to the only one.
 
         Raises:
-            JournalError: for an unknown name; it lists the known ones.
+            JournalError: for an unknown name, or none if there are several; it lists the known ones.
         """
+        if name is None and self.shared:
+            raise JournalError(f"this run searched {', '.join(self.names)}; choose one: --requirement NAME")
+        name = name or self.names[0]
         if name not in self.names:
             raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
         which = self.names.index(name)

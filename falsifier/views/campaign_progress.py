@@ -13,8 +13,6 @@ from falsifier.views.terminal import error_console, moving, unbroken
 Show = Callable[[Progress], None]
 Write = Callable[[str], None]
 
-# Time in s over which simulations per second are averaged.
-_RATE_WINDOW = 10.0
 # Minimum time in s between two plain lines with the overall progress.
 _LINE_PERIOD = 30.0
 
@@ -40,22 +38,6 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
             yield unbroken(Scoreboard(write, lambda text: live.update(Text(one_line(text)))))
 
 
-class Rate:
-    """Simulations per second, averaged over the last few seconds."""
-
-    def __init__(self) -> None:
-        self._seen: list[tuple[float, int]] = []
-
-    def __call__(self, progress: Progress, now: float | None = None) -> float | None:
-        """Return the current rate in 1/s; None at the first call."""
-        time = monotonic() if now is None else now
-        self._seen.append((time, progress.spent.simulations))
-        while self._seen[0][0] < time - _RATE_WINDOW:
-            self._seen.pop(0)
-        (begin, before), (end, after) = self._seen[0], self._seen[-1]
-        return (after - before) / (end - begin) if end > begin else None
-
-
 class Scoreboard:
     """Tells of each run that ends, and of the overall progress.
 
@@ -68,7 +50,6 @@ class Scoreboard:
         self._write, self._update = write, update
         self._ended: dict[str, str] = {}
         self._begun = False
-        self._rate = Rate()
         self._written, self._overall = 0.0, ""
 
     def __call__(self, progress: Progress) -> None:
@@ -81,7 +62,7 @@ class Scoreboard:
             if run.name in ended and self._ended.get(run.name) != run.status:
                 self._ended[run.name] = run.status
                 self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run_line(run)}")
-        line = overall_line(progress, self._rate(progress))
+        line = overall_line(progress)
         if self._update is not None:
             self._update(line)
         elif monotonic() - self._written > _LINE_PERIOD and line != self._overall:
@@ -97,7 +78,7 @@ def run_line(run: RunProgress) -> str:
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
 
 
-def overall_line(progress: Progress, rate: float | None, *, stopped: bool = False) -> str:
+def overall_line(progress: Progress, *, stopped: bool = False) -> str:
     """Describe a campaign's progress in one line; stopped: no process works on it any more."""
     counts, spent = progress.counts, progress.spent
     parts = [
@@ -105,7 +86,7 @@ def overall_line(progress: Progress, rate: float | None, *, stopped: bool = Fals
         f"{counts['falsified']} falsified",
         *([f"{counts['failed']} failed"] if counts["failed"] else []),
         *([] if stopped else [f"{counts['running']} running"]),
-        spent.simulations_text + ("" if rate is None else f" ({rate:.0f}/s)"),
+        spent.simulations_text,
     ]
     if spent.calls:
         cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"

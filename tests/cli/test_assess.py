@@ -54,6 +54,6 @@ def test_a_run_of_several_requirements_asks_which_one_is_assessed(tmp_path: Path
     problems = [f"python:tests.problems:{name}" for name in ("impossible", "hard")]
     falsify(problems, "corners", budget=5, directory=tmp_path / "r")
     asked = falsifier("assess", "r", "--budget", "20", "--quiet", cwd=tmp_path)
-    assert asked.code == 2 and "NEVER, HARD; choose one with --requirement NAME" in asked.err
+    assert asked.code == 2 and "NEVER, HARD; choose one: --requirement NAME" in asked.err
     done = falsifier("assess", "r", "--requirement", "HARD", "--budget", "20", "--quiet", cwd=tmp_path)
     assert done.out.startswith("HARD: ") and "The search found a violation in" in done.out

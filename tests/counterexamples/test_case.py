@@ -57,7 +57,7 @@ def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) ->
     falsify(
         [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")], "corners", budget=2, directory=tmp_path
     )
-    with pytest.raises(SpecError, match="searched NEVER, FAR; choose one with --requirement NAME"):
+    with pytest.raises(JournalError, match="searched NEVER, FAR; choose one: --requirement NAME"):
         case_of(tmp_path)
 
 

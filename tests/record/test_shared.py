@@ -79,7 +79,7 @@ def test_what_was_recorded_is_what_each_would_have_judged(directory: Path, runs:
 
 def test_one_must_be_named(directory: Path, runs: dict[str, Run]) -> None:
     assert load_run(directory, "HARDER").simulations == runs["HARDER"].simulations
-    with pytest.raises(JournalError, match="choose one of NEVER, HARD, HARDER"):
+    with pytest.raises(JournalError, match="searched NEVER, HARD, HARDER; choose one"):
         load_run(directory)
     with pytest.raises(JournalError, match="NEVER, HARD, HARDER, not OTHER"):
         load_run(directory, "OTHER")

@@ -1,6 +1,6 @@
 from falsifier.campaigns import Method, Progress, RunProgress
 from falsifier.search.budget import Spent
-from falsifier.views.campaign_progress import Rate, Scoreboard, overall_line
+from falsifier.views.campaign_progress import Scoreboard, overall_line
 
 
 def run(name: str, seed: int, status: str, simulations: int = 0, best: float | None = None) -> RunProgress:
@@ -31,24 +31,16 @@ def test_plain_lines_say_each_end_once() -> None:
         board(progress)
     assert lines == [
         "3 runs, 0 already finished",
-        overall_line(BEFORE, None),
+        overall_line(BEFORE),
         "[1/3] A uniform seed 0: falsified after 7 simulations, best robustness -0.5",
         "[2/3] B uniform seed 0: failed after 1 simulation: ",
     ]
 
 
 def test_the_overall_line_counts_everything() -> None:
-    assert overall_line(AFTER, 12.4) == (
-        "1/3 runs finished, 1 falsified, 1 failed, 1 running, 10 simulations (12/s), 300 tokens, "
-        "0.7500 US dollars"
+    assert overall_line(AFTER) == (
+        "1/3 runs finished, 1 falsified, 1 failed, 1 running, 10 simulations, 300 tokens, 0.7500 US dollars"
     )
-
-
-def test_the_rate_is_over_the_last_looks() -> None:
-    rate = Rate()
-    assert rate(BEFORE, 0.0) is None
-    assert rate(AFTER, 2.0) == 7 / 2.0
-    assert rate(AFTER, 30.0) is None, "what is long past does not count"
 
 
 def test_on_a_terminal_the_overall_line_is_replaced_and_ends_stay() -> None:

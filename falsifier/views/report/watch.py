@@ -116,7 +116,7 @@ class Watch:
         if self._follower is not None:
             progress, working = self._follower.look(), is_worked_on(self.directory)
             rows = list(progress.runs)
-            parts.append(el("p", overall_line(progress, None, stopped=not working), class_="result"))
+            parts.append(el("p", overall_line(progress, stopped=not working), class_="result"))
         if chosen not in places:
             running = [run.name for run in rows if run.status == "running" and run.name in places]
             chosen = next(iter([*running, *places]), "")
