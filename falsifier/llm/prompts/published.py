@@ -3,7 +3,6 @@
 ``design/published-prompts.md`` compares line by line.
 """
 
-import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,7 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
-from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, RATIONALE, formula_text, json_form
+from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, formula_text, reply_form
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Always, Eventually, Formula, Until
@@ -68,7 +67,7 @@ def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
     if variant.has("values"):
         guidance.append(_GUIDANCE_ON_OUTPUTS.format(what=what))
     sections.append("\n".join(guidance))
-    sections.append(f"{json_form(count)}\n{_blank(view, count, named=named)}")
+    sections.append(reply_form(view, count, named=named, own=False))
     return "\n\n".join(sections)
 
 
@@ -94,24 +93,6 @@ def _numbers(view: View, *, named: bool) -> Iterator[str]:
         held = "" if r.hold is None else f", sampled and held every {r.hold:g} s"
         between = f"{r.name} between these times: {INTERPOLATION_WORDS[r.interpolation]}{held}"
         yield f"{r.name}: one value for the whole time" if r.control_points == 1 else between
-
-
-def _blank(view: View, count: int, *, named: bool) -> str:
-    """The form of a reply with blanks in place of numbers: none are shown before the first sample."""
-    space, parts = view.space, [f'"rationale": {json.dumps(RATIONALE)}']
-    if not named:
-        parts.append(f'"point": [{counted(len(space.dimensions), "number")}]')
-    if named and space.inputs:
-        signals = (
-            f'{{"name": {json.dumps(r.name)}, "values": [{counted(r.control_points, "number")}]}}'
-            for r in space.inputs
-        )
-        parts.append(f'"signals": [{", ".join(signals)}]')
-    if named and space.parameters:
-        parameters = (f'{{"name": {json.dumps(p.name)}, "value": number}}' for p in space.parameters)
-        parts.append(f'"parameters": [{", ".join(parameters)}]')
-    one = f"{{{', '.join(parts)}}}"
-    return one if count == 1 else f'{{"candidates": [{one}]}}'
 
 
 def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from falsifier.context.values import Context
-from falsifier.core.space import Freedom, InputRange, ParameterRange, nearest_value
-from falsifier.core.words import listed
+from falsifier.core.space import Freedom, InputRange, ParameterRange
+from falsifier.core.words import counted, listed
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
@@ -21,10 +21,6 @@ _MAX_TIMES = 25
 _FEW_TIMES = 5
 # Digits of the limits of what is chosen: a value that exceeds one by a rounding is clamped.
 _DIGITS_OF_BOUNDS = 7
-# Places in a range of the numbers of an example: unlike each other, so that none looks recommended.
-_PLACES = (0.13, 0.86, 0.42, 0.68, 0.27, 0.94, 0.55)
-# Share of the stop time at which the pieces of an example begin.
-_BEGINNINGS = (0.0, 0.24, 0.62)
 
 # What is left empty leaves no trace.
 _STANDING = "{task}\n\n{system}\n\n{requirement}\n\n{outputs}\n\n{choice}\n\n{context}\n\n{advice}\n\n{reply}"
@@ -73,9 +69,8 @@ _JUMPS = (
     "long for what the system does meanwhile."
 )
 
-_JSON = "Reply with one JSON object{many} in this form, with one or two sentences of rationale{own}:"
-_OWN_NUMBERS = "; the numbers below only show the form, choose your own"
-RATIONALE = "why these values"
+_JSON = "Reply with one JSON object{many} in this form, with one or two sentences of rationale:"
+_RATIONALE = "why these values"
 _LESSONS = "what the samples taught so far"
 _ALL_NOTE = "Every {} must be given in every reply, also those that stay as they were."
 _FREE_NOTE = (
@@ -114,7 +109,7 @@ def standing(
         choice="\n".join(_choice(view)),
         context="\n".join(_context(view)),
         advice="\n".join(_advice(view)),
-        reply="\n".join((json_form(count, own=_OWN_NUMBERS), *_example_and_notes(view, count))),
+        reply="\n".join(_reply(view, count)),
     )
     return "\n\n".join(section for section in text.split("\n\n") if section)
 
@@ -153,11 +148,6 @@ def _prefixed(formula: Formula) -> str:
     """Operand of a prefix operator; two of these in a row need no parentheses between them."""
     text = formula_text(formula)
     return text if isinstance(formula, Always | Eventually | Not | Next) else f"({text})"
-
-
-def json_form(count: int, *, own: str = "") -> str:
-    """Say that a reply is JSON in the form that follows."""
-    return _JSON.format(many=f" with {count} different candidates" if count > 1 else "", own=own)
 
 
 def _system(view: View) -> str:
@@ -317,45 +307,43 @@ def _advice(view: View) -> Iterator[str]:
         yield _JUMPS.format(inputs=listed(jumping))
 
 
-def _example_and_notes(view: View, count: int) -> Iterator[str]:
-    """The form of a reply with numbers that no reader takes for advice, and notes on it."""
+def _reply(view: View, count: int) -> Iterator[str]:
+    """The form of a reply, and notes on it."""
     space = view.space
-    one: dict[str, object] = {"rationale": RATIONALE}
-    free = any(r.free for r in space.inputs)
-    if space.inputs:
-        one["signals"] = [_example(view, r, k, free=free) for k, r in enumerate(space.inputs)]
-    if space.parameters:
-        one["parameters"] = [
-            {"name": p.name, "value": _spread(p, 1, k)[0]} for k, p in enumerate(space.parameters)
-        ]
-    yield json.dumps({"lessons": _LESSONS, **(one if count == 1 else {"candidates": [one]})})
+    yield reply_form(view, count, named=True, own=True)
     if len(space.names) > 1:
         yield _ALL_NOTE.format(
             " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
         )
-    if free:
+    if any(r.free for r in space.inputs):
         yield _FREE_NOTE
     yield _LESSONS_NOTE
 
 
-def _example(view: View, r: InputRange, position: int, *, free: bool) -> dict[str, object]:
-    if not free:
-        return {"name": r.name, "values": _spread(r, r.control_points, position)}
-    times: list[float] = []
-    interpolation: str = r.interpolation
-    count = r.control_points
-    if r.free is not None:
-        count = min(count, len(_PLACES))
-        fits = r.free.max_control_points >= len(_BEGINNINGS)
-        if position == 0 and fits and r.free.min_interval <= view.space.stop_time / 5:
-            times = [float(f"{share * view.space.stop_time:.3g}") for share in _BEGINNINGS]
-            interpolation, count = "constant", len(times)
-    values = _spread(r, count, position)
-    return {"name": r.name, "interpolation": interpolation, "times": times, "values": values}
+def reply_form(view: View, count: int, *, named: bool, own: bool) -> str:
+    """Say in which form a reply is, with blanks in place of numbers: none are shown before the first sample.
 
-
-def _spread(ranged: InputRange | ParameterRange, count: int, first: int) -> list[float]:
-    """Values that a reply may contain and that differ from each other."""
-    places = (_PLACES[(first + k) % len(_PLACES)] for k in range(count))
-    values = (ranged.low + place * (ranged.high - ranged.low) for place in places)
-    return [nearest_value(ranged, float(f"{value:.4g}")) for value in values]
+    Args:
+        view: the problem.
+        count: number of candidates wanted.
+        named: whether inputs and parameters are told by name; else a reply is one list of numbers.
+        own: whether the reply has lessons, and control points of its own where these are free.
+    """
+    space, parts = view.space, [f'"rationale": "{_RATIONALE}"']
+    is_free = own and any(r.free for r in space.inputs)
+    signals, parameters = [], [f'{{"name": {json.dumps(p.name)}, "value": number}}' for p in space.parameters]
+    for r in space.inputs:
+        times = "[numbers]" if r.free else "[]"
+        manner = f'"interpolation": "{r.interpolation}", "times": {times}, ' if is_free else ""
+        values = "numbers" if is_free and r.free else counted(r.control_points, "number")
+        signals.append(f'{{"name": {json.dumps(r.name)}, {manner}"values": [{values}]}}')
+    if not named:
+        parts.append(f'"point": [{counted(len(space.dimensions), "number")}]')
+    else:
+        parts += [f'"signals": [{", ".join(signals)}]'] if signals else []
+        parts += [f'"parameters": [{", ".join(parameters)}]'] if parameters else []
+    one = ", ".join(parts)
+    lessons = f'"lessons": "{_LESSONS}", ' if own else ""
+    many = f" with {count} different candidates" if count > 1 else ""
+    form = f'{lessons}"candidates": [{{{one}}}]' if count > 1 else f"{lessons}{one}"
+    return f"{_JSON.format(many=many)}\n{{{form}}}"
