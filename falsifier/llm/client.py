@@ -35,7 +35,7 @@ from falsifier.llm.messages import (
     cleaned,
 )
 from falsifier.llm.providers import find_key, known, provider_of
-from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, Gate, retried
+from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, retried
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
 
@@ -68,7 +68,6 @@ class LiteLLMChat:
         mode: how the next reply that follows a schema is asked for, if no tools are offered.
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
-        gate: shared between all runs that use the same account.
         attempts: maximum number of requests per reply if failures are temporary.
         first_delay: seconds before the second of them.
     """
@@ -81,7 +80,6 @@ class LiteLLMChat:
     price: Price | None = None
     mode: Mode = "json_schema"
     content: str = ""
-    gate: Gate = field(default_factory=Gate)
     attempts: int = DEFAULT_ATTEMPTS
     first_delay: float = FIRST_DELAY
     _mode_with_tools: Mode = field(init=False)
@@ -107,7 +105,6 @@ class LiteLLMChat:
         """
         return retried(
             lambda: self._asked(request),
-            self.gate,
             attempts=self.attempts,
             first_delay=self.first_delay,
             seconds_left=lambda: request.seconds_left,

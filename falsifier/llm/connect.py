@@ -20,7 +20,7 @@ from falsifier.llm.litellm_adapter import check_name, check_options
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode
-from falsifier.llm.retry import DEFAULT_ATTEMPTS, Gate
+from falsifier.llm.retry import DEFAULT_ATTEMPTS
 from falsifier.llm.usage import Price
 
 
@@ -49,7 +49,6 @@ def connect(
     options: Mapping[str, Any] | None = None,
     price: Price | None = None,
     timeout: float = DEFAULT_TIMEOUT,
-    gate: Gate | None = None,
     attempts: int = DEFAULT_ATTEMPTS,
     cache: Path | None = None,
 ) -> Chat:
@@ -63,7 +62,6 @@ def connect(
         options: further parameters of litellm's ``completion``.
         price: what the LLM costs; None: litellm's table.
         timeout: seconds to wait for one reply.
-        gate: shared by all runs on the same account; None: a new one.
         attempts: maximum number of requests per reply if failures are temporary.
         cache: directory of stored replies; None: no cache.
 
@@ -83,7 +81,6 @@ def connect(
         price=price,
         mode=first_mode(llm),
         content="" if own is None else own.content,
-        gate=gate or Gate(),
         attempts=attempts,
     )
     return chat if cache is None else CachedChat(chat, cache, chat.parameters)

@@ -57,7 +57,6 @@ class TransientChatError(ChatError):
 
     Attributes:
         retry_after: seconds that the server asked to wait, or None.
-        for_all: whether other requests on the same account should wait too, as after a rate limit.
         patience: maximum number of requests worth sending; None: no limit of its own.
     """
 
@@ -66,11 +65,9 @@ class TransientChatError(ChatError):
         message: str,
         *,
         retry_after: float | None = None,
-        for_all: bool = False,
         patience: int | None = None,
     ) -> None:
         self.retry_after = retry_after
-        self.for_all = for_all
         self.patience = patience
         super().__init__(message)
 
@@ -206,9 +203,7 @@ def classify(
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
-        return TransientChatError(
-            where + filled["detail"], retry_after=_retry_after(error), for_all=status == 429
-        )
+        return TransientChatError(where + filled["detail"], retry_after=_retry_after(error))
     return ChatError(where + filled["detail"])
 
 

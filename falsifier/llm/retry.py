@@ -1,11 +1,9 @@
-"""Retries of requests that failed for a temporary reason, coordinated between runs."""
+"""Retries of requests that failed for a temporary reason."""
 
 import logging
 import random
-import threading
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from time import sleep
 
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
@@ -21,58 +19,8 @@ FIRST_DELAY = 1.0
 _LONGEST_DELAY = 120.0
 
 
-class Gate:
-    """Limits concurrent requests and makes all of them wait during a pause.
-
-    Runs that share a gate share the provider's rate limit: if one is told to wait, all wait.
-    """
-
-    def __init__(self, concurrency: int = 4, *, sleep: Callable[[float], None] = time.sleep) -> None:
-        self._slots = threading.BoundedSemaphore(concurrency)
-        self._lock = threading.Lock()
-        self._open_at = 0.0
-        self._sleep = sleep
-
-    @contextmanager
-    def passage(self, limit: float | None = None) -> Iterator[None]:
-        """Wait for a slot and for the end of a pause, at most ``limit`` seconds.
-
-        Raises:
-            ChatError: if that is too short.
-        """
-        limit = None if limit is None else min(limit, threading.TIMEOUT_MAX)
-        until = None if limit is None else time.monotonic() + limit
-        if not self._slots.acquire(timeout=limit):
-            raise ChatError("no time is left: other requests to this language model are still waiting")
-        try:
-            while (wait := self.remaining()) > 0:
-                if until is not None and time.monotonic() + wait > until:
-                    raise ChatError(
-                        f"no time is left: requests to this language model pause for another {wait:.0f} s"
-                    )
-                self._sleep(wait)
-            yield
-        finally:
-            self._slots.release()
-
-    def pause(self, seconds: float) -> None:
-        """Hold back all requests for this many seconds from now."""
-        with self._lock:
-            self._open_at = max(self._open_at, time.monotonic() + seconds)
-
-    def wait(self, seconds: float) -> None:
-        """Wait without delaying other requests."""
-        self._sleep(seconds)
-
-    def remaining(self) -> float:
-        """Seconds until the end of a pause; negative after it."""
-        with self._lock:
-            return self._open_at - time.monotonic()
-
-
 def retried(
     ask: Callable[[], ChatReply],
-    gate: Gate,
     *,
     attempts: int = DEFAULT_ATTEMPTS,
     first_delay: float = FIRST_DELAY,
@@ -82,7 +30,6 @@ def retried(
 
     Args:
         ask: sends the question.
-        gate: shared between all runs that use the same account.
         attempts: maximum number of requests.
         first_delay: seconds before the second request; each further delay is twice as long, with jitter.
         seconds_left: seconds until the answer is of no use any more; None: it always is.
@@ -95,8 +42,7 @@ def retried(
     try:
         for attempt in range(1, attempts + 1):
             try:
-                with gate.passage(seconds_left()):
-                    reply = ask()
+                reply = ask()
             except TransientChatError as error:
                 lost += [error.lost] if error.lost else []
                 limit = min(attempts, error.patience or attempts)
@@ -109,7 +55,7 @@ def retried(
                 if left is not None and delay >= left:
                     raise ChatError(f"no time is left to ask again. {error}") from None
                 _LOG.warning("%s. Retrying in %.0f s (attempt %d of %d).", error, delay, attempt + 1, limit)
-                (gate.pause if error.for_all else gate.wait)(delay)
+                sleep(delay)
             else:
                 return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
     except ChatError as error:

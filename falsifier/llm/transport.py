@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# A reply of a million characters (incoming.LONGEST_REPLY), each escaped, twice over.
+# A reply of a million characters (messages.LONGEST_REPLY), each escaped, twice over.
 _MOST_BYTES = 16 << 20
 # Time for a call that was given up, and whose connections are cut, to end, in s.
 _GRACE = 0.5

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from falsifier.context.values import Context
@@ -17,7 +16,6 @@ from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
-    from falsifier.llm.retry import Gate
     from falsifier.llm.usage import Price
 
 # Engines that ask a language model.
@@ -140,7 +138,6 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         options=llm.options,
         price=price,
         timeout=llm.timeout or DEFAULT_TIMEOUT,
-        gate=_gate(llm.name, llm.api_base),
         attempts=attempts or DEFAULT_ATTEMPTS,
         cache=default_cache_directory() if llm.cache else None,
     )
@@ -170,11 +167,3 @@ def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: i
     if request.engine == "hybrid":
         return make_engine("hybrid", problem, seed=seed, adviser=led)
     return led
-
-
-@lru_cache
-def _gate(llm: str, api_base: str | None) -> "Gate":
-    """Return the gate shared by all runs of this process that use the same account."""
-    from falsifier.llm.retry import Gate
-
-    return Gate()

@@ -6,7 +6,6 @@ from falsifier.core.secrets import redact
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import ContextExceededError, TransientChatError, classify
-from falsifier.llm.retry import Gate
 from tests.llm.server import Step, serving
 from tests.llm.test_client import REQUEST
 
@@ -80,10 +79,13 @@ def free_port() -> int:
 
 
 @pytest.mark.parametrize("model", ["openai/m", "ollama_chat/m", "hosted_vllm/m", "lm_studio/m"])
-def test_where_nothing_listens_on_this_machine_little_patience_helps(model: str) -> None:
+def test_where_nothing_listens_on_this_machine_little_patience_helps(
+    model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     address = f"http://127.0.0.1:{free_port()}/v1"
     naps: list[float] = []
-    chat = LiteLLMChat(model, api_base=address, gate=Gate(sleep=naps.append))
+    monkeypatch.setattr("falsifier.llm.retry.sleep", naps.append)
+    chat = LiteLLMChat(model, api_base=address)
     with pytest.raises(ChatError, match=f"nothing is listening at {address}: start the ") as caught:
         chat.complete(REQUEST)
     assert len(naps) == 2
