@@ -68,66 +68,46 @@ class Node:
             queue.extend(reversed(node.children))
 
 
-@dataclass(slots=True)
-class _Section:
-    """A section of text that is being read; a value may go on in lines of their own."""
-
-    kind: str
-    line: int
-    values: dict[str, list[str]] = field(default_factory=dict)
-    children: list[Node] = field(default_factory=list)
-    last: str = ""
-
-    def add(self, line: str) -> bool:
-        """Add a value, or the next piece of the last one; return whether the line is either."""
-        piece = _STRING.match(line)
-        if piece is not None and self.last:
-            self.values[self.last].append(_unescaped(piece[1]))
-            return True
-        found = _VALUE.match(line)
-        if found is None:
-            return False
-        name, value = found[1], found[2].strip()
-        text = _STRING.match(value)
-        if value.startswith('"') and text is None:
-            return False
-        self.values[name] = [_unescaped(text[1]) if text else value]
-        self.last = name if text else ""
-        return True
-
-    def node(self) -> Node:
-        """Return the section as it was read."""
-        return Node(
-            self.kind, {n: "".join(pieces) for n, pieces in self.values.items()}, tuple(self.children)
-        )
-
-
 def parse_mdl(text: str, shown: str) -> Node:
     """Return the sections of a file of braces, within a section ``file``.
 
     Raises:
         SpecError: naming the file and the line that cannot be read.
     """
-    stack = [_Section("file", 0)]
+    # Of each section around: what it is, its line, its values and the sections within it.
+    opened: list[tuple[str, int, dict[str, str], list[Node]]] = [("file", 0, {}, [])]
+    name, pieces = "", list[str]()  # of the latest value, if it is text: it may go on in lines of its own
     for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
         if not line or line.startswith("#"):
             continue
+        if pieces and (piece := _STRING.match(line)):
+            pieces.append(_unescaped(piece[1]))
+            continue
+        _, _, values, children = opened[-1]
+        if pieces:
+            values[name], pieces = "".join(pieces), []
         if opening := _OPENING.match(line):
-            if len(stack) > _MAX_DEPTH:
+            if len(opened) > _MAX_DEPTH:
                 raise SpecError(f"{shown}: line {number}: sections are nested more than {_MAX_DEPTH} deep")
-            stack.append(_Section(opening[1], number))
+            opened.append((opening[1], number, {}, []))
         elif line == "}":
-            if len(stack) == 1:
+            if len(opened) == 1:
                 raise SpecError(f"{shown}: line {number}: a section is closed that was not opened")
-            closed = stack.pop()
-            stack[-1].children.append(closed.node())
-        elif not stack[-1].add(line):
-            raise SpecError(f"{shown}: line {number}: expected NAME VALUE, NAME {{ or }}, got {line[:60]!r}")
-    if len(stack) > 1:
-        raise SpecError(
-            f"{shown}: the section {stack[-1].kind} of line {stack[-1].line} is not closed; it ends too early"
-        )
-    return stack[0].node()
+            kind = opened.pop()[0]
+            opened[-1][3].append(Node(kind, values, tuple(children)))
+        else:
+            found = _VALUE.match(line)
+            string = _STRING.match(found[2]) if found else None
+            if found is None or (found[2].startswith('"') and string is None):
+                raise SpecError(
+                    f"{shown}: line {number}: expected NAME VALUE, NAME {{ or }}, got {line[:60]!r}"
+                )
+            name, pieces = found[1], [_unescaped(string[1])] if string else []
+            values[name] = pieces[0] if pieces else found[2]
+    kind, begun, values, children = opened[-1]
+    if len(opened) > 1:
+        raise SpecError(f"{shown}: the section {kind} of line {begun} is not closed; it ends too early")
+    return Node(kind, values, tuple(children))
 
 
 def is_text_package(text: str) -> bool:
