@@ -271,14 +271,15 @@ class Hybrid:
     @property
     def _is_trusted(self) -> bool:
         """Whether recent predictions were good."""
-        return self.surrogate.is_trusted and self.surrogate.misses < _MOST_MISSES
+        forecaster = self.surrogate.forecaster
+        return forecaster.is_trusted and forecaster.misses < _MOST_MISSES
 
     def _standing(self) -> list[str]:
         """Return how the search stands, in the words that the LLM is told."""
-        if self.surrogate.misses >= _MOST_MISSES:
+        if (misses := self.surrogate.forecaster.misses) >= _MOST_MISSES:
             return [
                 "A numerical optimiser shares this search and fits a model to the samples above. It "
-                f"predicted a violation {self.surrogate.misses} times in a row and was wrong each time: do "
+                f"predicted a violation {misses} times in a row and was wrong each time: do "
                 "not rely on small changes of the best sample, try another structure."
             ]
         if not self._since_best:

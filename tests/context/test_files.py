@@ -58,16 +58,6 @@ def test_what_has_control_characters_and_is_not_utf_8_is_binary() -> None:
     assert text_of(bytes(range(1, 256))) is None
 
 
-ALARM = "gain = 3\npassword: operators know it\n"
-
-
-def test_a_line_like_a_key_is_refused_with_what_to_do() -> None:
-    with pytest.raises(
-        SpecError, match=r"a\.md: line 2 looks like a key.*leave it out; if it is not.*checked:a\.md"
-    ):
-        Sentry(()).look(ALARM, "a.md", "a.md", "leave it out")
-
-
 def test_the_value_of_a_key_is_never_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PLANT_API_KEY", "quite an ordinary value")
     with pytest.raises(SpecError, match=r"a\.md: line 1 has the value of an environment variable"):

@@ -160,17 +160,6 @@ def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
     assert size + sum(len(e.text) + len(e.name) + len(e.form) for e in context.excerpts) <= MAX_TOTAL
 
 
-def test_a_class_of_one_file_extends_one_of_another(tmp_path: Path) -> None:
-    base = "partial model Base\n  input Real power;\n  Real trips;\n  parameter Real limit = 3;\nend Base;\n"
-    (tmp_path / "base.mo").write_text(base)
-    (tmp_path / "plant.mo").write_text(
-        "model Plant\n  extends Lib.Base;\nequation\n  trips = if power > limit then 1 else 0;\nend Plant;\n"
-    )
-    assert read(tmp_path / "plant.mo").of("power") == ()
-    context = read(tmp_path / "plant.mo", tmp_path / "base.mo")
-    assert "power > limit (limit = 3)" in context.of("power")
-
-
 def test_levels_of_inputs_within_their_ranges_are_crossings(tmp_path: Path) -> None:
     path = tmp_path / "a.c"
     limits = "".join(f"if (m->power > {i}) m->trips = {i};\n" for i in range(1, 90))

@@ -213,7 +213,7 @@ class Coverage:
         self.layout = planning_layout(problem.space, TimeGrid.of(problem))
         self.seed = seed
         self._explorer = Explorer(problem, self.layout)
-        self._known: set[int] = set()
+        self._known: set[int] = set()  # what was simulated or is about to be
         self._asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:
@@ -223,27 +223,19 @@ class Coverage:
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add the trajectories to what was reached."""
         for evaluation in evaluations:
-            self.avoid(evaluation.candidate)
+            self._known.add(hash(evaluation.candidate.key))
             if evaluation.trajectory is not None:
                 point = self.layout.point(evaluation.candidate)
                 self._explorer.learn(point, evaluation.trajectory, 0.0, 0.0)
-
-    def avoid(self, candidate: Candidate) -> None:
-        """Do not propose a candidate, because it is about to be simulated."""
-        self._known.add(hash(candidate.key))
-
-    def avoids(self, candidate: Candidate) -> bool:
-        """Whether a candidate was simulated or is about to be."""
-        return hash(candidate.key) in self._known
 
     def _ask_one(self) -> Candidate:
         ideas = self._ideas(np.random.default_rng([self.seed, self._asked]))
         self._asked += 1
         for idea in ideas:
             candidate = self.layout.candidate(idea.point, origin=self.name, rationale=idea.why)
-            if not self.avoids(candidate):
+            if hash(candidate.key) not in self._known:
                 break
-        self.avoid(candidate)
+        self._known.add(hash(candidate.key))
         return candidate
 
     def _ideas(self, rng: np.random.Generator) -> Iterator[Idea]:

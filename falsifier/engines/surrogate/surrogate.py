@@ -164,16 +164,6 @@ class Surrogate:
         """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
         return self.forecaster.recent_error
 
-    @property
-    def is_trusted(self) -> bool:
-        """Whether recent predictions were good."""
-        return self.forecaster.is_trusted
-
-    @property
-    def misses(self) -> int:
-        """Number of planned inputs, counted back from the last one, that did not violate as predicted."""
-        return self.forecaster.misses
-
     def _judge(self, pending: Pending, sample: Sample | None) -> None:
         if pending.forecast is not None and sample is not None:
             cost = self.history.scaled_cost()
