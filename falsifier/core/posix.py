@@ -167,7 +167,8 @@ class Program:
         """
         self.stop()
         if not self.ends_within(_ENDING_SECONDS):
-            _kill(self.pid)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self.pid, signal.SIGKILL)
         code = self._reap(0)
         self._close()
         return code or 0
@@ -209,12 +210,6 @@ def _spawn(command: Sequence[str], environment: Mapping[str, str], places: Mappi
     finally:
         for copy in copies.values():
             os.close(copy)
-
-
-def _kill(pid: int) -> None:
-    """Kill a process, if it is still there."""
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, signal.SIGKILL)
 
 
 def hide_memory() -> None:

@@ -12,7 +12,7 @@ from falsifier.fmu.process import outcome
 from falsifier.fmu.process.connection import Closed, Reply
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import Plan
-from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker, tell_if_slow
+from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker
 from falsifier.fmu.process.workplace import Workplace
 
 # Failures of simulations in new processes that are repeated to hear the FMU's messages; more say the same.
@@ -178,9 +178,7 @@ class Runner:
         outputs = worker.outputs(plan)
         log = worker.take_log(reply)
         if worker.simulations == 1:
-            seconds = time.perf_counter() - worker.started
-            self._experience.took(seconds)
-            tell_if_slow(plan, seconds)
+            self._experience.took(time.perf_counter() - worker.started)
         if reply.leaving:
             self._drop()
         return outputs, log

@@ -1,7 +1,6 @@
 """One worker, as the process that requests simulations sees it, and how long it waits for one."""
 
 import contextlib
-import logging
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -48,15 +47,11 @@ GRACE_SECONDS = 0.1
 SHARES = 10
 # How often to look how far a simulation is; from when on that is told.
 _LOOKING_SECONDS, _LONG_SECONDS = 1.0, 3.0
-# Simulations that take longer are told once.
-_SLOW_SECONDS = 10.0
 
 # Hears the name of a model, the simulated time and the stop time in s.
 Listener = Callable[[str, float, float], None]
 
-_LOG = logging.getLogger(__name__)
 _LISTENERS: list[Listener] = []
-_TOLD: set[str] = set()
 
 
 @contextmanager
@@ -105,13 +100,6 @@ class Patience:
         if now - self._started > _LONG_SECONDS and math.isfinite(reached):
             for listener in _LISTENERS:
                 listener(self._plan.model, min(max(reached, 0.0), self._plan.stop_time), self._plan.stop_time)
-
-
-def tell_if_slow(plan: Plan, seconds: float) -> None:
-    """Tell once that simulations of a model take long."""
-    if seconds > _SLOW_SECONDS and plan.model not in _TOLD:
-        _TOLD.add(plan.model)
-        _LOG.warning("%s: a simulation of %g s takes %.0f s", plan.model, plan.stop_time, seconds)
 
 
 class Worker:
