@@ -36,12 +36,8 @@ _SLOW = (
 )
 # Packages of which commands import many modules one by one.
 _LARGE = ("falsifier", "openai.resources")
-# What runs when it is imported, engines whose libraries are not installed, and modules of other systems.
-_NEVER = (
-    "falsifier.__main__",
-    "falsifier.core.windows",
-    "falsifier.engines.optimisers.botorch_gp",
-)
+# What runs when it is imported, and engines whose libraries are not installed.
+_NEVER = ("falsifier.__main__", "falsifier.engines.optimisers.botorch_gp")
 _ONE_AT_A_TIME = threading.Lock()
 
 

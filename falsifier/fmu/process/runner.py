@@ -153,8 +153,8 @@ class Runner:
     def _simulate(
         self, worker: Worker, plan: Plan, given: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+        self._check_wanted()  # it may have been stopped while the worker was being started
         try:
-            self._check_wanted()  # it may have been stopped while the worker was being started
             worker.start(given)
             reply = worker.wait()
         except TimeoutError:
@@ -165,8 +165,6 @@ class Runner:
             reason, log = worker.crash(error)
             self._worker = None
             raise outcome.crash(plan, reason, log) from None
-        except SimulationError:  # stopped before it began
-            raise
         except BaseException:
             # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
             self._drop()
