@@ -41,24 +41,22 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     experiment = problem.experiment
     steps = round(experiment.stop_time / (experiment.step_size or experiment.output_interval))
     times = np.arange(steps + 1, dtype=np.float64) * np.float64(experiment.stop_time / steps)
-    after, before = {}, {}
+    columns = {}
     for variable in problem.info.inputs:
-        values = _values(problem, candidate, variable, times)
-        if values is not None:
-            name = variable.name
-            after[name] = values
-            stepped = name in candidate.signals and _steps(variable, candidate.signals[name])
-            before[name] = np.concatenate((values[:1], values[:-1])) if stepped else values
-    rows = [
-        pair
-        for k in range(steps + 1)
-        for pair in ((k, False), (k, True))
-        if pair[1] or any(before[n][k] != after[n][k] for n in after)
-    ]
+        after = _values(problem, candidate, variable, times)
+        if after is not None:
+            signal = candidate.signals.get(variable.name)
+            stepped = signal is not None and _steps(variable, signal)
+            before = np.concatenate((after[:1], after[:-1])) if stepped else after
+            columns[variable.name] = np.stack((before, after), axis=1).ravel()
+    rows = np.stack((np.repeat(times, 2), *columns.values()))
+    kept = np.concatenate(([True], (np.diff(rows) != 0.0).any(axis=0)))
     # A step at the stop time has no effect: the last inputs are set one communication step earlier.
-    rows = rows[:-1] if len(rows) > 1 and rows[-2] == (steps, False) else rows
-    columns = {n: np.array([(after if late else before)[n][k] for k, late in rows]) for n in after}
-    return _without_repetition(InputTable(times[[k for k, _ in rows]], columns))
+    kept[-1] = False
+    rows = rows[:, kept]
+    same = (np.diff(rows[1:]) == 0.0).all(axis=0)
+    rows = rows[:, np.concatenate(([True], ~(same[:-1] & same[1:]), [True]))]
+    return InputTable(rows[0], dict(zip(columns, rows[1:], strict=True)))
 
 
 def start_values(problem: Problem, candidate: Candidate) -> dict[str, float | str]:
@@ -81,14 +79,6 @@ def _values(
 
 def _steps(variable: Variable, signal: Signal) -> bool:
     return signal.hold is not None or signal.interpolation == "constant" or variable.kind != "real"
-
-
-def _without_repetition(table: InputTable) -> InputTable:
-    """Return the table without rows that lie between two equal ones; steps stay."""
-    values = np.stack(list(table.columns.values())) if table.columns else np.zeros((1, len(table.times)))
-    inner = (values[:, 1:-1] == values[:, :-2]).all(axis=0) & (values[:, 1:-1] == values[:, 2:]).all(axis=0)
-    kept = np.concatenate(([True], ~inner, [True])) if len(table.times) > 1 else np.array([True])
-    return InputTable(table.times[kept], {name: column[kept] for name, column in table.columns.items()})
 
 
 def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.float64]]]:
