@@ -94,7 +94,7 @@ def main() -> None:
         problem = load_problem("AT1")
         found = falsify(problem, budget=60, seed=1).shown
         assert found is not None
-        around = robustness_map(problem, evaluate(problem, found.candidate), samples=200, points=21)
+        around = robustness_map(problem, evaluate(problem, found.candidate))
         plotting.save_figure(plotting.plot_robustness_map(around, "AT1"), PICTURES / "robustness-map.png")
 
         runs = cross(

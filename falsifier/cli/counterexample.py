@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
-from math import ceil, isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +26,10 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.regression import Database
+from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET
+from falsifier.counterexamples.robustness_map import robustness_map
+from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET
+from falsifier.counterexamples.shrink import shrink
 from falsifier.counterexamples.store import EXPLANATION, beside
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
@@ -41,14 +44,6 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
 
-# Shrinking usually reaches a local minimum with fewer simulations.
-_SHRINK_BUDGET = 500
-# Simulations of a map: random changes, and the points of a square grid.
-_MAP_SAMPLES, _MAP_POINTS = 256, 441
-_MAP_BUDGET = _MAP_SAMPLES + _MAP_POINTS
-# With fewer, that share of them is no grid of two points by two.
-_LEAST_MAP_BUDGET = ceil(4 * _MAP_BUDGET / _MAP_POINTS)
-
 
 @command()
 @run_argument
@@ -58,7 +53,7 @@ _LEAST_MAP_BUDGET = ceil(4 * _MAP_BUDGET / _MAP_POINTS)
 @click.option(
     "--map", "mapped", is_flag=True, help="Change all inputs at random; draw which changes still violate."
 )
-@budget_option(shown=f"{_SHRINK_BUDGET}; with --map {_MAP_BUDGET}", note=" of --shrink or --map")
+@budget_option(shown=f"{SHRINK_BUDGET}; with --map {MAP_BUDGET}", note=" of --shrink or --map")
 @click.option(
     "--at-most",
     type=float,
@@ -101,9 +96,9 @@ def explain(
         refuse("add --shrink or --map", budget=budget, out=out)
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
-        _shrink(case, rights, budget=budget or _SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
+        _shrink(case, rights, budget=budget or SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
     elif mapped:
-        _map(case, run, rights, budget=budget or _MAP_BUDGET, out=out, as_json=as_json)
+        _map(case, run, rights, budget=budget or MAP_BUDGET, out=out, as_json=as_json)
     else:
         _explain(case, run, rights, as_json=as_json)
 
@@ -178,8 +173,6 @@ def _shrink(
     as_json: bool,
 ) -> None:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
-    from falsifier.counterexamples.shrink import shrink
-
     # A link is followed, not replaced.
     file = (
         beside(case.file, "shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
@@ -273,18 +266,11 @@ def _map(
     case: Case, run: Path, rights: Mapping[str, Any], *, budget: int, out: Path | None, as_json: bool
 ) -> None:
     """Draw the robustness around it."""
-    from falsifier.counterexamples.robustness_map import robustness_map
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
-    if budget < _LEAST_MAP_BUDGET:
-        raise click.UsageError(
-            f"--budget {budget}: a map needs at least {_LEAST_MAP_BUDGET} simulations; {_MAP_BUDGET} is usual"
-        )
     picture = beside(case.file, "robustness-map.png") if out is None else checked_picture(out)
-    points = isqrt(budget * _MAP_POINTS // _MAP_BUDGET)
-    samples = budget - points * points
     with _loaded(case, rights) as problem:
-        found = robustness_map(problem, case.simulated(problem), samples=samples, points=points)
+        found = robustness_map(problem, case.simulated(problem), budget=budget)
     save_figure(plot_robustness_map(found, problem.name), picture)
     labels = (coordinate.label for coordinate in found.coordinates)
     content = {

@@ -6,10 +6,12 @@ interpolation are not. The size of a change is the largest share of a range by w
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
@@ -17,6 +19,11 @@ from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
+# Simulations of a map, and the share of them on its grid.
+BUDGET = 700
+_GRID_SHARE = 0.63
+# With fewer, there is no grid of two points by two.
+_LEAST_BUDGET = 7
 # Maximum sizes of the changes as shares of the radius; each is used for an equal part of the samples.
 _SHELLS = (0.125, 0.25, 0.5, 1.0)
 
@@ -122,8 +129,7 @@ def robustness_map(
     evaluation: Evaluation,
     *,
     radius: float = 0.05,
-    samples: int = 256,
-    points: int = 21,
+    budget: int = BUDGET,
     seed: int = 0,
 ) -> RobustnessMap:
     """Simulate around a counterexample or a near miss.
@@ -132,20 +138,19 @@ def robustness_map(
         problem: the problem with the requirement.
         evaluation: the counterexample, or the nearest miss.
         radius: largest change as a share of the range.
-        samples: simulations with all coordinates changed at once, from a scrambled Sobol sequence.
-        points: grid points along each of the two most influential coordinates.
+        budget: maximum number of simulations: with all coordinates changed at once, from a scrambled Sobol
+            sequence, and on a grid of the two most influential coordinates.
         seed: seed of the sequence.
 
     Raises:
-        SpecError: for a failed simulation, a radius outside (0, 1], or too few samples or grid points.
+        SpecError: for a failed simulation, a radius outside (0, 1], or a budget below 7.
     """
     if evaluation.robustness is None:
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
-    if not 0 < radius <= 1 or samples < 1 or points < 2:
-        raise SpecError(
-            "robustness map: expected 0 < radius <= 1, at least one sample and at least two grid points, got "
-            f"radius {radius:g}, samples {samples}, grid {points}"
-        )
+    if not 0 < radius <= 1:
+        raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:g}")
+    points = isqrt(int(_GRID_SHARE * whole("budget", budget, least=_LEAST_BUDGET)))
+    samples = budget - points * points
     from scipy.stats.qmc import Sobol
 
     candidate = evaluation.candidate

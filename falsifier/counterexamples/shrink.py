@@ -27,6 +27,8 @@ Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
 SignalPass = Callable[[Problem, InputRange, Signal], Iterator[Signal]]
 Progress = Callable[[Evaluation, int], None]
 
+# Shrinking usually reaches a local minimum with fewer simulations.
+BUDGET = 500
 # Share of a violation's margin that a simpler one keeps, unless something else is demanded.
 KEPT_SHARE = 0.5
 # Share of a near miss's robustness by which a simpler one may be farther from a violation.
@@ -56,7 +58,7 @@ def shrink(
     problem: Problem,
     evaluation: Evaluation,
     *,
-    budget: int = 500,
+    budget: int = BUDGET,
     at_most: float | None = None,
     progress: Progress = lambda evaluation, simulations: None,
 ) -> Shrunk:

@@ -23,7 +23,7 @@ def problem() -> Problem:
 
 
 def test_the_violation_persists_as_far_as_it_does() -> None:
-    found = robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.1, samples=128, points=11)
+    found = robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.1, budget=200)
     assert [c.label for c in found.coordinates] == ["u [V]", "x0"]
     assert found.axes[0] == 0
     shares = dict(found.persistence)
@@ -42,13 +42,13 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
 
 def test_what_moves_nothing_has_no_influence() -> None:
     flat = lag_problem("G[0,10] (x - x >= 1)", parameters=(X0,))
-    found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), samples=8, points=2)
+    found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), budget=8)
     assert set(found.influences) == {0.0}
     assert "None of these changes moved the robustness." in found.text
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
-    first, second = (robustness_map(problem(), at(problem(), 1.0, -1.0), samples=20) for _ in range(2))
+    first, second = (robustness_map(problem(), at(problem(), 1.0, -1.0), budget=60) for _ in range(2))
     assert first.values[:, 0].max() <= 1.0
     assert first.values[:, 1].min() >= -1.0
     np.testing.assert_array_equal(first.robustness, second.robustness)
@@ -57,11 +57,13 @@ def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
 def test_each_stretch_moves_alone() -> None:
     free = lag_problem(free=Freedom(5, 0.1))
     signal = Signal((0.0, 2.0, 4.0, 6.0), (1.0, 0.0, 0.0, 1.0), "constant")
-    found = robustness_map(free, evaluate(free, Candidate({"u": signal})), samples=16, points=3)
+    found = robustness_map(free, evaluate(free, Candidate({"u": signal})), budget=30)
     assert [(c.time, c.value) for c in found.coordinates] == [(0.0, 1.0), (2.0, 0.0), (6.0, 1.0)]
     assert found.axes[0] == 2  # what comes last decides x(10)
 
 
 def test_settings_are_checked() -> None:
-    with pytest.raises(SpecError, match="radius"):
+    with pytest.raises(SpecError, match="radius: expected a share"):
         robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.0)
+    with pytest.raises(SpecError, match="budget"):
+        robustness_map(problem(), at(problem(), 0.54, 0.0), budget=6)

@@ -48,14 +48,14 @@ def test_two_coordinates_are_a_map_whose_boundary_lies_where_the_violation_ends(
     # x(10) is u, nearly: it violates where u is above 0.5.
     lag = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=[START])
     start = evaluate(lag, Candidate({"u": Signal((0.0,), (0.54,), "constant")}, {"x0": 0.0}))
-    found = robustness_map(lag, start, samples=32, points=5)
+    found = robustness_map(lag, start, budget=45)
     figure = plot_robustness_map(found, "LAG")
     sizes, surface = figure.axes[:2]
     assert figure.get_suptitle() == "LAG: robustness around the counterexample"
     assert (surface.get_xlabel(), surface.get_ylabel()) == ("u [V]", "x0")
     drawn = {line.get_label(): ys(line) for line in sizes.get_lines()}
     assert (drawn["violated"] < 0).all() and (drawn["satisfied"] >= 0).all()
-    assert len(drawn["violated"]) + len(drawn["satisfied"]) == 32
+    assert len(drawn["violated"]) + len(drawn["satisfied"]) == len(found.robustness)
     assert drawn["counterexample"].tolist() == [start.robustness]
     (boundary,) = [c for c in surface.collections if type(c).__name__ == "QuadContourSet"]
     across = np.concatenate([path.vertices for path in boundary.get_paths()])
@@ -69,7 +69,7 @@ def test_two_coordinates_are_a_map_whose_boundary_lies_where_the_violation_ends(
 def test_a_single_coordinate_is_a_line_through_the_counterexample(tmp_path: Path) -> None:
     lag = lag_problem(points=1)
     start = evaluate(lag, lag.space.decode([1.0]))
-    figure = plot_robustness_map(robustness_map(lag, start, samples=8, points=5))
+    figure = plot_robustness_map(robustness_map(lag, start, budget=45))
     assert figure.get_suptitle() == "robustness around the counterexample"
     line, counterexample, _ = figure.axes[1].get_lines()
     assert figure.axes[1].get_xlabel() == "u [V]"
