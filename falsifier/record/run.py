@@ -23,7 +23,6 @@ from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
-from falsifier.record.manifest import Manifest
 from falsifier.record.records import EvaluatedRecord
 from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
@@ -198,29 +197,30 @@ def resume(
         instance("problems", problem, Problem, "a list of Problem")
     directory = Path(directory)
     places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
+    by_name = {problem.name: problem for problem in problems}
     results: list[Result] = []
-    described_at = {place: manifest.read(place) for place in places or [directory]}
-    searched = [name for described in described_at.values() for name in described.names]
-    for problem in problems:
-        if problem.name not in searched:
-            raise JournalError(f"{directory}: this run searched {', '.join(searched)}, not {problem.name}")
-    for place, described in described_at.items():
+    for place in places or [directory]:
+        described = manifest.read(place)
         request = described.request
         if budget is not None:
             request = request.model_copy(update={"budget": _changed(request.budget, budget, place)})
-        if not problems and not request.problems:
-            raise JournalError(
-                f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
-            )
         if engine is None and request.llm is None and described.engine not in ENGINES:
             raise JournalError(
                 f"{place}: this run's engine was made in Python: call resume() with engine=..."
             )
-        if problems:
-            loaded = _given(problems, described, place)
+        if not problems and not request.problems:
+            raise JournalError(
+                f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
+            )
+        if not problems:
+            loaded = load_sources(request.problems)
+        elif by_name.keys() >= set(described.names):
+            loaded = [by_name[name] for name in described.names]
             loaded = widened(loaded) if request.levels else loaded
         else:
-            loaded = load_sources(request.problems)
+            raise JournalError(
+                f"{place}: this run searched {', '.join(described.names)}: give all of them in problems=[...]"
+            )
         results += carry_out(
             request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
         )
@@ -324,15 +324,6 @@ def carry_out(
             listeners=all_listeners,
             prepared=perf_counter() - started,
         )
-
-
-def _given(problems: Sequence[Problem], described: Manifest, place: Path) -> list[Problem]:
-    """Return the problems that a run searched, in its order, from those that the user gave."""
-    by_name = {problem.name: problem for problem in problems}
-    missing = [name for name in described.names if name not in by_name]
-    if missing:
-        raise JournalError(f"{place}: this run also searched {', '.join(missing)}: add it to problems=[...]")
-    return [by_name[name] for name in described.names]
 
 
 def _problem(given: Falsifiable) -> Problem:

@@ -184,11 +184,11 @@ def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Pa
 def test_a_run_is_resumed_with_the_problems_that_it_searched(tmp_path: Path) -> None:
     loose = lag_problem("G[0,10] (x <= 5)", name="loose")
     falsify(loose, "uniform", budget=2, directory=tmp_path / "one")
-    with pytest.raises(JournalError, match="this run searched loose, not tight"):
+    with pytest.raises(JournalError, match="this run searched loose: give all of them"):
         resume(tmp_path / "one", problems=[lag_problem(name="tight")])
     apart = [loose, lag_problem("G[0,10] (x <= 6)", name="wide", limit=2.0)]
     falsify(apart, "uniform", budget=2, directory=tmp_path / "two")
     resumed = resume(tmp_path / "two", problems=apart, budget=3)
     assert [(r.problem.name, r.spent.simulations) for r in resumed] == [("loose", 3), ("wide", 3)]
-    with pytest.raises(JournalError, match=r"also searched|searched loose"):
+    with pytest.raises(JournalError, match="searched wide: give all of them"):
         resume(tmp_path / "two", problems=apart[:1])
