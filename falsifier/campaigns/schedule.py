@@ -8,7 +8,7 @@ from pathlib import Path
 
 from falsifier.campaigns.directory import run_directory
 from falsifier.errors import FalsifierError
-from falsifier.evaluation.workers import Workers
+from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.loading import load_sources
 from falsifier.record.journal import STOP
 from falsifier.record.manifest import check_unchanged, file_hashes
@@ -71,10 +71,10 @@ class Schedule:
         workers: pools of one process each.
     """
 
-    def __init__(self, tasks: Iterable[RunTask], workers: Sequence[Workers]) -> None:
+    def __init__(self, tasks: Iterable[RunTask], workers: Sequence[LastingExecutor]) -> None:
         self._waiting = deque(tasks)
         self._idle = list(workers)
-        self._running: dict[Future[None], tuple[RunTask, Workers]] = {}
+        self._running: dict[Future[None], tuple[RunTask, LastingExecutor]] = {}
         self._lost: set[str] = set()
 
     def run(self, report: Report, tick: Tick) -> None:

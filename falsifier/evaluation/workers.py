@@ -27,7 +27,7 @@ _FMU_LOGGER = "falsifier.fmu"
 _TRACKER_FILTER = "ignore:resource_tracker"
 
 
-class Workers(Executor):
+class LastingExecutor(Executor):
     """An executor that makes another one if the processes of the present one have died.
 
     Args:
@@ -94,7 +94,7 @@ def _processes(jobs: int) -> Iterator[Executor]:
     from multiprocessing import Pipe
 
     ending, end = Pipe(duplex=False)
-    executor = Workers(lambda: _process_pool(jobs, ending))
+    executor = LastingExecutor(lambda: _process_pool(jobs, ending))
     try:
         yield executor
     finally:
@@ -106,10 +106,10 @@ def _processes(jobs: int) -> Iterator[Executor]:
 
 
 @contextmanager
-def open_workers(jobs: int) -> Iterator[list[Workers]]:
+def open_workers(jobs: int) -> Iterator[list[LastingExecutor]]:
     """Open so many worker processes, each of which dies alone."""
     with ExitStack() as stack:
-        workers = [Workers(lambda: _process_pool(1)) for _ in range(jobs)]
+        workers = [LastingExecutor(lambda: _process_pool(1)) for _ in range(jobs)]
         for worker in workers:
             stack.callback(worker.shutdown, cancel_futures=True)
         yield workers

@@ -9,7 +9,7 @@ import pytest
 
 from falsifier.campaigns import CampaignRequest, cross
 from falsifier.campaigns.analysis import Run, load
-from falsifier.evaluation.workers import Workers
+from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import describe, write
@@ -44,8 +44,8 @@ def work_in_threads(patch: pytest.MonkeyPatch) -> None:
     """Give campaigns workers without the time that processes take to start."""
 
     @contextmanager
-    def pool(jobs: int) -> Iterator[list[Workers]]:
-        yield [Workers(lambda: ThreadPoolExecutor(1)) for _ in range(jobs)]
+    def pool(jobs: int) -> Iterator[list[LastingExecutor]]:
+        yield [LastingExecutor(lambda: ThreadPoolExecutor(1)) for _ in range(jobs)]
 
     patch.setattr("falsifier.campaigns.runner.open_workers", pool)
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from falsifier.campaigns.schedule import RunTask, Schedule
-from falsifier.evaluation.workers import Workers
+from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.source import ProblemSource
 from falsifier.search.request import RunRequest
 from tests.patience import HANG
@@ -18,7 +18,7 @@ from tests.patience import HANG
 REQUEST = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"),))
 
 
-def run(names: str, workers: list[Workers]) -> dict[str, str]:
+def run(names: str, workers: list[LastingExecutor]) -> dict[str, str]:
     """Carry out a run per letter; return why it failed, in the order in which they ended."""
     done: dict[str, str] = {}
     tasks = [RunTask(name, REQUEST, Path("unused"), {}) for name in names]
@@ -41,7 +41,7 @@ def test_each_worker_has_one_run_at_a_time(monkeypatch: pytest.MonkeyPatch) -> N
             inside -= 1
 
     monkeypatch.setattr("falsifier.campaigns.schedule.run_task", work)
-    workers = [Workers(lambda: ThreadPoolExecutor(8)) for _ in range(3)]
+    workers = [LastingExecutor(lambda: ThreadPoolExecutor(8)) for _ in range(3)]
     assert len(run("abcdefghi", workers)) == 9
     assert most == 3
 
@@ -73,7 +73,7 @@ class Mortal(Executor):
 
 def test_only_a_run_whose_process_dies_twice_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Mortal, "died", [])
-    done = run("abdoc", [Workers(Mortal) for _ in range(2)])
+    done = run("abdoc", [LastingExecutor(Mortal) for _ in range(2)])
     assert {name for name, failure in done.items() if failure} == {"d"}
     assert done["d"] == "its worker process died: killed"
     assert set(done) == set("abdoc")

@@ -14,7 +14,7 @@ import pytest
 
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.workers import Workers, local_executor, start
+from falsifier.evaluation.workers import LastingExecutor, local_executor, start
 from falsifier.testing import lag_problem
 from tests.fmu import support
 from tests.fmu.fixtures import isolated, ramp, run, runners
@@ -105,7 +105,7 @@ def test_processes_that_died_are_replaced() -> None:
         made.append(Mortal())
         return made[-1]
 
-    executor = Workers(make)
+    executor = LastingExecutor(make)
     assert [executor.submit(abs, -i).result() for i in range(3)] == [0, 1, 2]
     assert len(made) == 3
     executor.shutdown()
