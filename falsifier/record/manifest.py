@@ -23,7 +23,7 @@ from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Searched
 from falsifier.record.files import read_sealed, write_sealed
-from falsifier.search.refine_levels import levels_of, parameterization_note, parameterization_of
+from falsifier.search.refine_levels import levels_of, parameterization_of
 from falsifier.search.request import RunRequest
 
 MANIFEST = "manifest.json"
@@ -185,7 +185,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         components=problem.info.components,
         parameterization="refined" if is_refined else parameterization_of(levels[0].space),
         levels=tuple(
-            LevelRecord(first=level.first, searched=parameterization_note(level.space))
+            LevelRecord(first=level.first, searched=level.searched)
             for level in (levels if is_refined else ())
         ),
         inputs=tuple(InputRecord.model_validate(r, from_attributes=True) for r in space.inputs),

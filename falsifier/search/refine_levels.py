@@ -59,6 +59,11 @@ class RefineLevel:
     space: SearchSpace
     leaves_finer: bool = False
 
+    @property
+    def searched(self) -> str:
+        """How it searches the inputs, in words."""
+        return parameterization_note(self.space)
+
 
 def reached(levels: Sequence[RefineLevel], simulations: int) -> tuple[RefineLevel, ...]:
     """Return the levels that a run of so many simulations has begun; at least the first."""
@@ -76,46 +81,52 @@ class LevelResult:
 
     Attributes:
         name: which level it is.
+        searched: how it searched the inputs, in words.
         simulations: number of its simulations.
         smallest: smallest robustness of these; None if there is none.
         falsified: whether the requirement was falsified on this level.
     """
 
     name: str
+    searched: str
     simulations: int
     smallest: float | None
     falsified: bool
 
     @property
     def text(self) -> str:
-        """The outcome in words."""
+        """The outcome, and what was searched, in words."""
         count = counted(self.simulations, "simulation")
         if self.falsified:
-            return f"falsified after {count}"
-        if not self.simulations:
-            return "not begun"
-        return f"{count}, " + (
-            "all failed" if self.smallest is None else f"smallest robustness {self.smallest:+.6g}"
-        )
+            came = f"falsified after {count}"
+        elif not self.simulations:
+            came = "not begun"
+        elif self.smallest is None:
+            came = f"{count}, all failed"
+        else:
+            came = f"{count}, smallest robustness {self.smallest:+.6g}"
+        return f"{came}: {self.searched}"
 
 
 def level_results(
-    starts: Sequence[int], robustness: Sequence[float | None], *, falsified: bool
-) -> tuple[LevelResult, ...]:
+    levels: Sequence[tuple[int, str]], robustness: Sequence[float | None], *, falsified: bool
+) -> list[LevelResult]:
     """Return what came of each level.
 
     Args:
-        starts: number of simulations before each level.
+        levels: of each level, the number of simulations before it, and how it searched the inputs.
         robustness: of each simulation of the run, up to the counterexample; None or NaN without a verdict.
         falsified: whether the last of these is a counterexample.
     """
     found = []
-    for number, (first, end) in enumerate(zip(starts, (*starts[1:], len(robustness)), strict=True), start=1):
+    ends = [*(first for first, _ in levels[1:]), len(robustness)]
+    for number, ((first, searched), end) in enumerate(zip(levels, ends, strict=True), start=1):
         own = robustness[first:end]
         smallest = min((value for value in own if value is not None and not isnan(value)), default=None)
         is_last = bool(len(own)) and first + len(own) == len(robustness)
-        found.append(LevelResult(level_name(number, len(starts)), len(own), smallest, falsified and is_last))
-    return tuple(found)
+        name = level_name(number, len(levels))
+        found.append(LevelResult(name, searched, len(own), smallest, falsified and is_last))
+    return found
 
 
 def level_starts(

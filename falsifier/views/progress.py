@@ -247,8 +247,7 @@ class News:
                 return
             self._levels_told = number
             yield (
-                f"{level_name(number, len(levels))}, from simulation {level.first + 1} on: "
-                f"{parameterization_note(level.space)}"
+                f"{level_name(number, len(levels))}, from simulation {level.first + 1} on: {level.searched}"
             )
 
     def _failure(self, event: Evaluated) -> Iterator[str]:

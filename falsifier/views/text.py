@@ -16,7 +16,6 @@ from falsifier.record import manifest
 from falsifier.search.budget import Spent
 from falsifier.search.refine_levels import (
     LevelResult,
-    RefineLevel,
     level_results,
     parameterization_note,
     parameterization_of,
@@ -134,15 +133,7 @@ def result_json(result: Result) -> dict[str, Any]:
         "parameterization": "refined"
         if result.levels
         else parameterization_of(result.searched or result.problem.space),
-        "levels": [
-            {
-                "searched": parameterization_note(level.space),
-                "simulations": found.simulations,
-                "smallest": found.smallest,
-                "falsified": found.falsified,
-            }
-            for level, found in _level_results(result)
-        ],
+        "levels": [asdict(level) for level in _level_results(result)],
         "findings": [asdict(finding) for finding in result.findings],
         "failures": [asdict(failure) for failure in result.failures],
         "not_searched": [asdict(held) for held in result.problem.held],
@@ -156,22 +147,15 @@ def result_json(result: Result) -> dict[str, Any]:
 
 def level_facts(result: Result) -> list[Fact]:
     """Say of each level of a search that refined its inputs what was searched, and what came of it."""
-    return [
-        (found.name, f"{found.text}: {parameterization_note(level.space)}")
-        for level, found in _level_results(result)
-    ]
+    return [(level.name, level.text) for level in _level_results(result)]
 
 
-def _level_results(result: Result) -> list[tuple[RefineLevel, LevelResult]]:
-    if not result.levels:
-        return []
-    starts = [level.first for level in result.levels]
+def _level_results(result: Result) -> list[LevelResult]:
     # What was simulated at the same time as the counterexample comes after it and does not count.
     end = result.spent.simulations if result.falsified else None
     robustness = [e.robustness for e in result.evaluations[:end]]
-    return list(
-        zip(result.levels, level_results(starts, robustness, falsified=result.falsified), strict=True)
-    )
+    levels = [(level.first, level.searched) for level in result.levels]
+    return level_results(levels, robustness, falsified=result.falsified) if levels else []
 
 
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:

@@ -32,8 +32,8 @@ def test_a_finer_level_finds_what_the_coarse_one_cannot() -> None:
     result = falsify(fast_only(), "cma", budget=BUDGET, refine=True)
     assert result.falsified
     assert result.spent.simulations <= BUDGET
-    starts = [level.first for level in result.levels]
-    found = level_results(starts, [e.robustness for e in result.evaluations], falsified=True)
+    levels = [(level.first, level.searched) for level in result.levels]
+    found = level_results(levels, [e.robustness for e in result.evaluations], falsified=True)
     assert [level.falsified for level in found] == [False, True, False]
     coarse = result.evaluations[: result.levels[1].first]
     assert all(not e.violated and e.candidate.signals["u"].interpolation == "linear" for e in coarse)
@@ -137,13 +137,13 @@ def test_levels_need_engines_that_can_be_made_by_name() -> None:
 
 
 SPACE = lag_problem().space
-STARTS = (0, 4, 8)
+LEVELS = ((0, "slow"), (4, "faster"), (8, "fast"))
 
 
 def test_what_came_of_each_level_is_told() -> None:
-    found = level_results(STARTS, [3.0, 1.0, None, 2.0, nan, None], falsified=False)
+    found = level_results(LEVELS, [3.0, 1.0, None, 2.0, nan, None], falsified=False)
     assert [f"{level.name}: {level.text}" for level in found] == [
-        "level 1 of 3: 4 simulations, smallest robustness +1",
-        "level 2 of 3: 2 simulations, all failed",
-        "level 3 of 3: not begun",
+        "level 1 of 3: 4 simulations, smallest robustness +1: slow",
+        "level 2 of 3: 2 simulations, all failed: faster",
+        "level 3 of 3: not begun: fast",
     ]

@@ -168,11 +168,9 @@ def run_name(run: Run) -> str:
 
 def level_facts(run: Run) -> list[Fact]:
     """Return what came of each level of a run that refined its inputs, and what the level searched."""
-    levels = run.manifest.levels
-    if not levels:
-        return []
-    found = level_results([level.first for level in levels], list(run.robustness), falsified=run.falsified)
-    return [(each.name, f"{each.text}: {level.searched}") for level, each in zip(levels, found, strict=True)]
+    levels = [(level.first, level.searched) for level in run.manifest.levels]
+    found = level_results(levels, list(run.robustness), falsified=run.falsified) if levels else []
+    return [(level.name, level.text) for level in found]
 
 
 def advice(shown: Shown) -> str:
