@@ -39,7 +39,6 @@ class LLMEngine:
         problem: the problem to search.
         chat: the chat with the LLM.
         variant: name of the prompt variant, which determines what prompts contain; None: the default one.
-        on_exchange: called with every exchange until ``attach`` replaces it.
         sample: number that distinguishes runs with equal questions, so that cached replies are not shared.
         anonymous: whether the LLM gets neutral names instead of real ones.
 
@@ -56,7 +55,6 @@ class LLMEngine:
         chat: Chat,
         *,
         variant: str | None = None,
-        on_exchange: OnExchange = lambda _: None,
         sample: int = 0,
         anonymous: bool = False,
     ) -> None:
@@ -67,7 +65,7 @@ class LLMEngine:
             llm=chat.llm,
         )
         self._chat = chat
-        self._on_exchange = on_exchange
+        self._on_exchange: OnExchange = lambda _: None
         self._sample = sample
         self._without_answer = 0
         # Random changes in place of an answer, and why the first of them was needed.

@@ -3,7 +3,6 @@
 Resumed runs pay for nothing twice; tests, tutorials and dry runs need no key.
 """
 
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -72,7 +71,6 @@ class ScriptedChat:
 
     def __post_init__(self) -> None:
         self._lines: Iterator[Line] = iter(() if callable(self.script) else self.script)
-        self._lock = threading.Lock()
 
     def complete(self, request: ChatRequest) -> ChatReply:
         """Return the next line of the script.
@@ -80,10 +78,9 @@ class ScriptedChat:
         Raises:
             ChatError: if the script has ended.
         """
-        with self._lock:
-            self.requests.append(request)
-            asked = len(self.requests)
-            line = self.script(request) if callable(self.script) else next(self._lines, None)
+        self.requests.append(request)
+        asked = len(self.requests)
+        line = self.script(request) if callable(self.script) else next(self._lines, None)
         if line is None:
             raise ChatError(
                 f"the script of {self.llm!r} contains only {counted(asked - 1, 'line')}, but request {asked} "

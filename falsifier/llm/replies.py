@@ -52,11 +52,6 @@ class ReplyForm:
     reasoned: bool = True
     lessons: bool = False
 
-    @property
-    def is_free(self) -> bool:
-        """Whether the LLM may choose the control points of any input."""
-        return self.free and any(r.free for r in self.space.inputs)
-
     def schema(self) -> dict[str, Any]:
         """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps.
 
@@ -81,7 +76,7 @@ class ReplyForm:
         if inputs:
             signal: dict[str, Any] = {"name": {"type": "string", "enum": [r.name for r in inputs]}}
             value = {"type": "number", **_range(inputs)}
-            if self.is_free:
+            if self.free and any(r.free for r in inputs):
                 possible = dict.fromkeys(i for r in inputs for i in _interpolations(r))
                 signal["interpolation"] = {"type": "string", "enum": list(possible)}
                 signal |= {"times": _NUMBERS, "values": schema_of_list(value)}

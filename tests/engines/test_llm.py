@@ -45,7 +45,8 @@ def test_the_road_to_a_valid_reply() -> None:
     exchanges: list[Exchange] = []
     with serving(*script) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
-        engine = LLMEngine(problem, chat, variant="MP4", on_exchange=exchanges.append)
+        engine = LLMEngine(problem, chat, variant="MP4")
+        engine.attach(exchanges.append, lambda inner: inner)
         engine.tell([evaluate(problem, *engine.ask())])
         (instead,) = engine.ask()
         assert (instead.origin, instead.rationale) == (
