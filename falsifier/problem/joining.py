@@ -12,7 +12,7 @@ from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
-from falsifier.problem.ranges import DEFAULT_POINTS, search_space, string_values
+from falsifier.problem.ranges import search_space, string_values
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 from falsifier.problem.source import STL_NAME
@@ -82,9 +82,9 @@ def join(
         for layer in layers:
             inputs |= {name: overlay(inputs.get(name), s) for name, s in layer.inputs.items()}
             parameters |= {name: overlay(parameters.get(name), s) for name, s in layer.parameters.items()}
-        if changes is not None:
-            formulas = section_formulas(sections, experiment.stop_time)
-            inputs |= _with_points({name: inputs[name] for name in changes.inputs}, formulas, experiment)
+        formulas = section_formulas(sections, experiment.stop_time)
+        free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
+        inputs = {name: s.model_copy(update={"free": free}) if s.is_open else s for name, s in inputs.items()}
         space, fixed = search_space(inputs, parameters, info, experiment.stop_time)
         if searches and not space.names:
             raise _nothing_to_search(info, changes)
@@ -250,23 +250,6 @@ def _recording(
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     return replace(experiment, outputs=tuple(outputs))
-
-
-def _with_points(
-    changed: Mapping[str, InputSection], formulas: Iterable[str], experiment: Experiment
-) -> dict[str, InputSection]:
-    """Return those of the changed inputs whose control points nobody stated, free by default."""
-    free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
-    return {
-        name: section.model_copy(
-            update={
-                "control_points": DEFAULT_POINTS,
-                "free": section.free or (None if section.interpolation else free),
-            }
-        )
-        for name, section in changed.items()
-        if section.value is None and section.control_points is None
-    }
 
 
 def _nothing_to_search(info: ModelInfo, changes: ModelChanges | None) -> SpecError:

@@ -94,10 +94,6 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
             key="range",
         )
     _check(variable, low, high)
-    if section.control_points is None:
-        raise SpecError(
-            "this key is missing; specify the number of evenly spaced control points", key="control_points"
-        )
     discrete = variable.kind != "real"
     interpolation = section.interpolation or ("constant" if discrete else "pchip")
     if discrete and interpolation != "constant":
@@ -108,7 +104,7 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
         variable.name,
         low,
         high,
-        control_points=section.control_points,
+        control_points=section.control_points or DEFAULT_POINTS,
         interpolation=interpolation,
         hold=section.hold,
         free=Freedom(**section.free.model_dump()) if section.free else None,

@@ -65,7 +65,10 @@ class InputSection(Strict):
 
     range: Range | None = Field(None, description="[low, high]; default: the FMU's min and max.")
     control_points: int | None = Field(
-        None, ge=1, le=MAX_CONTROL_POINTS, description="Number of evenly spaced control points."
+        None,
+        ge=1,
+        le=MAX_CONTROL_POINTS,
+        description="Number of evenly spaced control points; default: engines choose them, 5 if fixed.",
     )
     interpolation: Interpolation | None = Field(
         None,
@@ -82,6 +85,12 @@ class InputSection(Strict):
         if self.value is not None and (self.range is not None or self.control_points is not None):
             raise ValueError("value keeps the input constant; remove it, or remove range and control_points")
         return self
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is searched, and nobody stated its parameterization."""
+        stated = (self.value, self.control_points, self.interpolation, self.free)
+        return all(each is None for each in stated)
 
 
 def _bare_value(section: object) -> object:

@@ -15,14 +15,14 @@ from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package
-from falsifier.problem.grid import choose_grid, default_freedom, fitting_interval
+from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec, load_source
 from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS, items_text
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
-from falsifier.problem.sections import FreeSection, RequirementSection
+from falsifier.problem.sections import RequirementSection
 from falsifier.problem.source import MODEL_FILES, ProblemSource
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
@@ -69,10 +69,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     doubt = "" if info.stop_time else f"the {info.noun} specifies none: check this"
     model += [_noted(f"stop_time = {_toml(stop_time)}", doubt)]
     model += ["# output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time"]
-    # The limits that fit the placeholder requirement, whose window is the whole simulation.
-    step = choose_grid(stop_time, fmu_step=info.step_size).interval
-    free = default_freedom((), stop_time=stop_time, step=step)
-    sections += ["\n".join(model), *(_input(v, free) for v in inputs)]
+    sections += ["\n".join(model), *map(_input, inputs)]
     if tunable:
         sections.append(_parameters(tunable, searched=() if inputs else tunable[:1]))
     sections.append(_requirement(info, stop_time))
@@ -99,7 +96,7 @@ def _local(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def _input(v: Variable, free: FreeSection) -> str:
+def _input(v: Variable) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
     lines = [f"[inputs.{_key(v.name)}]"]
     lines += [_comment(line) for line in (meaning, items_text(v) if v.literals else "") if line]
@@ -112,17 +109,9 @@ def _input(v: Variable, free: FreeSection) -> str:
     if low == high:
         return "\n".join([*lines, f"value = {_toml(low)}"])
     doubt = "" if v.is_bounded else "unbounded: the FMU specifies no min and max; replace with the real range"
-    limits = f"{{max_control_points = {free.max_control_points}, min_interval = {_toml(free.min_interval)}}}"
-    choice = "engines may choose the control points; delete for the fixed ones above"
-    return "\n".join(
-        [
-            *lines,
-            _noted(f"range = {_range(v, low, high)}", doubt),
-            f"control_points = {DEFAULT_POINTS}",
-            f"interpolation = {_toml('pchip' if v.kind == 'real' else 'constant')}",
-            _noted(f"free = {limits}", choice),
-        ]
-    )
+    lines.append(_noted(f"range = {_range(v, low, high)}", doubt))
+    points = f"control_points = {DEFAULT_POINTS}  # evenly spaced; without this line engines choose them"
+    return "\n".join([*lines, _comment(points)])
 
 
 def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> str:

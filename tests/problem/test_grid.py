@@ -13,6 +13,7 @@ from falsifier.problem.grid import (
 )
 from falsifier.problem.problem import Problem
 from tests.fmu.fixtures import path as fmu_path
+from tests.problem.support import echo
 
 
 @pytest.mark.parametrize(
@@ -118,6 +119,12 @@ def test_control_points_that_nobody_stated_are_free() -> None:
     assert u.free is not None
     assert (u.free.max_control_points, u.free.min_interval) == (200, 0.05)
     assert lag().space.inputs[0].free == u.free, "all bounded inputs"
+
+
+def test_an_input_of_a_spec_without_control_points_is_free_too(tmp_path: Path) -> None:
+    assert all(r.free is None for r in echo(tmp_path, "in_Boolean = {control_points = 2}").space.inputs)
+    (searched,) = echo(tmp_path, "in_Boolean = {}").space.inputs
+    assert searched.free is not None and searched.control_points == 5
 
 
 def test_control_points_that_were_stated_are_fixed() -> None:

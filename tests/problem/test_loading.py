@@ -41,7 +41,6 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         ("speed <=", "sped <=", r"requirements\.R\.formula: unknown signal 'sped'; did you mean 'speed'"),
         ("G[0,20]", "G[0,60]", r"requirements\.R\.formula: .*60 s"),
         ("G[0,20]", "G[0,20", r"requirements\.R\.formula: "),
-        ("control_points = 7", "", r"inputs\.throttle\.control_points: this key is missing"),
         ("control_points", "range = [0, 120]\ncontrol_points", r"inputs\.throttle\.range: .* exceeds"),
         ("finalDrive", "finalDrve", r"parameters\.finalDrve: .*did you mean 'finalDrive'"),
         ("[parameters]", "[parameters]\nspeed = 3", r"parameters\.speed: cannot be set: .*output"),
