@@ -139,24 +139,19 @@ class OutputCoverage:
 
 @dataclass(frozen=True, slots=True)
 class ModeCoverage:
-    """Which values an integer, Boolean or enumeration had.
+    """Which values an integer, Boolean or enumeration had: their names, or the numbers as text.
 
     Attributes:
         name: its name.
-        labels: name of each value that is known to exist; empty if that is not known.
         seen: the values that it had.
+        never: values that are known to exist and that it did not have.
         changes: the changes that happened, as pairs of values.
     """
 
     name: str
-    labels: Mapping[int, str]
-    seen: frozenset[int]
-    changes: frozenset[tuple[int, int]]
-
-    @property
-    def unseen(self) -> tuple[int, ...]:
-        """Values that are known to exist and were not seen."""
-        return tuple(sorted(set(self.labels) - self.seen))
+    seen: tuple[str, ...]
+    never: tuple[str, ...]
+    changes: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -255,10 +250,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
         ranges=tuple(found for found, _ in ranges),
         pairs=tuple(sorted(pairs, key=lambda pair: pair.tried.mean())),
         outputs=tuple(seen.outputs.values()),
-        modes=tuple(
-            ModeCoverage(name, labels, frozenset(seen.values[name]), frozenset(seen.changes[name]))
-            for name, labels in seen.labels.items()
-        ),
+        modes=tuple(map(seen.mode, seen.labels)),
     )
 
 
@@ -309,16 +301,16 @@ class _Seen:
     def give(self, candidate: Candidate) -> None:
         """Add the modes that one simulation was given."""
         for name, signal in candidate.signals.items():
-            self._mode(name, signal.values)
+            self._add(name, signal.values)
         for name, value in candidate.parameters.items():
-            self._mode(name, (value,))
+            self._add(name, (value,))
 
     def reach(self, trajectory: Trajectory) -> None:
         """Add what one simulation reached."""
         self.trajectories += 1
         for name, values in trajectory.columns.items():
             if name in self.labels:
-                self._mode(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
+                self._add(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
             elif name not in self.inputs:
                 known = self.outputs.get(name)
                 self.outputs[name] = OutputCoverage(
@@ -329,11 +321,21 @@ class _Seen:
                     values if known is None else np.maximum(known.highs, values),
                 )
 
-    def _mode(self, name: str, values: Iterable[float]) -> None:
+    def _add(self, name: str, values: Iterable[float]) -> None:
         if name in self.labels:
             numbers = [round(value) for value in values]
             self.values[name].update(numbers)
             self.changes[name].update((a, b) for a, b in pairwise(numbers) if a != b)
+
+    def mode(self, name: str) -> ModeCoverage:
+        """Return which values a mode had in all simulations."""
+        labels, values = self.labels[name], self.values[name]
+
+        def named(numbers: Iterable[int]) -> tuple[str, ...]:
+            return tuple(labels.get(number, str(number)) for number in numbers)
+
+        never = named(sorted(labels.keys() - values))
+        return ModeCoverage(name, named(sorted(values)), never, tuple(map(named, sorted(self.changes[name]))))
 
 
 def _allowed(r: InputRecord) -> list[int]:

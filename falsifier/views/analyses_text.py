@@ -87,15 +87,7 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
             for p in found.pairs
         ],
         "outputs": [{"name": o.name, "unit": o.unit, "reached": [o.low, o.high]} for o in found.outputs],
-        "modes": [
-            {
-                "name": m.name,
-                "seen": [_label(m, value) for value in sorted(m.seen)],
-                "never": [_label(m, value) for value in m.unseen],
-                "changes": [[_label(m, a), _label(m, b)] for a, b in sorted(m.changes)],
-            }
-            for m in found.modes
-        ],
+        "modes": [asdict(mode) for mode in found.modes],
         "levels": [
             {"requirement": name, "levels": [asdict(x) for x in climb.levels.found], "missing": climb.lines}
             for name, climb in found.climbs.items()
@@ -151,23 +143,17 @@ def _pair_rows(pairs: Iterable[PairCoverage]) -> Iterator[tuple[str, str]]:
 
 
 def _mode_row(mode: ModeCoverage) -> tuple[str, str]:
-    text = _cut([_label(mode, value) for value in sorted(mode.seen)]) or "nothing recorded"
+    text = _cut(mode.seen) or "nothing recorded"
     if mode.changes:
-        changes = [f"{_label(mode, a)} to {_label(mode, b)}" for a, b in sorted(mode.changes)]
-        text += f"; changes {_cut(changes)}"
+        text += f"; changes {_cut([f'{before} to {after}' for before, after in mode.changes])}"
     elif mode.seen:
         text += "; no changes"
-    never = [_label(mode, value) for value in mode.unseen]
-    return mode.name, text + (f"; never {_cut(never)}" if never else "")
+    return mode.name, text + (f"; never {_cut(mode.never)}" if mode.never else "")
 
 
 def _cut(entries: Sequence[str]) -> str:
     more = [f"{len(entries) - _SHOWN} more"] if len(entries) > _SHOWN else []
     return ", ".join([*entries[:_SHOWN], *more])
-
-
-def _label(mode: ModeCoverage, value: int) -> str:
-    return mode.labels.get(value, str(value))
 
 
 def _named(name: str, unit: str) -> str:

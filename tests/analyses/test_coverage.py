@@ -79,8 +79,7 @@ def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
     assert found.ranges[0].parts.tolist() == [1, 0, 1]
     assert found.ranges[0].gaps == ((1.0, 1.0),)
     mode = found.modes[0]
-    assert (mode.name, mode.unseen) == ("u", (1,))
-    assert (set(mode.seen), set(mode.changes)) == ({0, 2}, {(0, 2)})
+    assert (mode.name, mode.seen, mode.never, mode.changes) == ("u", ("0", "2"), ("1",), (("0", "2"),))
 
 
 def test_outputs_and_modes_are_read_from_trajectories() -> None:
@@ -94,7 +93,7 @@ def test_outputs_and_modes_are_read_from_trajectories() -> None:
     assert (x.name, x.unit, x.low, x.high) == ("x", "m", -10.0, 10.0)
     assert x.highs[3] == 3.0 and x.lows[3] == -3.0
     (gear,) = found.modes
-    assert (set(gear.seen), gear.unseen, set(gear.changes)) == ({0, 1}, (2,), {(0, 1)})
+    assert (gear.seen, gear.never, gear.changes) == (("N", "D"), ("R",), (("N", "D"),))
 
 
 def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> None:
