@@ -79,6 +79,17 @@ unsigned get_states(const struct solver *s)
     return s->n ? s->f.get_states(s->fmu->instance, s->x, s->n) : 0;
 }
 
+/* The start of a piece in s; inf after the last one. */
+static double start_of(const struct inputs *inputs, size_t j, size_t piece)
+{
+    return piece < inputs->pieces ? inputs->rows[j][piece].start : INFINITY;
+}
+
+static double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
+{
+    return piece_at(&inputs->rows[j][piece], time);
+}
+
 static void put_current(const struct inputs *inputs, double time)
 {
     for (size_t j = 0; j < inputs->ports.count; j++)

@@ -201,7 +201,7 @@ static void set_up_worker(const struct policy *policy, pid_t guard, int sock)
     if (chdir(policy->writable[0]))
         _exit(CANNOT_START);
     limit_resources(policy);
-    unsigned enforced = confine(policy, ~0u, &listener);
+    unsigned enforced = confine(policy, &listener);
     hand_over(sock, enforced, listener);
     close(sock);
     if (listener >= 0)

@@ -99,12 +99,6 @@ static void announce(const char *way)
     reply(done, MORE, -1.0, way);
 }
 
-static void connect(struct request *r)
-{
-    if (!settle(read_text(r)))
-        end_process(CUT_OFF);
-}
-
 /* Returns whether the process goes on. */
 static int simulate(struct request *r)
 {
@@ -128,7 +122,10 @@ static int answer(enum kind kind, struct request *r)
 {
     failing = "";
     switch (kind) {
-    case CONNECT: connect(r); break;
+    case CONNECT:
+        if (!settle(read_text(r)))
+            end_process(CUT_OFF);
+        break;
     case LOAD: start_session(r); break;
     case PREPARE: prepare_session(*r); break;
     case SIMULATE: return simulate(r);

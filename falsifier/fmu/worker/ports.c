@@ -92,20 +92,9 @@ double rounding(double time)
     return 1e-11 * fmax(1.0, fabs(time));
 }
 
-/* The start of a piece in s; inf after the last one. */
-double start_of(const struct inputs *inputs, size_t j, size_t piece)
-{
-    return piece < inputs->pieces ? inputs->rows[j][piece].start : INFINITY;
-}
-
 /* The value of a piece at a time within it or at its end. */
 double piece_at(const struct piece *p, double time)
 {
     double dt = time - p->start;
     return ((p->c[3] * dt + p->c[2]) * dt + p->c[1]) * dt + p->c[0];
-}
-
-double value_at(const struct inputs *inputs, size_t j, size_t piece, double time)
-{
-    return piece_at(&inputs->rows[j][piece], time);
 }

@@ -41,7 +41,7 @@ void tell(enum told what, const char *path);
 
 /* Hold this process and all that descend from it to a policy, for good; returns bits of enum enforced.
  * *listener becomes a descriptor for answer_call, or -1. */
-unsigned confine(const struct policy *policy, unsigned wanted, int *listener);
+unsigned confine(const struct policy *policy, int *listener);
 
 /* Answer one system call that waits for it. worker is the process that the guard has started. */
 void answer_call(int listener, const struct policy *policy, unsigned enforced, pid_t worker);

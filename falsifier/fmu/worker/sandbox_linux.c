@@ -365,11 +365,11 @@ static void write_filter(struct program *p, const struct policy *policy, int has
     finish(p, ALLOW);
 }
 
-static unsigned filter_calls(const struct policy *policy, unsigned wanted, int *listener)
+static unsigned filter_calls(const struct policy *policy, int *listener)
 {
     static const unsigned flags[] = {SECCOMP_FILTER_FLAG_SPEC_ALLOW, 0};
     struct program *p = calloc(1, sizeof *p);
-    for (int has_guard = (wanted & REFUSALS) != 0; p && has_guard >= 0; has_guard--)
+    for (int has_guard = 1; p && has_guard >= 0; has_guard--)
         for (int k = 0; k < 2; k++) {
             write_filter(p, policy, has_guard);
             struct sock_fprog filter = {p->count, p->steps};
@@ -385,15 +385,13 @@ static unsigned filter_calls(const struct policy *policy, unsigned wanted, int *
     return 0;
 }
 
-unsigned confine(const struct policy *policy, unsigned wanted, int *listener)
+unsigned confine(const struct policy *policy, int *listener)
 {
-    unsigned enforced = 0;
     *listener = -1;
     prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-    if (wanted & FILES)
-        enforced |= enter_landlock(policy);
+    const unsigned enforced = enter_landlock(policy);
     drop_capabilities();
-    return enforced | filter_calls(policy, wanted, listener);
+    return enforced | filter_calls(policy, listener);
 }
 
 void adopt_orphans(void)

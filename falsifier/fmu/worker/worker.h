@@ -154,9 +154,7 @@ unsigned read_values(const struct fmu *fmu, const struct ports *ports, double *n
 unsigned write_row(const struct fmu *fmu, const struct ports *ports, const double *numbers);
 void put(const struct place *place, double number);
 double rounding(double time);
-double start_of(const struct inputs *inputs, size_t j, size_t piece);
 double piece_at(const struct piece *piece, double time);
-double value_at(const struct inputs *inputs, size_t j, size_t piece, double time);
 
 /* lifecycle.c */
 struct outcome enter_initialisation(struct fmu *fmu, struct plan *plan);
