@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from hashlib import sha256
 from math import isfinite
 from time import perf_counter
 from typing import Any
@@ -34,7 +33,7 @@ from falsifier.llm.messages import (
     Usage,
     cleaned,
 )
-from falsifier.llm.providers import find_key, known, provider_of
+from falsifier.llm.providers import find_key, known
 from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, retried
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
@@ -222,10 +221,6 @@ class LiteLLMChat:
 
     def _arguments(self, request: ChatRequest, mode: Mode) -> dict[str, Any]:
         arguments = self._options()
-        if provider_of(self.llm) == "openai" and self.api_base is None:
-            # Requests that begin alike go to the machine that has kept the beginning.
-            beginning = request.messages[0].content.encode()
-            arguments["prompt_cache_key"] = sha256(beginning).hexdigest()[:16]
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
             if known(self.llm).effort == "allowed":

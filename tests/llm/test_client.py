@@ -321,16 +321,3 @@ def test_what_the_next_question_begins_with_is_marked_where_a_provider_keeps_not
         {"role": "system", "content": "standing"},
         {"role": "user", "content": "samples and news"},
     ]
-
-
-def test_openai_is_told_which_questions_begin_alike(monkeypatch: pytest.MonkeyPatch) -> None:
-    with serving(Step("a"), Step("b")) as server:
-        monkeypatch.setenv("OPENAI_API_BASE", server.url)
-        monkeypatch.setenv("OPENAI_API_KEY", "sk-some-key")
-        for text in ("first", "second"):
-            news = Message(role="user", content=text)
-            LiteLLMChat("openai/gpt-5-mini").send(
-                KEPT.model_copy(update={"messages": (KEPT.messages[0], news)})
-            )
-    first, second = (r.body["prompt_cache_key"] for r in server.received)
-    assert first == second
