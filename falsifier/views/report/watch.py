@@ -180,16 +180,17 @@ def _run_html(run: Run, watched: _Watched) -> Html:
 
     best = None if run.shown is None else watched.candidates.get(run.shown)
     shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
+    count = len(run.robustness)
     tried = [
         (Candidate.from_json(candidate), None)
         for i, candidate in sorted(watched.candidates.items())
-        if i < len(run.robustness)
+        if i < count
     ]
     history = drawn(partial(plot_history, run), "Robustness over simulations")
     covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
     facts: list[Fact] = [("time", seconds_text(run.spent))]
     facts += [("language model", llm_use(run.spent))] if run.spent.calls else []
-    of = "" if len(tried) == len(run.robustness) else f" ({len(tried)} of {len(run.robustness)} simulations)"
+    of = "" if len(tried) == count else f" ({len(tried)} of {count} simulations)"
     asked = watched.exchange
     more = [
         join(el("h3", "Robustness over simulations"), history),
