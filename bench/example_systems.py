@@ -78,7 +78,7 @@ def suspension(times: Array, inputs: dict[str, Array], parameters: dict[str, flo
     return {"travel": travel, "load": load}
 
 
-def _problem(
+def function_problem(
     function: Response,
     formula: str,
     inputs: tuple[InputRange, ...],
@@ -87,6 +87,7 @@ def _problem(
     stop: float,
     interval: float,
 ) -> Problem:
+    """Return the problem of a formula over the outputs of a Python function, sampled at the interval (s)."""
     variables = (
         *(
             Variable(r.name, causality="input", kind=r.kind, low=r.low, high=r.high, start=r.low)
@@ -106,7 +107,7 @@ def _problem(
 def commands_problem() -> Problem:
     """Four commands in the right order must not happen."""
     command = InputRange("command", 0, 7, kind="integer", control_points=12, interpolation="constant")
-    return _problem(commands, "G[0,24] (stage <= 3)", (command,), (), {"stage": "integer"}, 24.0, 0.1)
+    return function_problem(commands, "G[0,24] (stage <= 3)", (command,), (), {"stage": "integer"}, 24.0, 0.1)
 
 
 def brake_problem() -> Problem:
@@ -116,7 +117,7 @@ def brake_problem() -> Problem:
         InputRange("voltage", 5.0, 14.0, control_points=12, interpolation="linear"),
     )
     outputs: dict[str, Kind] = {"corruption": "integer", "presses": "integer"}
-    return _problem(brake, "G[0,20] (corruption <= 2)", inputs, (), outputs, 20.0, 0.05)
+    return function_problem(brake, "G[0,20] (corruption <= 2)", inputs, (), outputs, 20.0, 0.05)
 
 
 def suspension_problem(formula: str) -> Problem:
@@ -126,7 +127,9 @@ def suspension_problem(formula: str) -> Problem:
         "tyre": (1e5, 3e5), "bump": (0.01, 0.06), "frequency": (0.5, 6.0), "length": (0.2, 4.0),
     }  # fmt: skip
     parameters = tuple(ParameterRange(name, low, high) for name, (low, high) in ranges.items())
-    return _problem(suspension, formula, (), parameters, {"travel": "real", "load": "real"}, 5.0, 0.002)
+    return function_problem(
+        suspension, formula, (), parameters, {"travel": "real", "load": "real"}, 5.0, 0.002
+    )
 
 
 PROBLEMS: dict[str, Callable[[], Problem]] = {
@@ -137,27 +140,30 @@ PROBLEMS: dict[str, Callable[[], Problem]] = {
 }
 
 
-def main() -> None:
-    """Print the table, row by row."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def compare(problems: Mapping[str, Callable[[], Problem]], description: str | None) -> None:
+    """Read the options of the command line and print the table, row by row, with the means last."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--engines", nargs="+", default=list(ENGINES))
-    parser.add_argument("--requirements", nargs="+", default=list(PROBLEMS))
+    parser.add_argument("--requirements", nargs="+", default=list(problems))
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 9), metavar=("FIRST", "LAST"))
     parser.add_argument("--budget", type=int, default=300)
     options = parser.parse_args()
     print(f"| requirement | {' | '.join(options.engines)} |\n|{'---|' * (len(options.engines) + 1)}")
+    means: dict[str, list[float]] = {engine: [] for engine in options.engines}
     for name in options.requirements:
         cells = [name]
         for engine in options.engines:
-            problem, counts, found = PROBLEMS[name](), [], 0
+            problem, counts, found = problems[name](), [], 0
             for seed in range(options.seeds[0], options.seeds[1] + 1):
                 result = falsify(problem, engine, seed=seed, budget=options.budget)
                 counts.append(result.spent.simulations if result.falsified else options.budget)
                 found += result.falsified
             error = stdev(counts) / len(counts) ** 0.5
             cells.append(f"{mean(counts):.1f} ± {error:.1f} @ {found}")
+            means[engine].append(mean(counts))
         print(f"| {' | '.join(cells)} |", flush=True)
+    print(f"| {' | '.join(['mean', *(f'{mean(row):.1f}' for row in means.values())])} |")
 
 
 if __name__ == "__main__":
-    main()
+    compare(PROBLEMS, __doc__)
