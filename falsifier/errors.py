@@ -195,6 +195,8 @@ def rejected(message: str, given: object) -> str:
         r"\w+ should have at (least|most) (\d+) items? after validation, not (\d+)", message
     ):
         return f"expected at {sizes[1]} {sizes[2]} items, got {sizes[3]}"
+    if message == "Field required":
+        return "a value is missing"
     if not message.startswith("Input should"):
         return message
     message = next((own for begin, own in _VALIDATORS if message.startswith(begin)), "expected {}").format(

@@ -29,7 +29,7 @@ MAX_CONTROL_POINTS = 10_000
 class Strict(BaseModel):
     """A section that takes no other keys than its own."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True, populate_by_name=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     @model_validator(mode="before")
     @classmethod
@@ -39,7 +39,7 @@ class Strict(BaseModel):
             return section
         fields = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key in section:
-            if key not in fields and key not in cls.model_fields:
+            if key not in fields:
                 raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), fields)}")
         for key, field in fields.items():
             if field.is_required() and key not in section:

@@ -76,7 +76,9 @@ class Spec(Strict):
     context: ContextSection = Field(default_factory=ContextSection)
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
-    requirements: dict[str, AnyRequirement] = Field(min_length=1)
+    requirements: dict[str, AnyRequirement] = Field(
+        min_length=1, description="What to falsify, as [requirements.NAME]."
+    )
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
 
     def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:

@@ -32,7 +32,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
         ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
         ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
-        ("inputs.u.range", [0], r"inputs\.u\.range"),
+        ("inputs.u.range", [0], r"inputs\.u\.range\.1: a value is missing"),
         ("inputs.u.interpolation", "cubic", r"inputs\.u\.interpolation: .*'constant', got 'cubic'$"),
         ("inputs.u.control_points", 0, r"inputs\.u\.control_points: .*greater than or equal to 1, got 0$"),
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
@@ -41,12 +41,18 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected either range"),
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"formul": "x"}, r"requirements\.R\.formul: unknown key; did you mean 'formula'"),
+        ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
         ("profiles.p.inputs.u.hodl", 1, r"profiles\.p\.inputs\.u\.hodl: unknown key; did you mean 'hold'"),
     ],
 )
 def test_errors_name_file_key_and_cure(path: str, value: object, message: str) -> None:
     with pytest.raises(SpecError, match=rf"my\.toml: {message}"):
         parse_spec(changed(path, value), file="my.toml")
+
+
+def test_a_file_without_requirements_is_told_what_is_missing() -> None:
+    with pytest.raises(SpecError, match=r"my\.toml: requirements: this key is missing \(What to falsify"):
+        parse_spec({"model": GOOD["model"]}, file="my.toml")
 
 
 def test_unreadable_files_are_named(tmp_path: Path) -> None:
