@@ -66,6 +66,11 @@ class Formula:
         """Formulas directly below this one."""
         return ()
 
+    @property
+    def window(self) -> Window | None:
+        """Window of a temporal operator; None without one."""
+        return None
+
     def walk(self) -> Iterator["Formula"]:
         """Yield this formula and all below it, from left to right."""
         yield self
@@ -95,7 +100,7 @@ class Formula:
     @property
     def windows(self) -> tuple[Window, ...]:
         """Windows of the temporal operators, from left to right; without those that have none."""
-        return tuple(w for f in self.walk() if (w := getattr(f, "window", None)) is not None)
+        return tuple(f.window for f in self.walk() if f.window is not None)
 
     def horizon(self, step: float = 0.0) -> float:
         """Return the minimum length in s of a trajectory on which the formula can be evaluated at time 0.
@@ -106,7 +111,8 @@ class Formula:
         Args:
             step: sampling step in s; each ``X`` adds one.
         """
-        return max((child.horizon(step) for child in self.children), default=0.0)
+        own = step if isinstance(self, Next) else self.window.end if self.window else 0.0
+        return own + max((child.horizon(step) for child in self.children), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -153,71 +159,65 @@ class Flag(Predicate):
 @dataclass(frozen=True, slots=True, repr=False)
 class _Unary(Formula):
     operand: Formula
+    sign: ClassVar[str]
 
     @property
     def children(self) -> tuple[Formula, ...]:
         """The operand."""
         return (self.operand,)
 
+    def __str__(self) -> str:
+        return f"{self.sign}{self.window or ''} {_prefixed(self.operand)}"
+
 
 class Not(_Unary):
     """Negation."""
 
     __slots__ = ()
-
-    def __str__(self) -> str:
-        return f"not {_prefixed(self.operand)}"
+    sign: ClassVar[str] = "not"
 
 
 class Next(_Unary):
     """The operand holds at the next recorded time."""
 
     __slots__ = ()
-
-    def horizon(self, step: float = 0.0) -> float:
-        """Return one sampling step plus the operand's horizon, in s."""
-        return step + self.operand.horizon(step)
-
-    def __str__(self) -> str:
-        return f"X {_prefixed(self.operand)}"
+    sign: ClassVar[str] = "X"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class _Windowed(_Unary):
     window: Window | None = None
 
-    def horizon(self, step: float = 0.0) -> float:
-        """Return the end of the window plus the operand's horizon, in s."""
-        return _end(self.window) + self.operand.horizon(step)
-
 
 class Always(_Windowed):
     """The operand holds throughout the window; without a window, to the end of the trajectory."""
 
     __slots__ = ()
-
-    def __str__(self) -> str:
-        return f"G{self.window or ''} {_prefixed(self.operand)}"
+    sign: ClassVar[str] = "G"
 
 
 class Eventually(_Windowed):
     """The operand holds at some time in the window; without a window, before the trajectory ends."""
 
     __slots__ = ()
-
-    def __str__(self) -> str:
-        return f"F{self.window or ''} {_prefixed(self.operand)}"
+    sign: ClassVar[str] = "F"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class _Binary(Formula):
     left: Formula
     right: Formula
+    sign: ClassVar[str]
 
     @property
     def children(self) -> tuple[Formula, ...]:
         """Left and right operand."""
         return (self.left, self.right)
+
+    def __str__(self) -> str:
+        is_chain = isinstance(self, And | Or)
+        least = (self.binding, self.binding + 1) if is_chain else (PREFIX, PREFIX)
+        return f"{embraced(self.left, least[0])} {self.sign} {embraced(self.right, least[1])}"
 
 
 class And(_Binary):
@@ -225,9 +225,7 @@ class And(_Binary):
 
     __slots__ = ()
     binding: ClassVar[int] = CONJUNCTION
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, CONJUNCTION)} and {embraced(self.right, CONJUNCTION + 1)}"
+    sign: ClassVar[str] = "and"
 
 
 class Or(_Binary):
@@ -235,9 +233,7 @@ class Or(_Binary):
 
     __slots__ = ()
     binding: ClassVar[int] = DISJUNCTION
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, DISJUNCTION)} or {embraced(self.right, DISJUNCTION + 1)}"
+    sign: ClassVar[str] = "or"
 
 
 class Implies(_Binary):
@@ -245,9 +241,7 @@ class Implies(_Binary):
 
     __slots__ = ()
     binding: ClassVar[int] = IMPLICATION
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, PREFIX)} -> {embraced(self.right, PREFIX)}"
+    sign: ClassVar[str] = "->"
 
 
 class Iff(_Binary):
@@ -255,9 +249,7 @@ class Iff(_Binary):
 
     __slots__ = ()
     binding: ClassVar[int] = EQUIVALENCE
-
-    def __str__(self) -> str:
-        return f"{embraced(self.left, PREFIX)} <-> {embraced(self.right, PREFIX)}"
+    sign: ClassVar[str] = "<->"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -266,10 +258,6 @@ class Until(_Binary):
 
     window: Window | None = None
     binding: ClassVar[int] = UNTIL
-
-    def horizon(self, step: float = 0.0) -> float:
-        """Return the end of the window plus the larger horizon of the operands, in s."""
-        return _end(self.window) + max(self.left.horizon(step), self.right.horizon(step))
 
     def __str__(self) -> str:
         return f"{_prefixed(self.left)} U{self.window or ''} {_prefixed(self.right)}"
@@ -282,10 +270,6 @@ def negated(formula: Formula) -> Formula:
     if isinstance(formula, Predicate) and not isinstance(formula, Flag):
         return Predicate(OPPOSITE[formula.operator], formula.left, formula.right)
     return Not(formula)
-
-
-def _end(window: Window | None) -> float:
-    return window.end if window else 0.0
 
 
 def _prefixed(operand: Formula) -> str:
@@ -331,46 +315,36 @@ def without_constants(formula: Formula) -> Formula:
     F[0,5] (x >= 1)
     """
     match formula:
-        case Predicate() | Constant():
-            return formula
-        case Not(operand):
-            return _opposite(without_constants(operand))
-        case Next(operand) | Always(operand) | Eventually(operand):
-            inner = without_constants(operand)
-            return inner if isinstance(inner, Constant) else replace(formula, operand=inner)
-        case Until(left, right, window):
-            return _until(without_constants(left), without_constants(right), window)
-        case And(left, right) | Or(left, right) | Implies(left, right) | Iff(left, right):
-            return _joined(type(formula), without_constants(left), without_constants(right))
-    raise TypeError(f"not a formula: {formula!r}")
+        case _Unary(operand):
+            formula = replace(formula, operand=without_constants(operand))
+        case _Binary(left, right):
+            formula = replace(formula, left=without_constants(left), right=without_constants(right))
+    match formula:
+        case Not(Constant() as only):
+            return _opposite(only)
+        case Next(Constant() as only) | Always(Constant() as only) | Eventually(Constant() as only):
+            return only
+        case And(Constant(True), other) | And(other, Constant(True)) | Or(Constant(False), other):
+            return other
+        case Or(other, Constant(False)) | Implies(Constant(True), other):
+            return other
+        case Iff(Constant(True), other) | Iff(other, Constant(True)):
+            return other
+        case Iff(Constant(False), other) | Iff(other, Constant(False)) | Implies(other, Constant(False)):
+            return _opposite(other)
+        case And(Constant(), _) | And(_, Constant()) | Until(Constant(False), _) | Until(_, Constant(False)):
+            return FALSE
+        case Or(Constant(), _) | Or(_, Constant()) | Implies(Constant(), _) | Implies(_, Constant()):
+            return TRUE
+        case Until(Constant(), right, window):
+            return right if right == TRUE else Eventually(right, window)
+        case Until(left, Constant(), window):
+            # The earliest time is the best one for the right operand; the left one must hold up to then.
+            return Always(left, Window(0.0, window.start)) if window and window.start > 0 else left
+    return formula
 
 
 def _opposite(formula: Formula) -> Formula:
     if isinstance(formula, Constant):
         return FALSE if formula.value else TRUE
     return Not(formula)
-
-
-def _joined(kind: type[And | Or | Implies | Iff], left: Formula, right: Formula) -> Formula:
-    if kind is Implies and isinstance(right, Constant):
-        return right if right.value else _opposite(left)
-    if not isinstance(left, Constant):
-        left, right = right, left  # of the others, the operands can be exchanged
-    if not isinstance(left, Constant):
-        return kind(right, left)
-    if kind is Implies:
-        return right if left.value else TRUE
-    if kind is Iff:
-        return right if left.value else _opposite(right)
-    return left if left.value is (kind is Or) else right
-
-
-def _until(left: Formula, right: Formula, window: Window | None) -> Formula:
-    if FALSE in (left, right) or left == right == TRUE:
-        return FALSE if left == FALSE else right
-    if left == TRUE:
-        return Eventually(right, window)
-    if right == TRUE:
-        # The earliest time is the best one for the right operand; the left one must hold up to then.
-        return Always(left, Window(0.0, window.start)) if window and window.start > 0 else left
-    return Until(left, right, window)
