@@ -27,11 +27,13 @@ from falsifier.stl.formula import (
     And,
     Eventually,
     Formula,
+    Iff,
     Implies,
     Next,
     Not,
     Or,
     Predicate,
+    Temporal,
     Until,
     Window,
 )
@@ -42,6 +44,7 @@ _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Of numbers that are all floating-point, power is the faster one.
 _ARITHMETIC = OPERATORS | {"^": np.power}
 _NEGATION = op.scaled(-1.0)
+_CONNECTIVES: dict[type[Formula], op.Function] = {Not: _NEGATION, And: np.minimum, Or: np.maximum}
 Node = Formula | Expression
 
 
@@ -61,7 +64,16 @@ def compile_formula(formula: Formula, *, step: float, samples: int, first: int =
     compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
     compiler.demand(formula, first, last)
     compiler.place(formula)
-    return compiler.program()
+    return Program(
+        compiler.part(formula),
+        formula.signals,
+        step,
+        samples,
+        np.arange(samples, dtype=np.float64) * step,
+        tuple(compiler.steps),
+        compiler.size,
+        compiler.checked,
+    )
 
 
 def window_samples(window: Window, step: float) -> tuple[int, int]:
@@ -70,18 +82,15 @@ def window_samples(window: Window, step: float) -> tuple[int, int]:
     Raises:
         FormulaError: if a bound is not a multiple of the step.
     """
-    start, end = (_bound_samples(bound, window, step) for bound in (window.start, window.end))
+    start, end = round(window.start / step), round(window.end / step)
+    for bound, nearest in ((window.start, start), (window.end, end)):
+        if abs(bound / step - nearest) > _BOUND_TOLERANCE:
+            raise FormulaError(
+                f"the bound {number_text(bound)} s of the window {window} is not a multiple of the sampling "
+                f"step {number_text(step)} s; the nearest multiple is "
+                f"{number_text(round(nearest * step, 12))} s"
+            )
     return start, end
-
-
-def _bound_samples(bound: float, window: Window, step: float) -> int:
-    nearest = round(bound / step)
-    if abs(bound / step - nearest) > _BOUND_TOLERANCE:
-        raise FormulaError(
-            f"the bound {number_text(bound)} s of the window {window} is not a multiple of the sampling step "
-            f"{number_text(step)} s; the nearest multiple is {number_text(round(nearest * step, 12))} s"
-        )
-    return nearest
 
 
 @dataclass(slots=True)
@@ -101,29 +110,28 @@ class _Compiler:
         """Record that a part, and everything below it, is needed at the samples from first to last."""
         if last >= self.samples:
             self._fail_past_end(node, last)
-        reach = (first, last)
-        if isinstance(node, Always | Eventually | Until) and node.window is None:
-            reach = (first, self.samples - 1)
-        elif isinstance(node, Always | Eventually | Until) and node.window:
+        seen = self.needs.get(node, (first, last))
+        self.needs[node] = (min(seen[0], first), max(seen[1], last))
+        if isinstance(node, Next):
+            first, last = first + 1, last + 1
+        elif isinstance(node, Temporal) and node.window is None:
+            last = self.samples - 1
+        elif isinstance(node, Temporal) and node.window:
             # First, so that no bound after the end of the trajectory is suggested as the nearest multiple.
             beyond = last + round(node.window.end / self.step)
             if beyond >= self.samples:
                 self._fail_past_end(node, beyond)
             start, end = window_samples(node.window, self.step)
-            reach = (first if isinstance(node, Until) else first + start, last + end)
-        elif isinstance(node, Next):
-            reach = (first + 1, last + 1)
-        seen = self.needs.get(node, (first, last))
-        self.needs[node] = (min(seen[0], first), max(seen[1], last))
+            first, last = first if isinstance(node, Until) else first + start, last + end
         for part in _parts(node):
-            self.demand(part, *reach)
+            self.demand(part, first, last)
 
     def _fail_past_end(self, node: Node, last: int) -> None:
         end = (self.samples - 1) * self.step
-        window = getattr(node, "window", None)
+        window = node.window if isinstance(node, Formula) else None
         what = f"the window {window} of {node}" if window else f"{node}"
         hint = "shorten the windows or simulate longer"
-        if any(isinstance(f, Always | Eventually | Until) and f.window is None for f in self.formula.walk()):
+        if any(isinstance(f, Temporal) and f.window is None for f in self.formula.walk()):
             hint += "; an operator without a window extends to the stop time: give it one that ends earlier"
         raise FormulaError(
             f"{what} needs values up to {number_text(round(last * self.step, 9))} s, but the trajectory ends "
@@ -135,165 +143,133 @@ class _Compiler:
     def place(self, node: Node) -> Place:
         """Emit the steps of a part, only once, and return the place of its values."""
         if node not in self.places:
+            first, last = self.needs[node]
             if isinstance(node, Expression):
-                self.places[node] = self._expression(node)
+                self.places[node] = self._expression(node, first, last)
             else:
-                self.places[node] = self._formula(node)
+                self.places[node] = self._formula(node, first, last)
         return self.places[node]
 
-    def _emit(self, function: op.Function, length: int, *operands: int, width: int = 0) -> int:
-        """Append one step and return the offset of its result.
+    def _emit(
+        self, function: op.Function, first: int, last: int, *operands: Place, ahead: tuple[int, int] = (0, 0)
+    ) -> Place:
+        """Append one step and return the place of its result.
 
         Args:
             function: what it calculates.
-            length: length of its result and of its operands.
-            operands: their offsets.
-            width: by how much the first one is longer.
+            first: first sample of its result and of its operands.
+            last: last sample of them.
+            operands: their places.
+            ahead: by how many samples the first and the last one of the operands are later.
         """
-        reads = [slice(offset, offset + length) for offset in operands]
-        if width:
-            reads[0] = slice(operands[0], operands[0] + length + width)
-        out = slice(self.size, self.size + length)
-        self.steps.append(op.calculating(function, out, *reads))
-        self.size += length
-        return out.start
+        start, end = first + ahead[0], last + ahead[1] + 1
+        reads = [slice(place.at(start), place.at(end)) for place in operands]
+        result = Place(self.size - first, first, last)
+        self.size = result.at(last + 1)
+        self.steps.append(op.calculating(function, slice(result.at(first), self.size), *reads))
+        return result
 
-    def _expression(self, node: Expression) -> Place:
-        first, last = self.needs[node]
-        n = last - first + 1
+    def _expression(self, node: Expression, first: int, last: int) -> Place:
         if isinstance(node, Name):
             return Place(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
         if not node.signals:
-            return Place(self._emit(op.constant(_constant(node)), n) - first, first, last)
+            return self._emit(op.constant(_constant(node)), first, last)
         match node:
             case Arithmetic():
-                offset = self._arithmetic(node, first, n)
+                return self._arithmetic(node, first, last)
             case Negative(operand):
-                offset = self._emit(_NEGATION, n, self.place(operand).at(first))
-            case Call(name):
-                function, sides = FUNCTIONS_OF[name], [self.place(o).at(first) for o in node.operands]
-                offset = self._emit(function, n, *sides[:2])
+                return self._emit(_NEGATION, first, last, self.place(operand))
+            case Call(name, operands):
+                function, sides = FUNCTIONS_OF[name], [self.place(operand) for operand in operands]
+                result = self._emit(function, first, last, *sides[:2])
                 for other in sides[2:]:
-                    offset = self._emit(function, n, offset, other)
-            case _:
-                raise TypeError(f"not an expression: {node!r}")
-        return Place(offset - first, first, last)
+                    result = self._emit(function, first, last, result, other)
+                return result
+        raise TypeError(f"not an expression: {node!r}")
 
-    def _arithmetic(self, node: Arithmetic, first: int, n: int) -> int:
+    def _arithmetic(self, node: Arithmetic, first: int, last: int) -> Place:
         left, right, operator = node.left, node.right, node.operator
         if operator == "^" and not right.signals and _constant(right) == 2:
             # One multiplication is much faster than pow, and squares are frequent.
-            base = self.place(left).at(first)
-            return self._emit(np.multiply, n, base, base)
-        if not right.signals and operator in "+-*":
-            c = _constant(right)
-            scale = op.scaled(c) if operator == "*" else op.scaled(1.0, c if operator == "+" else -c)
-            return self._emit(scale, n, self.place(left).at(first))
-        if not left.signals and operator in "+-*":
-            c = _constant(left)
-            scale = op.scaled(c) if operator == "*" else op.scaled(1.0 if operator == "+" else -1.0, c)
-            return self._emit(scale, n, self.place(right).at(first))
-        return self._emit(_ARITHMETIC[operator], n, self.place(left).at(first), self.place(right).at(first))
+            base = self.place(left)
+            return self._emit(np.multiply, first, last, base, base)
+        if operator in "+-*" and not (left.signals and right.signals):
+            c = _constant(left if right.signals else right)
+            factor, offset = {"+": (1.0, c), "-": (-1.0, c), "*": (c, 0.0)}[operator]
+            if operator == "-" and left.signals:
+                factor, offset = 1.0, -c
+            return self._emit(
+                op.scaled(factor, offset), first, last, self.place(left if left.signals else right)
+            )
+        return self._emit(_ARITHMETIC[operator], first, last, self.place(left), self.place(right))
 
-    def _predicate(self, node: Predicate, first: int, n: int) -> int:
+    def _predicate(self, node: Predicate, first: int, last: int) -> Place:
         left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
-        difference = Arithmetic("-", left, right)
-        if difference.signals:
-            offset = self._arithmetic(difference, first, n)
-        else:
-            offset = self._emit(op.constant(_constant(difference)), n)
+        margin = self._expression(Arithmetic("-", left, right), first, last)
         if node.operator in ("==", "!="):
-            offset = self._emit(np.absolute, n, offset)
+            margin = self._emit(np.absolute, first, last, margin)
         if node.operator == "==":
-            offset = self._emit(_NEGATION, n, offset)
-        self.checked[len(self.steps)] = node, Place(offset - first, first, first + n - 1)
-        self.steps.append(op.checking(slice(offset, offset + n), on_limit(node.operator)))
-        return offset
+            margin = self._emit(_NEGATION, first, last, margin)
+        self.checked[len(self.steps)] = node, margin
+        self.steps.append(op.checking(slice(margin.at(first), margin.at(last + 1)), on_limit(node.operator)))
+        return margin
 
-    def _formula(self, node: Formula) -> Place:
-        first, last = self.needs[node]
-        n = last - first + 1
+    def _formula(self, node: Formula, first: int, last: int) -> Place:
         if isinstance(node, Predicate):
-            return Place(self._predicate(node, first, n) - first, first, last)
-        if isinstance(node, Next):
-            below = self.place(node.operand)
-            return Place(below.base + 1, first, last)
-        if isinstance(node, Always | Eventually):
-            return self._window(node, first, last)
-        if isinstance(node, Until):
-            return self._until(node, first, last)
-        sides = [self.place(child).at(first) for child in node.children]
-        if isinstance(node, Not):
-            offset = self._emit(_NEGATION, n, *sides)
-        elif isinstance(node, And):
-            offset = self._emit(np.minimum, n, *sides)
-        elif isinstance(node, Or):
-            offset = self._emit(np.maximum, n, *sides)
-        elif isinstance(node, Implies):
-            offset = self._implication(sides[0], sides[1], n)
-        else:
-            both = self._implication(sides[0], sides[1], n), self._implication(sides[1], sides[0], n)
-            offset = self._emit(np.minimum, n, *both)
-        return Place(offset - first, first, last)
+            return self._predicate(node, first, last)
+        parts = [self.place(child) for child in node.children]
+        match node:
+            case Next():
+                return parts[0].later(1)
+            case Always() | Eventually():
+                return self._window(node, parts[0], first, last)
+            case Until():
+                return self._until(node, parts[0], parts[1], first, last)
+            case Implies():
+                return self._implication(parts[0], parts[1], first, last)
+            case Iff():
+                forth = self._implication(parts[0], parts[1], first, last)
+                back = self._implication(parts[1], parts[0], first, last)
+                return self._emit(np.minimum, first, last, forth, back)
+        return self._emit(_CONNECTIVES[type(node)], first, last, *parts)
 
-    def _implication(self, left: int, right: int, n: int) -> int:
-        return self._emit(np.maximum, n, self._emit(_NEGATION, n, left), right)
+    def _implication(self, left: Place, right: Place, first: int, last: int) -> Place:
+        return self._emit(np.maximum, first, last, self._emit(_NEGATION, first, last, left), right)
 
-    def _window(self, node: Always | Eventually, first: int, last: int) -> Place:
-        below, extreme = self.place(node.operand), np.minimum if isinstance(node, Always) else np.maximum
+    def _window(self, node: Always | Eventually, below: Place, first: int, last: int) -> Place:
+        extreme, end = np.minimum if isinstance(node, Always) else np.maximum, self.samples - 1
         if node.window is None and first < last:
-            last = self.samples - 1
-            offset = self._emit(op.rest(extreme), last - first + 1, below.at(first))
-            return Place(offset - first, first, last)
-        start, end = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - first)
-        offset = self._emit(op.window(extreme), last - first + 1, below.at(first + start), width=end - start)
-        return Place(offset - first, first, last)
+            return self._emit(op.rest(extreme), first, end, below)
+        ahead = window_samples(node.window, self.step) if node.window else (0, end - first)
+        return self._emit(op.window(extreme), first, last, below, ahead=ahead)
 
-    def _until(self, node: Until, first: int, last: int) -> Place:
+    def _until(self, node: Until, left: Place, right: Place, first: int, last: int) -> Place:
         """Emit ``l U[a,b] r`` as ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, in samples.
 
         The three parts together are equivalent to the bounded until, and each takes linear time. The
         unbounded until in the last part ensures that l holds from a until r does; the middle part bounds
         when.
         """
-        left, right = (self.place(child) for child in node.children)
+        ahead = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - last)
+        begin, end = first + ahead[0], last + ahead[1]
+        both = self._emit(np.minimum, begin, end, left, right)
+        until = self._emit(op.until, begin, end, left, both)
         if node.window is None:
-            n = self.samples - first
-            both = self._emit(np.minimum, n, left.at(first), right.at(first))
-            offset = self._emit(op.until, n, left.at(first), both)
-            return Place(offset - first, first, self.samples - 1)
-        n = last - first + 1
-        start, end = window_samples(node.window, self.step)
-        begin, width = first + start, end - start
-        both = self._emit(np.minimum, n + width, left.at(begin), right.at(begin))
-        until = self._emit(op.until, n + width, left.at(begin), both)
-        soon = self._emit(op.window(np.maximum), n, both, width=width)
-        offset = self._emit(np.minimum, n, until, soon)
-        if start > 0:
-            before = self._emit(op.window(np.minimum), n, left.at(first), width=start - 1)
-            offset = self._emit(np.minimum, n, before, offset)
-        return Place(offset - first, first, last)
+            return until
+        soon = self._emit(op.window(np.maximum), first, last, both, ahead=ahead)
+        result = self._emit(np.minimum, first, last, until.later(ahead[0]), soon)
+        if begin > first:
+            before = self._emit(op.window(np.minimum), first, last, left, ahead=(0, ahead[0] - 1))
+            result = self._emit(np.minimum, first, last, before, result)
+        return result
 
     def part(self, node: Formula) -> Part:
         """Return a sub-formula with its place and all parts below it."""
         window: tuple[int, int | None] | None = None
-        if isinstance(node, Always | Eventually | Until):
+        if isinstance(node, Temporal):
             window = window_samples(node.window, self.step) if node.window else (0, None)
         children = tuple(self.part(child) for child in node.children)
         return Part(node, str(node), self.places[node], window, self.samples, children)
-
-    def program(self) -> Program:
-        """Return the compiled program; ``place`` must have been called before."""
-        return Program(
-            self.part(self.formula),
-            self.formula.signals,
-            self.step,
-            self.samples,
-            np.arange(self.samples, dtype=np.float64) * self.step,
-            tuple(self.steps),
-            self.size,
-            self.checked,
-        )
 
 
 def _constant(node: Expression) -> float:

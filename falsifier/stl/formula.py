@@ -263,6 +263,10 @@ class Until(_Binary):
         return f"{_prefixed(self.left)} U{self.window or ''} {_prefixed(self.right)}"
 
 
+# Operators that look at all times of a window.
+Temporal = Always | Eventually | Until
+
+
 def negated(formula: Formula) -> Formula:
     """Return what holds if a formula does not: the opposite comparison where there is one."""
     if isinstance(formula, Not):

@@ -19,15 +19,6 @@ Operation = Callable[[Floats], bool]
 Function = Callable[..., object]
 
 
-def run(steps: tuple[Operation, ...], buffer: Floats) -> int:
-    """Run all steps; return the number of the one whose check fails, after which no other is run, or -1."""
-    with np.errstate(all="ignore"):  # what is not finite is found by the checks
-        for number, step in enumerate(steps):
-            if step(buffer):
-                return number
-    return -1
-
-
 def calculating(function: Function, out: slice, *operands: slice) -> Operation:
     """Return the step that fills a part of the buffer from others."""
     a, b = (*operands, None, None)[:2]  # apart by their number: a loop over them would take time in each step
@@ -139,6 +130,10 @@ class Place:
         """Return the offset in the buffer of the value at this sample."""
         return self.base + sample
 
+    def later(self, samples: int) -> "Place":
+        """Return the place in which each sample has the value of one that many samples later."""
+        return Place(self.base + samples, self.first - samples, self.last - samples)
+
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -161,11 +156,11 @@ class Part:
     samples: int
     children: tuple["Part", ...]
 
-    def at(self, buffer: NDArray[np.float64], sample: int) -> float:
+    def at(self, buffer: Floats, sample: int) -> float:
         """Return the robustness at a sample."""
         return buffer.item(self.place.base + sample)
 
-    def over(self, buffer: NDArray[np.float64], first: int, last: int) -> NDArray[np.float64]:
+    def over(self, buffer: Floats, first: int, last: int) -> Floats:
         """Return the robustness at the samples from first to last inclusive."""
         return buffer[self.place.base + first : self.place.base + last + 1]
 
@@ -279,18 +274,19 @@ def _run(program: Program, buffer: Floats, signals: int) -> str:
         bad = int(np.flatnonzero(~np.isfinite(buffer[:signals]))[0]) if buffer.ndim == 1 else 0
         signal, sample = divmod(bad, program.samples)
         return f"signal {program.signals[signal]!r} is {buffer[bad]} at {sample * program.step:g} s"
-    failed = run(program.steps, buffer)
-    return "" if failed < 0 else _problem(program, buffer, failed)
+    with np.errstate(all="ignore"):  # what is not finite is found by the checks
+        for number, step in enumerate(program.steps):
+            if step(buffer):
+                return _problem(program, buffer, *program.checked[number])
+    return ""
 
 
-def _problem(program: Program, buffer: Floats, failed: int) -> str:
-    n = program.samples
-    predicate, place = program.checked[failed]
+def _problem(program: Program, buffer: Floats, predicate: Predicate, place: Place) -> str:
     if buffer.ndim > 1:
         return f"{predicate} has no finite value"
-    margins = buffer[place.at(place.first) : place.at(place.last) + 1]
+    margins = buffer[place.at(place.first) : place.at(place.last + 1)]
     sample = place.first + int(np.flatnonzero(~np.isfinite(margins))[0])
-    here = {name: buffer[i * n + sample] for i, name in enumerate(program.signals)}
+    here = {name: buffer[i * program.samples + sample] for i, name in enumerate(program.signals)}
     sides = [side for side in (predicate.left, predicate.right) if side.signals]
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)
     return (
