@@ -4,7 +4,7 @@ Parts of the requirement that never had a say, and inputs and parameters without
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 
 import numpy as np
@@ -17,7 +17,7 @@ from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
-from falsifier.stl.formula import Always, Eventually, Formula, Implies, Next, Or, Predicate, Until
+from falsifier.stl.formula import Formula, Implies, Next, Or, Predicate, Temporal
 from falsifier.stl.margins import is_on_limit, shown, signed
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
@@ -33,9 +33,9 @@ class _Extreme:
     """The smallest or largest margin of a part, when it had it, and the signals' values then."""
 
     margin: float
-    simulation: int
-    time: float
-    values: Mapping[str, float]
+    simulation: int = 0
+    time: float = 0.0
+    values: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -51,22 +51,23 @@ class _Seen:
 
     formula: Formula
     part: Formula
-    lowest: _Extreme | None = None
-    highest: _Extreme | None = None
-
-    @property
-    def low(self) -> float:
-        return inf if self.lowest is None else self.lowest.margin
-
-    @property
-    def high(self) -> float:
-        return -inf if self.highest is None else self.highest.margin
+    lowest: _Extreme = _Extreme(inf)
+    highest: _Extreme = _Extreme(-inf)
 
     @property
     def is_far(self) -> bool:
         """Whether it kept one truth, by much more than it moved."""
-        margin = max(self.low, -self.high)
-        return not is_on_limit(margin) and margin > _FAR * (self.high - self.low)
+        return not is_on_limit(self.distance) and self.distance > _FAR * self.range
+
+    @property
+    def distance(self) -> float:
+        """Smallest distance to its threshold, if it kept one truth."""
+        return max(self.lowest.margin, -self.highest.margin)
+
+    @property
+    def range(self) -> float:
+        """By how much it moved."""
+        return self.highest.margin - self.lowest.margin
 
 
 class Vacuity:
@@ -82,8 +83,8 @@ class Vacuity:
         seen: dict[tuple[Formula, Formula], _Seen] = {}
         # One for each place that is watched; places of the same part of the same formula share it.
         self._places = [
-            seen.setdefault((w.formula, w.part.formula), _Seen(w.formula, w.part.formula))
-            for w in self._monitor.watched
+            seen.setdefault((formula, part.formula), _Seen(formula, part.formula))
+            for formula, part in self._monitor.watched
         ]
         self._parts = list(seen.values())
         self._effects = Effects(problem)
@@ -105,21 +106,21 @@ class Vacuity:
             first = self._first.setdefault(name, trajectory[name])
             if not np.array_equal(first, trajectory[name]):
                 self._moved.add(name)
-        found = self._monitor.extremes(trajectory)
-        extremes = (x.tolist() for x in (found.lows, found.lowest, found.highs, found.highest))
-        for part, low, at_low, high, at_high in zip(self._places, *extremes, strict=True):
-            if low < part.low:
-                part.lowest = _Extreme(low, simulation, at_low, trajectory.at(at_low))
-            if high > part.high:
-                part.highest = _Extreme(high, simulation, at_high, trajectory.at(at_high))
+        for seen, found in zip(self._places, self._monitor.extremes(trajectory), strict=True):
+            if found.low < seen.lowest.margin:
+                seen.lowest = _Extreme(found.low, simulation, found.lowest, trajectory.at(found.lowest))
+            if found.high > seen.highest.margin:
+                seen.highest = _Extreme(found.high, simulation, found.highest, trajectory.at(found.highest))
 
     def findings(self) -> tuple[Finding, ...]:
         """Return what was not tested by any simulation so far; the most important first."""
         if not self._count:
             return ()
         constant = tuple(self._constant())
-        never = [part for part in self._parts if isinstance(part.formula, Implies) and part.high < 0]
-        always = [part for part in self._parts if isinstance(part.formula, Or) and part.low > 0]
+        never = [
+            part for part in self._parts if isinstance(part.formula, Implies) and part.highest.margin < 0
+        ]
+        always = [part for part in self._parts if isinstance(part.formula, Or) and part.lowest.margin > 0]
         said = {predicate for part in never for predicate in part.part.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
         predicates = [part for part in self._parts if isinstance(part.formula, Predicate) and not constant]
@@ -128,7 +129,10 @@ class Vacuity:
         unique = {(finding.kind, finding.part): finding for finding in found}
         # If nothing moves the requirement's signals, that has been said of everything that was searched.
         idle = self._effects.findings() if self._moved else ()
-        return (*constant, *_hidden(self._problem), *unique.values(), *idle)
+        if hidden := hidden_margin(self._problem):
+            what, advice = hidden
+            constant += (Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}."),)
+        return (*constant, *unique.values(), *idle)
 
     @property
     def _in_all(self) -> str:
@@ -173,12 +177,13 @@ class Vacuity:
     def _far(self, seen: _Seen) -> Finding:
         what = (
             f"{seen.formula} was never near its threshold {self._in_all}: it moved by "
-            f"{seen.high - seen.low:.6g} and stayed {max(seen.low, -seen.high):.6g} away"
+            f"{seen.range:.6g} and stayed {seen.distance:.6g} away"
         )
-        return _untested("threshold", seen, seen.lowest if seen.low > 0 else seen.highest, what, "it was off")
+        closest = seen.lowest if seen.lowest.margin > 0 else seen.highest
+        return _untested("threshold", seen, closest, what, "it was off")
 
 
-def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme | None, what: str, off: str) -> Finding:
+def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme, what: str, off: str) -> Finding:
     """Return the finding about a part: what was not tested, and how close the part came to changing.
 
     Args:
@@ -188,7 +193,6 @@ def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme | None, what: st
         what: what was not tested, in words.
         off: how its margin is said if its values are not telling.
     """
-    assert closest is not None, "a part is judged after it has been seen"
     margin = abs(closest.margin)
     near = _reached(seen.part, closest.values) or f"{off} by {shown(margin):.6g}"
     return Finding(
@@ -203,7 +207,7 @@ def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme | None, what: st
 
 def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     """Return what the sides of a part's predicates were; empty if the part looks at other times too."""
-    if any(isinstance(part, Always | Eventually | Until | Next) for part in formula.walk()):
+    if any(isinstance(part, Temporal | Next) for part in formula.walk()):
         return ""
     sides = dict.fromkeys(
         side for p in formula.predicates for side in (p.left, p.right) if not isinstance(side, Number)
@@ -211,12 +215,6 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     if not all(name in values for side in sides for name in side.signals):
         return ""
     return listed([f"{side} reached {float(side.evaluate(values)):.6g}" for side in sides]) if sides else ""
-
-
-def _hidden(problem: Problem) -> Iterator[Finding]:
-    if hidden := hidden_margin(problem):
-        what, advice = hidden
-        yield Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}.")
 
 
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,38 +47,20 @@ class Verdict:
         return self.robustness < 0
 
 
-@dataclass(frozen=True, slots=True)
-class Watched:
-    """A part of a formula whose extremes are of interest.
+class Extremes(NamedTuple):
+    """Smallest and largest robustness of a part of a formula over all samples at which it counts.
 
     Attributes:
-        formula: the implication or disjunction to which the part belongs; for a predicate itself.
-        part: the condition of an implication, an operand of a disjunction, or a predicate.
-        first: first sample at which it counts.
-        last: last sample.
+        low: smallest robustness.
+        lowest: its time in s.
+        high: largest robustness.
+        highest: its time in s.
     """
 
-    formula: Formula
-    part: Part
-    first: int
-    last: int
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Extremes:
-    """Smallest and largest robustness of the watched parts over all samples at which they count.
-
-    Attributes:
-        lows: smallest robustness, shape (k,).
-        highs: largest robustness, shape (k,).
-        lowest: time in s of the smallest, shape (k,).
-        highest: time in s of the largest, shape (k,).
-    """
-
-    lows: NDArray[np.float64]
-    highs: NDArray[np.float64]
-    lowest: NDArray[np.float64]
-    highest: NDArray[np.float64]
+    low: float
+    lowest: float
+    high: float
+    highest: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +71,9 @@ class Monitor:
         formula: the formula.
         step: sampling step of the trajectories in s.
         samples: their number of samples, including both ends.
-        watched: parts of the formula whose extremes tell whether it was tested.
+        watched: parts of the formula whose extremes tell whether it was tested: conditions of implications,
+            operands of disjunctions, and predicates. Before each, the implication or disjunction to which it
+            belongs; for a predicate itself.
 
     Raises:
         FormulaError: if the formula is not parsed, a window extends past the end of the grid or a bound is
@@ -99,7 +83,7 @@ class Monitor:
     formula: Formula
     step: float
     samples: int
-    watched: tuple[Watched, ...] = field(init=False, repr=False, compare=False)
+    watched: tuple[tuple[Formula, Part], ...] = field(init=False, repr=False, compare=False)
     _program: Program = field(init=False, repr=False, compare=False)
     _spare: list[NDArray[np.float64]] = field(init=False, repr=False, compare=False)
 
@@ -150,21 +134,22 @@ class Monitor:
         self._spare.append(buffer)
         return diagnosis
 
-    def extremes(self, trajectory: Trajectory) -> Extremes:
+    def extremes(self, trajectory: Trajectory) -> list[Extremes]:
         """Return the smallest and largest robustness of each watched part.
 
         Raises:
             MonitorError: if the trajectory cannot be evaluated.
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
-        lows, highs, lowest, highest = np.empty((4, len(self.watched)))
-        for i, watched in enumerate(self.watched):
-            values = watched.part.over(buffer, watched.first, watched.last)
+        found = []
+        for _, part in self.watched:
+            first, last = part.place.first, part.place.last
+            values = part.over(buffer, first, last)
             low, high = int(values.argmin()), int(values.argmax())
-            lows[i], highs[i] = values[low], values[high]
-            lowest[i], highest[i] = (watched.first + low) * self.step, (watched.first + high) * self.step
+            lowest, highest = (first + low) * self.step, (first + high) * self.step
+            found.append(Extremes(values.item(low), lowest, values.item(high), highest))
         self._spare.append(buffer)
-        return Extremes(lows, highs, lowest, highest)
+        return found
 
     def window(self, part: Formula) -> tuple[float, float]:
         """Return the first and last time in s at which a sub-formula matters to the robustness at time 0.
@@ -187,7 +172,8 @@ class Monitor:
         """
         sample = round(time / self.step)
         if not 0 <= sample < self.samples:
-            raise MonitorError(f"{time:g} s is outside the trajectory, which ends at {self._end:g} s")
+            end = (self.samples - 1) * self.step
+            raise MonitorError(f"{time:g} s is outside the trajectory, which ends at {end:g} s")
         result: dict[Formula, float] = {}
         for part in dict.fromkeys(self.formula.walk()):
             if sample + self._reach(part) < self.samples:
@@ -221,10 +207,6 @@ class Monitor:
         """
         return fill_many(self._program, columns)
 
-    @property
-    def _end(self) -> float:
-        return (self.samples - 1) * self.step
-
     def _take_buffer(self) -> NDArray[np.float64]:
         return self._spare.pop() if self._spare else np.empty(self._program.size)
 
@@ -237,15 +219,12 @@ class Monitor:
         return program.root.over(buffer, first, last).copy()
 
 
-def _watched(root: Part) -> Iterator[Watched]:
-    """Yield the conditions of implications, the operands of disjunctions, and the predicates."""
+def _watched(root: Part) -> Iterator[tuple[Formula, Part]]:
     for part in root.walk():
-        parts: tuple[Part, ...] = ()
         match part.formula:
             case Implies():
-                parts = part.children[:1]
+                yield part.formula, part.children[0]
             case Or():
-                parts = part.children
+                yield from ((part.formula, child) for child in part.children)
             case Predicate():
-                parts = (part,)
-        yield from (Watched(part.formula, each, part.place.first, part.place.last) for each in parts)
+                yield part.formula, part

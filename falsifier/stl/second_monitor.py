@@ -24,7 +24,6 @@ from math import copysign, inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
@@ -91,21 +90,20 @@ class _Translation:
                 return f"({self.side(left)} {operator} {self.side(right)})"
             case Not(operand):
                 return f"(not {self.text(operand, at_start=at_start)})"
-            case And(left, right) | Or(left, right) | Implies(left, right):
-                sign = {And: "and", Or: "or", Implies: "->"}[type(f)]
-                return f"({self.text(left, at_start=at_start)} {sign} {self.text(right, at_start=at_start)})"
             case Iff(left, right):
                 return self.text(And(Implies(left, right), Implies(right, left)), at_start=at_start)
+            case And(left, right) | Or(left, right) | Implies(left, right):
+                return (
+                    f"({self.text(left, at_start=at_start)} {f.sign} {self.text(right, at_start=at_start)})"
+                )
             case Always(operand, window) if window is not None and at_start:
                 return f"(always ((0 >= {self.inside(window)}) or {self.text(operand)}))"
             case Eventually(operand, window) if window is not None and at_start:
                 return f"(eventually (({self.inside(window)} >= 0) and {self.text(operand)}))"
-            case Next(operand):
-                return f"(next {self.text(operand)})"
-            case Always(operand, window):
-                return f"(always{self.window(window)} {self.text(operand)})"
-            case Eventually(operand, window):
-                return f"(eventually{self.window(window)} {self.text(operand)})"
+            case Next(operand) | Always(operand) | Eventually(operand):
+                name = {Next: "next", Always: "always", Eventually: "eventually"}[type(f)]
+                bounds = "[{},{}]".format(*self.samples(f.window)) if f.window else ""
+                return f"({name}{bounds} {self.text(operand)})"
             case Until(left, right, window):
                 return self.until(left, right, window)
         raise TypeError(f"not a formula: {f!r}")
@@ -123,10 +121,6 @@ class _Translation:
     def samples(self, window: Window) -> tuple[int, int]:
         return window_samples(window, self.trajectory.step or 1.0)
 
-    def window(self, window: Window | None) -> str:
-        """Return the text of a window in samples."""
-        return "[{},{}]".format(*self.samples(window)) if window else ""
-
     def column(self, values: list[float]) -> str:
         """Add a column and return its alias."""
         alias = f"v{len(self.columns)}"
@@ -143,22 +137,18 @@ class _Translation:
         if isinstance(expression, Number):
             return number_text(expression.value)
         if expression not in self.aliases:
-            self.aliases[expression] = self.column(self.values(expression).tolist())
+            known = {name: self.trajectory[name] for name in expression.signals}
+            values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
+            if not np.isfinite(values).all():
+                time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
+                raise MonitorError(f"{expression} has no finite value at {time:g} s")
+            self.aliases[expression] = self.column(values.tolist())
         return self.aliases[expression]
 
     def truth(self, predicate: Predicate) -> str:
         """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""
         true = np.broadcast_to(predicate.holds(self.trajectory.columns), self.trajectory.times.shape)
         return self.column(np.where(true, 1.0, -1.0).tolist())
-
-    def values(self, expression: Expression) -> NDArray[np.float64]:
-        """Return the values of a compared expression at all samples."""
-        known = {name: self.trajectory[name] for name in expression.signals}
-        values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
-        if not np.isfinite(values).all():
-            time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
-            raise MonitorError(f"{expression} has no finite value at {time:g} s")
-        return values
 
 
 def _evaluate(formula: Formula, translation: _Translation) -> float:

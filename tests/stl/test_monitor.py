@@ -259,7 +259,7 @@ def test_courses_agree_with_the_direct_definition(seed: int) -> None:
 
 def test_conditions_disjuncts_and_predicates_are_watched_where_they_count() -> None:
     monitor = Monitor(parse("G[0,2] (x >= 3 -> (y <= 1 or x <= 9))"), step=1.0, samples=4)
-    parts = [(str(w.formula), str(w.part.formula)) for w in monitor.watched]
+    parts = [(str(formula), str(part.formula)) for formula, part in monitor.watched]
     assert parts == [
         ("x >= 3 -> (y <= 1 or x <= 9)", "x >= 3"),
         ("x >= 3", "x >= 3"),
@@ -271,9 +271,8 @@ def test_conditions_disjuncts_and_predicates_are_watched_where_they_count() -> N
     # The last sample is outside the window and does not count.
     columns = {"x": np.array([0.0, 2.0, 1.0, 50.0]), "y": np.array([5.0, 0.0, 0.0, -50.0])}
     found = monitor.extremes(Trajectory(np.arange(4.0), columns))
-    assert (found.lows[0], found.lowest[0]) == (-3.0, 0.0)
-    assert (found.highs[0], found.highest[0]) == (-1.0, 1.0)
-    assert (found.lows[2], found.highs[2]) == (-4.0, 1.0)
+    assert found[0] == (-3.0, 0.0, -1.0, 1.0)
+    assert (found[2].low, found[2].high) == (-4.0, 1.0)
 
 
 def test_a_batch_is_judged_like_its_trajectories() -> None:
