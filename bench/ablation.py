@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from falsifier.engines.surrogate import local_search, surrogate
+from falsifier.engines.surrogate import local_search, policy, surrogate
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
@@ -72,7 +72,7 @@ PARTS = {
     "no stepping inputs": Part({"probes": 0}),
     "no trial of the dynamics": Part({"trial": 0}),
     "nothing reserved": Part({"reserved": 0.0}),
-    "ratings not sharpened": Part({"sharpness": 1.0}),
+    "ratings not sharpened": Part(patches=[(policy, "_SHARPNESS", 1.0)]),
     "half the population": Part({"pool": 250, "children": 125}),
 }
 

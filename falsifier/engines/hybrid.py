@@ -271,12 +271,12 @@ class Hybrid:
     @property
     def _is_trusted(self) -> bool:
         """Whether recent predictions were good."""
-        forecaster = self.surrogate.forecaster
-        return forecaster.is_trusted and forecaster.misses < _MOST_MISSES
+        forecasts = self.surrogate.forecasts
+        return forecasts.is_trusted and forecasts.misses < _MOST_MISSES
 
     def _standing(self) -> list[str]:
         """Return how the search stands, in the words that the LLM is told."""
-        if (misses := self.surrogate.forecaster.misses) >= _MOST_MISSES:
+        if (misses := self.surrogate.forecasts.misses) >= _MOST_MISSES:
             return [
                 "A numerical optimiser shares this search and fits a model to the samples above. It "
                 f"predicted a violation {misses} times in a row and was wrong each time: do "

@@ -1,6 +1,5 @@
 """The parameterizations in which engines search, as vectors in [0, 1]^d, and the time grid of their cells."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -200,23 +199,6 @@ class Layout:
         for p in self.space.parameters:
             parts.append(np.array([(candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)]))
         return np.asarray(np.clip(np.concatenate(parts), 0.0, 1.0))
-
-    def constant(self, levels: Sequence[float]) -> Array:
-        """Return the point at which each input and parameter is constant at its level in [0, 1]."""
-        point = np.empty(self.dimension)
-        for group, level in zip(self.groups, levels, strict=True):
-            point[group] = level
-        return self.settled(point)
-
-    def nearest_extreme(self, point: Array, *, within: float) -> tuple[int, ...] | None:
-        """Return the levels of the constant extreme that a point is near to, in each coordinate; or None."""
-        levels = []
-        for group in self.groups:
-            level = round(float(point[group][0]))
-            if np.abs(point[group] - level).max() > within:
-                return None
-            levels.append(level)
-        return tuple(levels)
 
 
 def fixed_layout(space: SearchSpace) -> Layout:

@@ -7,7 +7,7 @@ Systems are causal: inputs that stay the same up to a time do what they did unti
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
+from falsifier.engines.box import Proposal
 from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete_event
 from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
@@ -31,7 +32,7 @@ _SLIGHT, _AGAIN, _EARLIER = 0.2, 0.25, 0.15
 _SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
 # Two values of robustness that differ by at most this share of their size are the same level.
 _SAME_LEVEL = 1e-6
-# Ideas, then random points, among which one that was not simulated is looked for.
+# Proposals, then random points, among which one that was not simulated is looked for.
 _IDEAS, _DRAWS = 10, 100
 
 
@@ -48,19 +49,6 @@ class Reached:
     point: Array
     time: float
     tries: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Idea:
-    """A proposed input.
-
-    Attributes:
-        point: the input.
-        why: the reason, in words.
-    """
-
-    point: Array
-    why: str
 
 
 class Explorer:
@@ -117,7 +105,7 @@ class Explorer:
                 self._reached[mark] = Reached(point, time, known.tries if known else 0)
         return any(is_discrete_event(mark) and mark.source in (MODES, *self._marker.kinds) for mark in new)
 
-    def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Idea:
+    def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Proposal:
         """Return the next input: one that reached a rare mark, continued differently after it.
 
         Args:
@@ -126,26 +114,28 @@ class Explorer:
         """
         programs = (self._aimed if aimed else None) or self._programs
         if not programs.has_inputs:
-            return Idea(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
+            return Proposal(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)
         if mark is None:
-            return Idea(programs.fresh(rng), "a random program of the inputs: nothing has been reached yet")
+            return Proposal(
+                programs.fresh(rng), "a random program of the inputs: nothing has been reached yet"
+            )
         reached = self._reached[mark]
         reached.tries += 1
         kind = rng.random()
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
         if kind < _NEW_END:
             point = programs.another_end(rng, reached.point, reached.time)
-            return Idea(point, f"{where}, continued differently")
+            return Proposal(point, f"{where}, continued differently")
         if kind < _NEW_END + _REPEATED:
             other = self._choose(rng) or mark
             source = self._reached[other]
             span = (float(rng.uniform(0.0, source.time)), source.time)
             point = programs.repeated(rng, reached.point, reached.time, source.point, span)
-            return Idea(point, f"{where}, followed by what made {describe(other)}")
-        return Idea(programs.moved(rng, reached.point), f"{where}, slightly changed")
+            return Proposal(point, f"{where}, followed by what made {describe(other)}")
+        return Proposal(programs.moved(rng, reached.point), f"{where}, slightly changed")
 
-    def propose_lower(self, rng: np.random.Generator) -> Idea:
+    def propose_lower(self, rng: np.random.Generator) -> Proposal:
         """Return an input that reached the lowest robustness, continued differently after that was decided.
 
         Where robustness has few values, this is how the next lower one is reached from this one.
@@ -155,12 +145,14 @@ class Explorer:
         where = f"the input that made the robustness {self._lowest:.4g} at {reached.time:.3g} s"
         kind = rng.random()
         if kind < _SLIGHT:
-            return Idea(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+            return Proposal(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
         if kind < _SLIGHT + _AGAIN:
-            return Idea(self._again(rng, reached), f"{where}, done again and again")
+            return Proposal(self._again(rng, reached), f"{where}, done again and again")
         # Now and then from an earlier time: it may have been too late.
         time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
-        return Idea(self._programs.another_end(rng, reached.point, time), f"{where}, continued differently")
+        return Proposal(
+            self._programs.another_end(rng, reached.point, time), f"{where}, continued differently"
+        )
 
     def _again(self, rng: np.random.Generator, reached: Reached) -> Array:
         """Return the input that goes on with what it did before the lowest robustness, until the end."""
@@ -229,18 +221,16 @@ class Coverage:
                 self._explorer.learn(point, evaluation.trajectory, 0.0, 0.0)
 
     def _ask_one(self) -> Candidate:
-        ideas = self._ideas(np.random.default_rng([self.seed, self._asked]))
+        rng = np.random.default_rng([self.seed, self._asked])
         self._asked += 1
-        for idea in ideas:
-            candidate = self.layout.candidate(idea.point, origin=self.name, rationale=idea.why)
+        for turn in range(_IDEAS + _DRAWS):
+            if turn < _IDEAS:
+                idea = self._explorer.propose(rng)
+            else:
+                point = self.layout.settled(rng.random(self.layout.dimension))
+                idea = Proposal(point, "random: all other ideas were simulated")
+            candidate = self.layout.candidate(idea.point, origin=self.name, rationale=idea.rationale)
             if hash(candidate.key) not in self._known:
                 break
         self._known.add(hash(candidate.key))
         return candidate
-
-    def _ideas(self, rng: np.random.Generator) -> Iterator[Idea]:
-        for _ in range(_IDEAS):
-            yield self._explorer.propose(rng)
-        for _ in range(_DRAWS):
-            point = self.layout.settled(rng.random(self.layout.dimension))
-            yield Idea(point, "random: all other ideas were simulated")

@@ -85,7 +85,7 @@ class Marker:
         outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *formula.signals)))
         return cls(
             {name: problem.info.kind(name) for name in outputs if name not in driven},
-            tuple(p for p in formula.predicates if not {*p.left.signals, *p.right.signals} <= driven),
+            tuple(p for p in formula.predicates if not driven.issuperset(p.signals)),
         )
 
     def marks(self, trajectory: Trajectory) -> dict[Mark, float]:
@@ -93,7 +93,9 @@ class Marker:
         columns = {n: _finite(trajectory[n]) for n in self.kinds if n in trajectory.columns}
         discrete = {n: c for n, c in columns.items() if is_discrete(c, kind=self.kinds[n])}
         margins = {
-            f"{p.left} > {p.right}": _margin(p, trajectory) for p in self.predicates if not _only(p, discrete)
+            f"{p.left} > {p.right}": _margin(p, trajectory)
+            for p in self.predicates
+            if not discrete.keys() >= set(p.signals)
         }
         truths = {name: (margin > 0).astype(np.float64) for name, margin in margins.items()}
         found = [
@@ -109,13 +111,8 @@ class Marker:
         return {mark: float(trajectory.times[sample]) for mark, sample in first.items()}
 
 
-def _only(predicate: Predicate, discrete: Mapping[str, Floats]) -> bool:
-    return {*predicate.left.signals, *predicate.right.signals} <= discrete.keys()
-
-
 def _margin(predicate: Predicate, trajectory: Trajectory) -> Floats:
-    names = (*predicate.left.signals, *predicate.right.signals)
-    columns = {name: _finite(trajectory[name]) for name in names}
+    columns = {name: _finite(trajectory[name]) for name in predicate.signals}
     margin = predicate.left.evaluate(columns) - predicate.right.evaluate(columns)
     return np.broadcast_to(_finite(margin), trajectory.times.shape)
 
@@ -164,7 +161,7 @@ def _changes(changes: list[Change]) -> Iterator[tuple[Mark, int]]:
         if (count := counts[key]).bit_count() == 1 or count == 3:
             yield Mark(change.source, ("changes", change.old, change.new, count)), change.sample
         for before in latest.values():
-            gap = _octave(change.sample - before.sample + 1)
+            gap = (change.sample - before.sample + 1).bit_length()  # in octaves
             what = "after", change.old, change.new, before.source, before.old, before.new, gap
             yield Mark(change.source, what), change.sample
         latest[change.source] = change
@@ -193,7 +190,3 @@ def _nearness(name: str, margin: Floats) -> Iterator[tuple[Mark, int]]:
     samples = np.searchsorted(-distance, -start / 2.0 ** (np.arange(_LEVELS) / 2))
     for level, sample in enumerate(samples[samples < len(distance)].tolist()):
         yield Mark(name, ("near", level)), sample
-
-
-def _octave(samples: int) -> int:
-    return int(samples).bit_length()

@@ -6,6 +6,7 @@ result does not depend on timing.
 """
 
 import weakref
+from contextlib import suppress
 from queue import SimpleQueue
 from threading import Thread
 
@@ -29,15 +30,18 @@ class Annealing(BoxEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._walk = _Walk(self.box.dimension, seed)
+        self._points: SimpleQueue[Vector] = SimpleQueue()
+        self._costs: SimpleQueue[float | None] = SimpleQueue()
+        walk = self.box.dimension, seed, self._points, self._costs
+        Thread(target=_walk, args=walk, name="annealing", daemon=True).start()
         self._awaited: Vector | None = None
         self._worst = 0.0
-        weakref.finalize(self, self._walk.stop)
+        weakref.finalize(self, self._costs.put, None)
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._awaited is not None:
             return Proposal(rng.random(self.box.dimension), "uniform random, while annealing waits")
-        self._awaited = self._walk.next_point()
+        self._awaited = self._points.get()
         return Proposal(self._awaited, "a step of simulated annealing")
 
     def _learn(self, point: Vector, cost: float | None) -> None:
@@ -46,51 +50,24 @@ class Annealing(BoxEngine):
         # A failed simulation counts as the worst cost so far: annealing needs a number for every point.
         if self._awaited is not None and self._is_same(point, self._awaited):
             self._awaited = None
-            self._walk.answer(self._worst if cost is None else cost)
+            self._costs.put(self._worst if cost is None else cost)
 
 
-class _Walk:
-    """The annealing thread and the two queues between it and the engine."""
+def _walk(dimension: int, seed: int, points: SimpleQueue[Vector], costs: SimpleQueue[float | None]) -> None:
+    """Put the points of annealing, started again and again, until there is None in place of a cost."""
 
-    def __init__(self, dimension: int, seed: int) -> None:
-        self._points: SimpleQueue[Vector] = SimpleQueue()
-        self._costs: SimpleQueue[float | None] = SimpleQueue()
-        thread = Thread(target=self._run, args=(dimension, seed), name="annealing", daemon=True)
-        thread.start()
-
-    def next_point(self) -> Vector:
-        """Return the point whose cost annealing waits for."""
-        return self._points.get()
-
-    def answer(self, cost: float) -> None:
-        """Let annealing continue with this cost."""
-        self._costs.put(cost)
-
-    def stop(self) -> None:
-        """End the thread."""
-        self._costs.put(None)
-
-    def _run(self, dimension: int, seed: int) -> None:
-        try:
-            while True:
-                dual_annealing(
-                    self._cost,
-                    [(0.0, 1.0)] * dimension,
-                    maxiter=_NEVER,
-                    maxfun=_NEVER,
-                    seed=seed,
-                    no_local_search=True,
-                )
-                seed += 1
-        except _Stopped:
-            return
-
-    def _cost(self, point: Vector) -> float:
-        self._points.put(np.array(point))
-        cost = self._costs.get()
+    def cost_of(point: Vector) -> float:
+        points.put(np.array(point))
+        cost = costs.get()
         if cost is None:
             raise _Stopped
         return cost
+
+    bounds = [(0.0, 1.0)] * dimension
+    with suppress(_Stopped):
+        while True:
+            dual_annealing(cost_of, bounds, maxiter=_NEVER, maxfun=_NEVER, seed=seed, no_local_search=True)
+            seed += 1
 
 
 class _Stopped(Exception):

@@ -19,9 +19,11 @@ class Feasibility:
     of them, and an input that does not matter does not disturb it.
 
     Attributes:
+        layout: layout of the points.
         grid: the cells over which inputs are summarized.
     """
 
+    layout: Layout
     grid: TimeGrid
     _features: list[Array] = field(default_factory=list)
     _failed: list[bool] = field(default_factory=list)
@@ -32,30 +34,30 @@ class Feasibility:
         """Whether any simulation has failed so far; if none has, nothing is risky."""
         return any(self._failed)
 
-    def add(self, layout: Layout, point: Array, *, failed: bool) -> None:
+    def add(self, point: Array, *, failed: bool) -> None:
         """Add the outcome of one simulation."""
-        self._features.append(self._summary(layout, point[None])[0])
+        self._features.append(self._summary(point[None])[0])
         self._failed.append(failed)
         self._weights = None
 
-    def risk(self, layout: Layout, points: Array) -> Array:
+    def risk(self, points: Array) -> Array:
         """Return the probability that the simulation of each point fails, shape (m,)."""
         if not self.has_failures:
             return np.zeros(len(points))
         if self._weights is None:
             self._weights = _fitted(np.array(self._features), np.array(self._failed, dtype=np.float64))
-        return _logistic(self._summary(layout, points) @ self._weights + _PRIOR)
+        return _logistic(self._summary(points) @ self._weights + _PRIOR)
 
-    def excess(self, layout: Layout, points: Array) -> Array:
+    def excess(self, points: Array) -> Array:
         """Return how far the risk is above an even chance, from 0 to 1, shape (m,).
 
         Below that, only what is promising counts: violations are often close to where simulations fail.
         """
-        return np.asarray(np.maximum(2.0 * self.risk(layout, points) - 1.0, 0.0))
+        return np.asarray(np.maximum(2.0 * self.risk(points) - 1.0, 0.0))
 
-    def _summary(self, layout: Layout, points: Array) -> Array:
+    def _summary(self, points: Array) -> Array:
         """Return the features of points, from -1 to 1, with a constant, shape (m, 5 groups + 1)."""
-        inputs = 2.0 * layout.inputs(points, self.grid) - 1.0
+        inputs = 2.0 * self.layout.inputs(points, self.grid) - 1.0
         low, mean, high = inputs.min(axis=1), inputs.mean(axis=1), inputs.max(axis=1)
         parts = [low, mean, high, low**2, high**2, np.ones((len(points), 1))]
         return np.concatenate(parts, axis=1)

@@ -41,14 +41,22 @@ class Sample:
 
 @dataclass
 class History:
-    """Samples of one problem; the first trajectory determines which signals are discrete."""
+    """Samples of one problem; the first trajectory determines which signals are discrete.
+
+    Attributes:
+        problem: the problem.
+        grid: the grid of the traces.
+        layout: the layout of the points.
+        samples: what was simulated.
+        cost: the cost of predictions in the requirement's own unit; None before the first sample.
+    """
 
     problem: Problem
     grid: TimeGrid
     layout: Layout
     samples: list[Sample] = field(default_factory=list)
+    cost: PredictedCost | None = None
     _discrete: frozenset[str] = frozenset()
-    _cost: PredictedCost | None = None
     _scaled: PredictedCost | None = None
 
     def add(self, evaluation: Evaluation, point: Array) -> Sample | None:
@@ -56,11 +64,11 @@ class History:
         trajectory, robustness = evaluation.trajectory, evaluation.robustness
         if trajectory is None or robustness is None:
             return None
-        if self._cost is None:
-            self._cost = self._first_cost(trajectory)
-        trace = trace_of(self.problem.space, self.grid, self._cost.outputs, evaluation.candidate, trajectory)
+        if self.cost is None:
+            self.cost = self._first_cost(trajectory)
+        trace = trace_of(self.problem.space, self.grid, self.cost.outputs, evaluation.candidate, trajectory)
         cells = self.grid.cells
-        margins = self._cost.margins(trace.states[None, : cells + 1], trace.inputs[None, :cells])
+        margins = self.cost.margins(trace.states[None, : cells + 1], trace.inputs[None, :cells])
         critical = evaluation.verdict.critical_time / (self.grid.step * cells) if evaluation.verdict else 1.0
         sample = Sample(point, trace, margins, float(learnable(robustness)), min(critical, 1.0))
         self.samples.append(sample)
@@ -91,7 +99,7 @@ class History:
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs in the traces, in order."""
-        return self._cost.outputs if self._cost else ()
+        return self.cost.outputs if self.cost else ()
 
     @property
     def continuous(self) -> list[str]:
@@ -101,9 +109,9 @@ class History:
 
     def scaled_cost(self) -> PredictedCost:
         """Return the cost of predictions, scaled by the spread of all samples."""
-        assert self._cost is not None, "there is a sample"
+        assert self.cost is not None, "there is a sample"
         if self._scaled is None:
-            self._scaled = self._cost.rescaled([s.margins for s in self.samples])
+            self._scaled = self.cost.rescaled([s.margins for s in self.samples])
         return self._scaled
 
     @property

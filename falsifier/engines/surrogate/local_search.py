@@ -12,7 +12,6 @@ import numpy as np
 from falsifier.engines.box import BoxEngine, Proposal, Vector
 from falsifier.engines.layout import Array, Layout
 from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
-from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import changed, held_from, paced
 from falsifier.problem.problem import Problem
 
@@ -22,8 +21,6 @@ _TRIES = 100
 _MEAN_RANK = 0.5
 # Number of simulations before their changes are tried; share of random points later.
 _FEWEST, _FRESH = 8, 0.05
-# Maximum number of pieces of a random point.
-_PIECES = 6
 # Share of changes that keep all inputs constant from some time on: an excited system that is left alone may
 # do by itself what constant disturbance hides.
 _HELD = 0.2
@@ -59,11 +56,7 @@ class Seen:
 
 
 def propose_change(
-    seen: Seen,
-    layout: Layout,
-    settings: Settings,
-    rng: np.random.Generator,
-    risk: Callable[[Array], Array] | None = None,
+    seen: Seen, layout: Layout, rng: np.random.Generator, risk: Callable[[Array], Array], *, draws: int
 ) -> tuple[Array, str]:
     """Return a change of one of the best points, or a random point, and what it is.
 
@@ -72,20 +65,19 @@ def propose_change(
     Args:
         seen: what was simulated.
         layout: layout of the points.
-        settings: settings of the engine.
         rng: random generator.
-        risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,); None: none fails.
+        risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,).
+        draws: number of random points among which the least risky one is chosen.
     """
     if len(seen.costs) >= _FEWEST and rng.random() >= _FRESH:
-        children = _changes(seen, layout, settings, rng)
+        children = _changes(seen, layout, rng)
         if len(children):
-            return _least_risky(children, risk), "a change of one of the best candidates"
-    count = max(settings.retries, 1) if risk else 1
-    fresh = [paced(layout, rng, _PIECES, settings.at_bounds) for _ in range(count)]
-    return _least_risky(np.array(fresh), risk), "random: a new start of the search by changes"
+            return children[np.argmin(risk(children))], "a change of one of the best candidates"
+    fresh = np.array([paced(layout, rng) for _ in range(draws)])
+    return fresh[np.argmin(risk(fresh))], "random: a new start of the search by changes"
 
 
-def _changes(seen: Seen, layout: Layout, settings: Settings, rng: np.random.Generator) -> Array:
+def _changes(seen: Seen, layout: Layout, rng: np.random.Generator) -> Array:
     """Return changes of good points that can matter, shape (m, d); m may be 0."""
     # Among equal costs, any order: the first one would else be changed for ever.
     order = np.lexsort((rng.random(len(seen.costs)), seen.costs))
@@ -93,15 +85,10 @@ def _changes(seen: Seen, layout: Layout, settings: Settings, rng: np.random.Gene
     parents, decided = seen.points[chosen], seen.decided[chosen]
     children = changed(layout, rng, parents)
     held = rng.random(_TRIES) < _HELD
-    children[held] = held_from(layout, rng, parents[held], decided[held], settings.at_bounds)
+    children[held] = held_from(layout, rng, parents[held], decided[held])
     early = layout.starts[None] <= decided[:, None]
     matters = ((np.abs(children - parents) > _TOLERANCE) & early).any(axis=1)
     return np.asarray(children[matters])
-
-
-def _least_risky(points: Array, risk: Callable[[Array], Array] | None) -> Array:
-    """Return the first of the points whose simulations are the least likely to fail."""
-    return np.asarray(points[0 if risk is None else int(np.argmin(risk(points)))])
 
 
 class TrustRegion(BoxEngine):
@@ -125,14 +112,12 @@ class TrustRegion(BoxEngine):
         d = self.box.dimension
         costs = np.array(self._costs[self._first :])
         if len(costs) < min(d + 2, 12):
-            point: Vector = rng.random(d)
+            drawn: Vector = rng.random(d)
             why = "a new start of the trust region"
         else:
-            point, why = (
-                self._step(np.array(self._points[self._first :]), costs, rng),
-                "a step in a trust region",
-            )
-        point = self.box.settled(point)
+            drawn = self._step(np.array(self._points[self._first :]), costs, rng)
+            why = "a step in a trust region"
+        point = self.box.settled(drawn)
         self._own.append(point)
         return Proposal(point, why)
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.layout import Array, Layout
-from falsifier.engines.surrogate.history import Sample
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import mutations, random_points
 
@@ -20,6 +19,11 @@ from falsifier.engines.surrogate.variation import mutations, random_points
 _SAME_POINT = 1e-3
 # Number of plans that drive an output one way without anything new happening, after which it is left alone.
 _MOST_TRIES = 3
+# Survivors of each generation.
+_PARENTS = 30
+# Number of inputs, parameters and outputs up to which a plan has all of its candidates; with more, fewer, so
+# that its time does not grow.
+_MOST_SIGNALS = 8
 # Number of blocks of coordinates by which a gradient is taken; more take longer.
 _DIRECTIONS = 60
 
@@ -31,6 +35,7 @@ def plan(
     elites: Array,
     critical: Array,
     seen: Array,
+    outputs: int,
     settings: Settings,
     rng: np.random.Generator,
 ) -> Array:
@@ -42,50 +47,49 @@ def plan(
         elites: best simulated points, shape (e, d).
         critical: their critical times as shares of the horizon, shape (e,).
         seen: all simulated or pending points, shape (s, d).
+        outputs: number of predicted outputs.
         settings: sizes of the populations.
         rng: random generator.
     """
-    bred = settings.pool // 3
+    share = min(1.0, _MOST_SIGNALS / (outputs + len(layout.groups)))
+    first, later = (max(round(share * n), _PARENTS) for n in (settings.pool, settings.children))
+    bred = first // 3
     children = np.concatenate(
         [
-            random_points(layout, rng, settings.pool - bred),
+            random_points(layout, rng, first - bred),
             elites,
             mutations(layout, rng, elites, bred, critical=critical),
         ]
     )
-    pool, costs = _best(layout, children, predict(children), settings.parents)
-    blocks = _blocks(layout, _DIRECTIONS)
+    pool, costs = _best(layout, children, predict(children))
+    blocks = _blocks(layout)
     for step in range(settings.generations + settings.bound_steps):
         if step < settings.generations:
-            children = mutations(layout, rng, pool, settings.children)
+            children = mutations(layout, rng, pool, later)
         else:
             base = pool[0 if (step - settings.generations) % 2 == 0 else rng.integers(min(5, len(pool)))]
             children = layout.settled(_towards_bounds(predict, base, blocks))
-        pool, costs = _best(
-            layout,
-            np.concatenate([pool, children]),
-            np.concatenate([costs, predict(children)]),
-            settings.parents,
-        )
+        found = np.concatenate([costs, predict(children)])
+        pool, costs = _best(layout, np.concatenate([pool, children]), found)
     # The additional points are used only if the whole pool has been simulated before.
     others = [mutations(layout, rng, pool, len(pool)), random_points(layout, rng, len(pool))]
     points = np.concatenate([pool, *others])
     return np.asarray(next((point for point in points if not is_seen(point, seen)), points[0]))
 
 
-def _best(layout: Layout, points: Array, costs: Array, count: int) -> tuple[Array, Array]:
+def _best(layout: Layout, points: Array, costs: Array) -> tuple[Array, Array]:
     """Return the points with the lowest costs; where different draws are often equal, each point once."""
     if layout.has_gaps:
         _, firsts = np.unique(points, axis=0, return_index=True)
         firsts.sort()
         points, costs = points[firsts], costs[firsts]
-    order = np.argsort(costs, kind="stable")[:count]
+    order = np.argsort(costs, kind="stable")[:_PARENTS]
     return points[order], costs[order]
 
 
-def _blocks(layout: Layout, most: int) -> NDArray[np.intp]:
-    """Return for each coordinate the number of its block: neighbours of one group, about ``most`` blocks."""
-    width = -(-layout.dimension // most)
+def _blocks(layout: Layout) -> NDArray[np.intp]:
+    """Return for each coordinate the number of its block of neighbours in one group."""
+    width = -(-layout.dimension // _DIRECTIONS)
     sizes = [-(-len(group) // width) for group in layout.groups]
     firsts = np.cumsum([0, *sizes[:-1]])
     parts = [f + np.arange(len(g)) // width for f, g in zip(firsts, layout.groups, strict=True)]
@@ -164,19 +168,3 @@ class Pushes:
     def succeeded(self, push: Push) -> None:
         """Note that it made a discrete signal do something new: it is worth more tries."""
         self._tries[push] = 0
-
-
-def by_height(push: Push, samples: Sequence[Sample], cells: int) -> tuple[list[int], Array]:
-    """Return the indices of the samples, that in which the output went furthest first, and when each did so.
-
-    Args:
-        push: the output and the direction.
-        samples: at least one sample.
-        cells: number of cells of the horizon.
-
-    Returns:
-        The order of the samples, and the times as shares of the horizon, shape (samples,).
-    """
-    heights = np.array([push.heights(s.trace.states[: cells + 1]) for s in samples])
-    order = np.argsort(-heights.max(axis=1), kind="stable")
-    return order.tolist(), np.argmax(heights, axis=1) / cells

@@ -5,7 +5,6 @@ from math import inf
 
 import numpy as np
 
-from falsifier.engines.surrogate.settings import Settings
 from falsifier.evaluation.levels import Levels
 
 # What a new lowest robustness is worth at least; all the way to 0, it is worth 1.
@@ -14,6 +13,10 @@ _STEP_DOWN = 0.5
 _NEAR, _LOWEST = 0.25, 5
 # What something new that a discrete signal did is worth.
 _NEW_MARK = 0.1
+# Factor by which what an arm brought counts less with each of its later proposals.
+_MEMORY = 0.9
+# Power of the ratings to which the shares of turns are proportional.
+_SHARPNESS = 3.0
 # Number of proposals as which an arm's prior rating counts at first.
 _PRIOR_WEIGHT = 2.0
 # Rating of an arm of which nothing is known or remembered, and as how many proposals that always counts.
@@ -39,25 +42,17 @@ class Policy:
 
     Args:
         priors: rating of each arm before its first proposals, from 0 to 1.
-        settings: memory and sharpness.
     """
 
-    def __init__(self, priors: Mapping[str, float], settings: Settings) -> None:
-        self._settings = settings
+    def __init__(self, priors: Mapping[str, float]) -> None:
         self._brought = {arm: _PRIOR_WEIGHT * prior for arm, prior in priors.items()}
         self._turns = dict.fromkeys(priors, _PRIOR_WEIGHT)
 
     def learn(self, arm: str, worth: float, *, is_new: bool) -> None:
         """Rate an arm by the worth of a proposal, and by whether a discrete signal did something new."""
         if arm in self._turns:
-            memory = self._settings.memory
-            self._brought[arm] = memory * self._brought[arm] + max(worth, _NEW_MARK * is_new)
-            self._turns[arm] = memory * self._turns[arm] + 1.0
-
-    def rating(self, arm: str) -> float:
-        """Return what the arm's latest proposals brought on average, from 0 to 1."""
-        brought = self._brought[arm] + _UNKNOWN * _UNKNOWN_WEIGHT
-        return brought / (self._turns[arm] + _UNKNOWN_WEIGHT)
+            self._brought[arm] = _MEMORY * self._brought[arm] + max(worth, _NEW_MARK * is_new)
+            self._turns[arm] = _MEMORY * self._turns[arm] + 1.0
 
     def choose(self, arms: Sequence[str], reserved: Mapping[str, float], rng: np.random.Generator) -> str:
         """Draw one of the arms that can propose now.
@@ -68,6 +63,7 @@ class Policy:
             rng: random generator.
         """
         kept = np.array([reserved.get(arm, 0.0) for arm in arms])
-        ratings = np.array([self.rating(arm) for arm in arms]) ** self._settings.sharpness
+        brought, turns = (np.array([each[arm] for arm in arms]) for each in (self._brought, self._turns))
+        ratings = ((brought + _UNKNOWN * _UNKNOWN_WEIGHT) / (turns + _UNKNOWN_WEIGHT)) ** _SHARPNESS
         shares = kept + (1.0 - kept.sum()) * ratings / ratings.sum()
         return arms[int(rng.choice(len(arms), p=shares / shares.sum()))]

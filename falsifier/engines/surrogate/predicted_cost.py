@@ -86,7 +86,7 @@ class PredictedCost:
             grid,
             tuple(outputs),
             predicates,
-            tuple({*p.left.signals, *p.right.signals} <= discrete for p in predicates),
+            tuple(discrete.issuperset(p.signals) for p in predicates),
             (1.0,) * len(predicates),
             constants,
             Monitor(on_grid, 1.0, samples),
@@ -134,10 +134,6 @@ class PredictedCost:
             spread = float(np.std(np.concatenate([margins[i] for margins in seen])))
             scales.append(_DISCRETE if discrete else max(spread, 1e-9))
         return replace(self, scales=tuple(scales))
-
-    def plain(self) -> "PredictedCost":
-        """Return the cost in the requirement's own unit."""
-        return replace(self, scales=(1.0,) * len(self.scales))
 
     def _columns(self, margins: Margins) -> dict[str, NDArray[np.float64]]:
         beyond = self._monitor.samples - self.grid.cells - 1

@@ -1,8 +1,7 @@
 """The surrogate engine: arms that search in different ways on one history, rated by what they bring."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import zip_longest
 
 import numpy as np
@@ -13,13 +12,13 @@ from falsifier.engines.coverage import Explorer
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
-from falsifier.engines.surrogate.dynamics import Forecast, Forecaster
+from falsifier.engines.surrogate.dynamics import Forecasts, LinearDynamics
 from falsifier.engines.surrogate.feasibility import Feasibility
-from falsifier.engines.surrogate.history import History, Sample
+from falsifier.engines.surrogate.history import History
 from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
-from falsifier.engines.surrogate.planning import Push, Pushes, by_height, is_seen, plan
+from falsifier.engines.surrogate.planning import Push, Pushes, is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
-from falsifier.engines.surrogate.predicted_cost import inner_windows, needs_several
+from falsifier.engines.surrogate.predicted_cost import Margins, inner_windows, needs_several
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
@@ -29,6 +28,15 @@ from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
 _DRAWS = 100
+# Maximum number of simulations from which dynamics are learnt, the best and the latest.
+_MOST_TRACES = 60
+# Mean rank, from 0, of the simulation from which deviations are learnt: around the very best alone, the same
+# wrong prediction would be made again and again.
+_MEAN_RANK = 1.0
+# Number of best simulated inputs from which a plan is bred.
+_ELITES = 8
+# Maximum number of constant extremes before anything is learnt where there are only parameters.
+_CORNERS = 8
 # Number of levels of an input that steps through many.
 _LEVELS_OF_STEPS = 12
 # Maximum number of switching inputs: if that many random ones did not violate, more will not.
@@ -66,14 +74,14 @@ class Pending:
         arm: the arm that proposed it.
         candidate: the candidate.
         point: its point in the layout, in [0, 1]^d.
-        forecast: prediction of the dynamics, if they proposed it.
+        predicted: margins that the dynamics predicted, if they proposed it.
         push: what it drives further than before, if that is its aim.
     """
 
     arm: str
     candidate: Candidate
     point: Array
-    forecast: Forecast | None = None
+    predicted: Margins | None = None
     push: Push | None = None
 
 
@@ -91,8 +99,8 @@ class Surrogate:
         self.grid = TimeGrid.of(problem, cells=self.settings.cells)
         self.layout = planning_layout(space, self.grid)
         self.history = History(problem, self.grid, self.layout)
-        self.feasibility = Feasibility(self.grid)
-        self.forecaster = Forecaster(self.settings, self.layout)
+        self.feasibility = Feasibility(self.layout, self.grid)
+        self.forecasts = Forecasts()
         self._explorer = Explorer(problem, self.layout)
         self._corners = Corners(problem, seed=seed)
         self._engines: dict[str, BoxEngine] = {
@@ -101,8 +109,7 @@ class Surrogate:
             "corners": self._corners,
             "cma": CMA(problem, seed=seed),
         }
-        priors = _PRIORS if space.inputs else _PRIORS_OF_PARAMETERS
-        self._policy = Policy(priors, self.settings)
+        self._policy = Policy(_PRIORS if space.inputs else _PRIORS_OF_PARAMETERS)
         self._levels = Levels()
         self._pushes = Pushes()
         self._windows = [w for w in inner_windows(formula) if w >= self.grid.step] if space.inputs else []
@@ -122,7 +129,7 @@ class Surrogate:
             pending = self._pending.pop(evaluation.candidate.key, None)
             point = self.layout.point(evaluation.candidate) if pending is None else pending.point
             sample = self.history.add(evaluation, point)
-            self.feasibility.add(self.layout, point, failed=sample is None)
+            self.feasibility.add(point, failed=sample is None)
             for engine in self._engines.values():
                 engine.tell([evaluation])
             brought, is_new = 0.0, False
@@ -138,8 +145,10 @@ class Surrogate:
                 if pending.push and is_new:
                     self._pushes.succeeded(pending.push)
                 self._policy.learn(pending.arm, brought, is_new=is_new)
-                self._judge(pending, sample)
-            elif sample is not None and self.layout.nearest_extreme(point, within=_NEAR_EXTREME):
+                if pending.predicted is not None and sample is not None:
+                    cost, violated = self.history.scaled_cost(), sample.robustness < 0
+                    self.forecasts.judge(pending.predicted, sample.margins, cost, violated=violated)
+            elif sample is not None and self._is_near_extreme(point):
                 self._corners.hear(self._corners.box.point(evaluation.candidate), sample.robustness)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
@@ -151,9 +160,10 @@ class Surrogate:
         if len(self.history.samples) < 2 or not candidates:
             return []
         rng = np.random.default_rng([self.seed, self._asked, len(self.history.samples)])
-        fitted = self._fitted(self.history.by_scaled_cost(), rng)
-        points = np.array([self.layout.point(c) for c in candidates])
-        return fitted.verdicts(self.history.scaled_cost(), points)
+        dynamics = self._fitted(self.history.by_scaled_cost(), rng)
+        margins = self._margins(dynamics, np.array([self.layout.point(c) for c in candidates]))
+        assert self.history.cost is not None, "there are samples"
+        return self.history.cost.verdicts(margins)
 
     def suggest(self, candidates: Sequence[Candidate]) -> None:
         """Add candidates to those from which the next plan is bred."""
@@ -162,13 +172,7 @@ class Surrogate:
     @property
     def recent_error(self) -> float:
         """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
-        return self.forecaster.recent_error
-
-    def _judge(self, pending: Pending, sample: Sample | None) -> None:
-        if pending.forecast is not None and sample is not None:
-            cost = self.history.scaled_cost()
-            violated = sample.robustness < 0
-            self.forecaster.judge(pending.forecast, sample.margins, cost, violated=violated)
+        return self.forecasts.recent_error
 
     def _first_kinds(self) -> list[str]:
         """Return the kinds of the first inputs, in order.
@@ -180,7 +184,7 @@ class Surrogate:
         """
         settings = self.settings
         if not self.problem.space.inputs:
-            return ["corners"] * min(settings.corners, 2 ** len(self.problem.space.parameters))
+            return ["corners"] * min(_CORNERS, 2 ** len(self.problem.space.parameters))
         if self._windows:
             turns = zip_longest(["switching"] * settings.bangs, ["corners"] * settings.pauses)
             return [kind for turn in turns for kind in turn if kind is not None]
@@ -195,7 +199,7 @@ class Surrogate:
             if self._objection(pending) == 0.0:
                 break
             pending = min(pending, self._propose(rng), key=self._objection)
-        if self._is_repeated(pending):
+        if is_seen(pending.point, self._tried):
             pending = self._unseen(rng) or pending
         self._asked += 1
         self._pending[pending.candidate.key] = pending
@@ -207,20 +211,14 @@ class Surrogate:
         Plans and changes have considered the risk, and the evolution strategy waits for each of its points.
         """
         considered = pending.arm in ("dynamics", "changes", "cma")
-        risk = 0.0 if considered else float(self.feasibility.excess(self.layout, pending.point[None])[0])
-        return risk + self._is_repeated(pending)
-
-    def _is_repeated(self, pending: Pending) -> bool:
-        return is_seen(pending.point, self._tried)
+        risk = 0.0 if considered else float(self.feasibility.excess(pending.point[None])[0])
+        return risk + is_seen(pending.point, self._tried)
 
     def _unseen(self, rng: np.random.Generator) -> Pending | None:
         """Return a random point that has not been simulated; None if all draws have been."""
         points = self.layout.settled(rng.random((_DRAWS, self.layout.dimension)))
-        tried = self._tried
-        point = next((p for p in points if not is_seen(p, tried)), None)
-        return (
-            None if point is None else self._made("random", point, "random: all other ideas were simulated")
-        )
+        tried, why = self._tried, "random: all other ideas were simulated"
+        return next((self._made("random", p, why) for p in points if not is_seen(p, tried)), None)
 
     @property
     def _tried(self) -> Array:
@@ -249,9 +247,9 @@ class Surrogate:
                 return self._made(arm, point, "random: too few simulations to learn from yet")
             case "levels":
                 idea = self._explorer.propose_lower(rng)
-                return self._made(arm, idea.point, idea.why)
+                return self._made(arm, idea.point, idea.rationale)
         idea = self._explorer.propose(rng, aimed=arm == "context")
-        why = f"levels of the context files: {idea.why}" if arm == "context" else idea.why
+        why = f"levels of the context files: {idea.rationale}" if arm == "context" else idea.rationale
         return self._made(arm, idea.point, why)
 
     def _asked_of(self, arm: str, engine: BoxEngine) -> Pending:
@@ -262,13 +260,11 @@ class Surrogate:
             known = next((s for s in self.history.samples if is_seen(point, s.point[None])), None)
             if known is None:
                 break
-            verdict = Verdict(known.robustness, 0.0, "")
-            engine.tell([Evaluation(candidate, verdict=verdict)])
+            engine.tell([Evaluation(candidate, verdict=Verdict(known.robustness, 0.0, ""))])
         return Pending(arm, replace(candidate, origin=self.name), point)
 
-    def _made(self, arm: str, point: Array, why: str, forecast: Forecast | None = None) -> Pending:
-        candidate = self.layout.candidate(point, origin=self.name, rationale=why)
-        return Pending(arm, candidate, point, forecast)
+    def _made(self, arm: str, point: Array, why: str) -> Pending:
+        return Pending(arm, self.layout.candidate(point, origin=self.name, rationale=why), point)
 
     def _choose(self, rng: np.random.Generator) -> str:
         """Choose among the arms that can propose something now."""
@@ -302,67 +298,71 @@ class Surrogate:
         return self._made("switching", switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
-        settings, samples = self.settings, self.history.samples
-        order = self.history.by_scaled_cost()
-        self.forecaster = self._fitted(order, rng)
-        cost = self.history.scaled_cost()
-        suggested = np.array(self._suggested).reshape(-1, self.layout.dimension)
+        order, cost = self.history.by_scaled_cost(), self.history.scaled_cost()
+        dynamics, weight = self._fitted(order, rng), self.settings.risk_weight
+
+        def predict(points: Array) -> Array:
+            return cost.cost(self._margins(dynamics, points)) + weight * self.feasibility.excess(points)
+
+        elites = [self.history.samples[i] for i in order[:_ELITES]]
+        points = [*self._suggested, *(e.point for e in elites)]
+        critical = [*(1.0 for _ in self._suggested), *(e.critical for e in elites)]
         self._suggested = []
-        elites = [samples[i] for i in order[: settings.elites]]
         point = plan(
-            self._with_risk(self.forecaster.predictor(cost)),
+            predict,
             self.layout,
-            elites=np.concatenate([suggested, [e.point for e in elites]]),
-            critical=np.array([*(1.0 for _ in suggested), *(e.critical for e in elites)]),
+            elites=np.array(points),
+            critical=np.array(critical),
             seen=self._tried,
-            settings=self._plan_settings(len(cost.outputs)),
+            outputs=len(self.history.outputs),
+            settings=self.settings,
             rng=rng,
         )
-        forecast = self.forecaster.forecast(cost, point)
-        why = f"the learnt dynamics predict a scaled robustness of {forecast.cost:.3g}"
-        return self._made("dynamics", point, why, forecast)
+        predicted = self._margins(dynamics, point[None])
+        lowest = float(cost.cost(predicted)[0])
+        why = f"the learnt dynamics predict a scaled robustness of {lowest:.3g}"
+        return replace(self._made("dynamics", point, why), predicted=predicted)
 
     def _push(self, rng: np.random.Generator) -> Pending:
         """Plan what drives an output further than before."""
-        samples, push = self.history.samples, self._pushes.next(rng)
-        order, critical = by_height(push, samples, self.grid.cells)
-        forecaster, elites = self._fitted(order, rng), order[: self.settings.elites]
+        push, cells = self._pushes.next(rng), self.grid.cells
+        heights = np.array([push.heights(s.trace.states[: cells + 1]) for s in self.history.samples])
+        order = np.argsort(-heights.max(axis=1), kind="stable").tolist()
+        dynamics, elites = self._fitted(order, rng), order[:_ELITES]
 
         def predict(points: Array) -> Array:
-            return np.asarray(-push.heights(forecaster.outputs(points, self.grid)).max(axis=1))
+            states = dynamics.predict(self.layout.inputs(points, self.grid))
+            return np.asarray(-push.heights(states).max(axis=1))
 
         point = plan(
             predict,
             self.layout,
             elites=self.history.points[elites],
-            critical=critical[elites],
+            critical=np.argmax(heights[elites], axis=1) / cells,
             seen=self._tried,
-            settings=self._plan_settings(len(self.history.outputs)),
+            outputs=len(self.history.outputs),
+            settings=self.settings,
             rng=rng,
         )
         return replace(self._made("push", point, str(push)), push=push)
 
-    def _plan_settings(self, outputs: int) -> Settings:
-        settings = self.settings
-        share = min(1.0, settings.most_signals / (outputs + len(self.layout.groups)))
-        pool, children = (max(round(share * n), settings.parents) for n in (settings.pool, settings.children))
-        return replace(settings, pool=pool, children=children)
+    def _fitted(self, order: Sequence[int], rng: np.random.Generator) -> LinearDynamics:
+        """Return dynamics fitted to the best and the latest simulations."""
+        samples = self.history.samples
+        latest = range(max(0, len(samples) - _MOST_TRACES), len(samples))
+        kept = list(dict.fromkeys([*order[: _MOST_TRACES // 3], *reversed(latest)]))[:_MOST_TRACES]
+        base = min(int(rng.exponential(_MEAN_RANK)), len(kept) - 1)
+        return LinearDynamics([samples[i].trace for i in kept], base, rng)
 
-    def _fitted(self, order: Sequence[int], rng: np.random.Generator) -> Forecaster:
-        """Return the forecaster fitted to the best and the latest simulations."""
-        samples, most = self.history.samples, self.settings.most_traces
-        latest = range(max(0, len(samples) - most), len(samples))
-        kept = list(dict.fromkeys([*order[: most // 3], *reversed(latest)]))[:most]
-        # Around the very best alone, the same wrong prediction would be made again and again.
-        base = min(int(rng.exponential(self.settings.base_rank)), len(kept) - 1)
-        return self.forecaster.fitted([samples[i].trace for i in kept], base, rng)
+    def _margins(self, dynamics: LinearDynamics, points: Array) -> Margins:
+        """Return the predicted margins of points, shape (m, d)."""
+        inputs = self.layout.inputs(points, self.grid)
+        return self.history.scaled_cost().margins(dynamics.predict(inputs), inputs)
 
-    def _with_risk(self, predict: Callable[[Array], Array]) -> Callable[[Array], Array]:
-        """Return predicted costs that also count the risk of a failure, if there has been one."""
-        if not self.feasibility.has_failures:
-            return predict
-        weight = self.settings.risk_weight
-        return lambda points: predict(points) + weight * self.feasibility.excess(self.layout, points)
+    def _is_near_extreme(self, point: Array) -> bool:
+        """Whether each input is constant near a bound."""
+        own = (point[group] for group in self.layout.groups)
+        return all(np.abs(v - np.rint(v[0])).max() <= _NEAR_EXTREME for v in own)
 
     def _change(self, rng: np.random.Generator) -> Pending:
         samples, horizon = self.history.samples, self.grid.step * self.grid.cells
@@ -371,8 +371,8 @@ class Surrogate:
         rest = horizon if self._levels.is_staircase else min(self._windows, default=0.0)
         decided = np.array([s.critical * horizon + rest for s in samples])
         seen = Seen(self.history.points, self.history.robustness, decided)
-        risk = partial(self.feasibility.excess, self.layout) if self.feasibility.has_failures else None
-        point, why = propose_change(seen, self.layout, self.settings, rng, risk)
+        draws = max(self.settings.retries, 1) if self.feasibility.has_failures else 1
+        point, why = propose_change(seen, self.layout, rng, self.feasibility.excess, draws=draws)
         return self._made("changes", point, why)
 
 

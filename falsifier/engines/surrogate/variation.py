@@ -16,6 +16,9 @@ _POINT_TO_BOUND, _POINT_STEPPED = 0.1, 0.95
 _STEPS = (0.3, 0.1, 0.03)
 # Maximum shift in time, as a share of the horizon.
 _REACH = 0.05
+# Of what is tried without a plan, the maximum number of pieces of a random point, and the probability that a
+# level of it, or of a constant end, is a bound.
+_PIECES, _AT_BOUND = 6, 0.8
 
 Bools = NDArray[np.bool_]
 
@@ -83,7 +86,7 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
     return layout.settled(point)
 
 
-def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds: float) -> Array:
+def paced(layout: Layout, rng: np.random.Generator) -> Array:
     """Return one point: all inputs change together and keep their last levels; shape (d,).
 
     Together means at the same share of the control points of each, which is the same time if these cover the
@@ -91,39 +94,26 @@ def paced(layout: Layout, rng: np.random.Generator, most_pieces: int, at_bounds:
 
     Each order of magnitude of a piece's length is equally likely, so that short pulses, after which nothing
     changes any more, are as likely as slow changes. Parameters get any values: extremes are tried anyway.
-
-    Args:
-        layout: layout of the point.
-        rng: random generator.
-        most_pieces: maximum number of pieces; each number is equally likely.
-        at_bounds: probability that a level is a bound.
     """
-    pieces = int(rng.integers(1, most_pieces + 1))
+    pieces = int(rng.integers(1, _PIECES + 1))
     cells = max((len(group) for group in layout.groups), default=1)
     ends = np.cumsum(np.exp(rng.random(pieces - 1) * np.log(cells)) // 1) / cells
     point = rng.random(layout.dimension)
     for group in layout.groups[: len(layout.codings)]:
-        levels = _levels(rng, pieces, at_bounds=rng.random(pieces) < at_bounds)
+        levels = _levels(rng, pieces, at_bounds=rng.random(pieces) < _AT_BOUND)
         point[group] = levels[np.searchsorted(ends, np.arange(len(group)) / len(group), side="right")]
     return layout.settled(point)
 
 
-def held_from(
-    layout: Layout, rng: np.random.Generator, points: Array, until: Array, at_bounds: float
-) -> Array:
-    """Return a copy of the points in which all inputs are constant from a random time on; shape (m, d).
+def held_from(layout: Layout, rng: np.random.Generator, points: Array, until: Array) -> Array:
+    """Return a copy of the points, shape (m, d), in which all inputs are constant from a random time on.
 
-    Args:
-        layout: layout of the points.
-        rng: random generator.
-        points: shape (m, d).
-        until: latest time in s at which the constant end begins, shape (m,).
-        at_bounds: probability that a constant is a bound.
+    That time is at most ``until``, in s, shape (m,).
     """
     result = points.copy()
     starts = rng.random(len(points)) * np.minimum(until, layout.starts.max(initial=0.0))
     for group in layout.groups[: len(layout.codings)]:
-        levels = _levels(rng, len(points), at_bounds=rng.random(len(points)) < at_bounds)
+        levels = _levels(rng, len(points), at_bounds=rng.random(len(points)) < _AT_BOUND)
         is_end = layout.starts[group] >= starts[:, None]
         result[:, group] = np.where(is_end, levels[:, None], points[:, group])
     return layout.settled(result)

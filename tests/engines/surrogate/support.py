@@ -3,13 +3,10 @@
 import numpy as np
 
 from falsifier.engines.layout import TimeGrid, planning_layout
-from falsifier.engines.surrogate import Settings
 from falsifier.engines.surrogate.history import History
 from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
-
-SETTINGS = Settings()
 
 
 def history_of(problem: Problem, *, simulations: int, seed: int = 0) -> History:

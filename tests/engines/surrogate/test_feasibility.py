@@ -19,19 +19,19 @@ def diverges(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return lag(times, inputs, parameters)
 
 
-def learned(points: Points, failed: Sequence[bool]) -> tuple[Feasibility, Points]:
+def learned(points: Points, failed: Sequence[bool]) -> Points:
     problem = lag_problem(points=1)
     grid = TimeGrid.over(10.0, 10.0, cells=10, shortest=0.1)
     layout = planning_layout(problem.space, grid)
-    feasibility = Feasibility(grid)
+    feasibility = Feasibility(layout, grid)
     for point, bad in zip(points, failed, strict=True):
-        feasibility.add(layout, point, failed=bad)
-    return feasibility, feasibility.risk(layout, np.array([[0.0], [0.25], [0.75], [1.0]]))
+        feasibility.add(point, failed=bad)
+    return feasibility.risk(np.array([[0.0], [0.25], [0.75], [1.0]]))
 
 
 def test_the_risk_grows_towards_failures() -> None:
     points = np.linspace(0.0, 1.0, 9)[:, None]
-    _, risk = learned(points, [bool(p > 0.6) for p in points[:, 0]])
+    risk = learned(points, [bool(p > 0.6) for p in points[:, 0]])
     assert (np.diff(risk) > 0).all()
     assert risk[0] < 0.1 < 0.5 < risk[2]
 

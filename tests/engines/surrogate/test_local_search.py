@@ -13,7 +13,6 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 from falsifier.testing import FREE, START, lag, lag_problem
-from tests.engines.surrogate.support import SETTINGS
 
 
 def layout_of(cells: int = 100) -> Layout:
@@ -31,7 +30,7 @@ def test_the_best_are_changed_before_the_time_that_decided() -> None:
     history = seen(points, list(range(9)), 3.0)
     parents = []
     for _ in range(60):
-        point, why = propose_change(history, layout, SETTINGS, rng)
+        point, why = propose_change(history, layout, rng, lambda points: np.zeros(len(points)), draws=1)
         if why.startswith("random"):
             continue
         same = (np.abs(points - point) < 1e-9).mean(axis=1)
@@ -48,7 +47,7 @@ def test_risky_changes_are_avoided() -> None:
     def risk(points: Array) -> Array:
         return np.asarray(points.max(axis=1))
 
-    highest = [float(propose_change(history, layout, SETTINGS, rng, risk)[0].max()) for _ in range(40)]
+    highest = [float(propose_change(history, layout, rng, risk, draws=12)[0].max()) for _ in range(40)]
     assert np.mean(highest) < 0.75
 
 

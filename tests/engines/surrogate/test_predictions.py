@@ -12,7 +12,7 @@ from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import Monitor, parse
 from falsifier.testing import FREE, START, lag_problem
-from tests.engines.surrogate.support import SETTINGS, history_of
+from tests.engines.surrogate.support import history_of
 
 STEP, CELLS = 0.5, 40
 
@@ -57,7 +57,7 @@ def test_windows_between_grid_points_are_rounded(text: str) -> None:
 def test_dynamics_predict_an_unseen_input_from_a_few_trajectories() -> None:
     history = history_of(lag_problem(free=FREE, inputs=2, parameters=[START]), simulations=12)
     traces = [s.trace for s in history.samples]
-    fitted = LinearDynamics(traces[:-2], 0, SETTINGS, np.random.default_rng(0))
+    fitted = LinearDynamics(traces[:-2], 0, np.random.default_rng(0))
     for trace in traces[-2:]:
         predicted = fitted.predict(trace.inputs[None, :50])[0, :, 0]
         true = trace.states[:51, 0]
