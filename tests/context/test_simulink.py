@@ -216,6 +216,19 @@ def test_what_is_no_model_is_an_error(tmp_path: Path, text: str, message: str) -
 
 
 @pytest.mark.parametrize(
+    "parents", [[(3, 2), (2, 2)], [(3, 2), (4, 3), (3, 4)], [(k, k - 1) for k in range(3, 2000)]]
+)
+def test_states_may_be_in_each_other_and_nested_deep(parents: list[tuple[int, int]]) -> None:
+    states = (
+        f"state {{\nid {number}\nlabelString S\ntreeNode [{parent} 0 0 0]\n}}\n" for number, parent in parents
+    )
+    (chart,) = read_charts(
+        sections.parse_mdl(f"Stateflow {{\nchart {{\nid 2\n}}\n{''.join(states)}}}\n", "a.mdl")
+    )
+    assert {s.name.rpartition(".")[2] for s in chart.states} == {"S"}
+
+
+@pytest.mark.parametrize(
     ("name", "text", "message"),
     [
         ("simulink/systems/system_4.xml", "<System><Block", "system_4.xml: not well-formed XML"),

@@ -36,16 +36,21 @@ def read_charts(tree: Node) -> Iterator[Chart]:
         beside.setdefault(_parent(child), []).append(child)
     for node in tree.walk():
         if node.kind == "chart":
-            yield _chart(node, list(_items(node, "", beside)))
+            yield _chart(node, list(_items(node, beside)))
 
 
-def _items(around: Node, parent: str, beside: Mapping[str, list[Node]]) -> Iterator[_Item]:
-    number = around.get("id")
-    for child in (*around.children, *(beside.get(number, ()) if number else ())):
-        if child.kind in _KINDS:
-            key = child.get("SSID", "id")
-            yield _Item(child, key, parent)
-            yield from _items(child, key, beside)
+def _items(chart: Node, beside: Mapping[str, list[Node]]) -> Iterator[_Item]:
+    waiting = [_Item(chart, "", "")]
+    seen = {""}  # numbers; what a damaged file puts into itself is not followed again
+    while waiting:
+        around = waiting.pop()
+        if around.node is not chart:
+            yield around
+        number = around.node.get("id")
+        listed = () if number in seen else beside.get(number, ())
+        seen.add(number)
+        inner = [child for child in (*around.node.children, *listed) if child.kind in _KINDS]
+        waiting += [_Item(child, child.get("SSID", "id"), around.key) for child in reversed(inner)]
 
 
 def _parent(node: Node) -> str:
