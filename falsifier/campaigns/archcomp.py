@@ -113,7 +113,7 @@ class Row(BaseModel):
     number: int
     requirement: Annotated[str, BeforeValidator(_our_name)] = Field(alias="property")
     instance: Literal["1", "2"] = "1"
-    input: Annotated[Matrix, BeforeValidator(_matrix)]
+    input: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
     parameters: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
     falsified: bool = False
     simulations: int = Field(ge=0)
@@ -241,7 +241,7 @@ def _matrix_text(matrix: Matrix) -> str:
 def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
     stated = {name: text.strip() for name, text in cells.items() if name and text and text.strip()}
     try:
-        return Row.model_validate({"number": number} | stated)
+        return Row.model_validate(stated | {"number": number})
     except ValidationError as error:
         first = error.errors()[0]
         told = rejected(first["msg"], first["input"])

@@ -87,6 +87,11 @@ def test_unreadable_cells_name_their_row(tmp_path: Path) -> None:
             read_rows(rows(tmp_path, f'S,HARD,1,"[0 1]",[],yes,{number},1,1,-0.4,10'))
 
 
+def test_rows_without_a_counterexample_need_no_input(tmp_path: Path) -> None:
+    (row,) = read_rows(rows(tmp_path, "S,HARD,1,,,no,1500,1,1,,10"))
+    assert (row.input.size, row.falsified, row.simulations) == (0, False, 1500)
+
+
 def test_another_table_is_told_from_a_validation_file(tmp_path: Path) -> None:
     (tmp_path / "all.csv").write_text("requirement,method,robustness\nHARD,corners,1.0\n")
     with pytest.raises(SpecError, match=r"all\.csv: expected .* ARCH-COMP .* missing: property, input"):
