@@ -72,16 +72,16 @@ def run_campaign(
         ModelError: if an FMU cannot be used.
     """
     jobs = whole("jobs", jobs, least=1)
-    hashes = check_request(request)
+    problems = check_request(request)
     with campaign_lock(directory):
         if is_campaign(directory):
             raise JournalError(
                 f"{directory} already contains a campaign: choose another --out, or to continue it: "
                 f"falsifier resume {directory}"
             )
-        record = CampaignRecord(**environment(), request=request, hashes=hashes)
+        record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
-        return _work(directory, record, jobs, tuple(listeners))
+        return _work(directory, record, problems, jobs, tuple(listeners))
 
 
 def resume_campaign(
@@ -107,15 +107,22 @@ def resume_campaign(
     jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
-        check_unchanged(directory, record.hashes, _hashes(_load(record.runs.values())))
+        problems = _load(record.runs.values())
+        check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
             )
-        return _work(directory, record, jobs, tuple(listeners))
+        return _work(directory, record, problems, jobs, tuple(listeners))
 
 
-def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[Listener, ...]) -> CampaignEnd:
+def _work(
+    directory: Path,
+    record: CampaignRecord,
+    problems: Mapping[ProblemSource, Problem],
+    jobs: int,
+    listeners: tuple[Listener, ...],
+) -> CampaignEnd:
     stop = directory / STOP
     stop.unlink(missing_ok=True)
     limits, follower, began, reason = record.request.limits, Follower(directory), perf_counter(), ""
@@ -145,13 +152,15 @@ def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[L
     def report(task: RunTask, failure: str) -> None:
         place = run_directory(directory, task.name)
         if failure:
-            _record_failure(place, task.request, failure)
+            _record_failure(place, task, failure)
         keep_recorded(place)
 
-    tasks = []
+    tasks, hashes = [], {source: file_hashes(problem) for source, problem in problems.items()}
     for run in follower.look().runs:
         if not run.finished:
-            tasks.append(RunTask(run.name, record.runs[run.name], directory.absolute(), record.hashes))
+            request = record.runs[run.name]
+            source = request.problems[0]
+            tasks.append(RunTask(run.name, request, problems[source], hashes[source], directory.absolute()))
         elif run.falsified:  # its counterexample is missing if the process was killed just after it ended
             keep_recorded(run_directory(directory, run.name))
     with open_workers(jobs) as workers:
@@ -168,11 +177,11 @@ def _work(directory: Path, record: CampaignRecord, jobs: int, listeners: tuple[L
     return CampaignEnd(progress, reason)
 
 
-def check_request(request: CampaignRequest) -> dict[str, str]:
+def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
     """Check names and keys, load all problems and read their context files before anything is written.
 
     Returns:
-        SHA-256 of all FMUs and specs, by path.
+        The problems, without what context files say.
 
     Raises:
         SpecError: for an unknown engine or prompt variant, or a problem or context file that is not valid.
@@ -192,7 +201,7 @@ def check_request(request: CampaignRequest) -> dict[str, str]:
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})
-    return _hashes(problems)
+    return problems
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
@@ -217,13 +226,13 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
     return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
 
 
-def _record_failure(directory: Path, request: RunRequest, reason: str) -> None:
+def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     """Record in a run's journal why it failed, if its worker could not do so."""
     (summary,) = RunFollower(directory, [Summary()]).look()
     if summary.status not in ("waiting", "running"):
         return
-    with open_journal(directory, keep=request.keep, patience=_PATIENCE) as journal:
+    with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
         if not holds_run(directory):
-            problem = load_source(request.problems[0])
-            write(directory, describe(request, [problem], method_of(request).label))
+            method = method_of(task.request).label
+            write(directory, describe(task.request, [task.problem], method, task.hashes))
         journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent))

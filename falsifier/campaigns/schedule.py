@@ -9,9 +9,8 @@ from pathlib import Path
 from falsifier.campaigns.directory import run_directory
 from falsifier.errors import FalsifierError
 from falsifier.evaluation.workers import LastingExecutor
-from falsifier.problem.loading import load_sources
+from falsifier.problem.problem import Problem
 from falsifier.record.journal import STOP
-from falsifier.record.manifest import check_unchanged, file_hashes
 from falsifier.record.run import StopFile, carry_out
 from falsifier.search.request import RunRequest
 
@@ -28,14 +27,16 @@ class RunTask:
     Attributes:
         name: name of the run.
         request: what to run.
+        problem: what is searched, as it was when the campaign was started: its spec may change meanwhile.
+        hashes: SHA-256 of its files then, by path.
         campaign: directory of the campaign.
-        hashes: SHA-256 of the campaign's files when it was started, by path.
     """
 
     name: str
     request: RunRequest
-    campaign: Path
+    problem: Problem
     hashes: dict[str, str]
+    campaign: Path
 
 
 Report = Callable[[RunTask, str], None]
@@ -43,17 +44,12 @@ Tick = Callable[[], bool]
 
 
 def run_task(task: RunTask) -> None:
-    """Carry out one run, or resume it; what comes of it stands in its journal.
-
-    Raises:
-        JournalError: if an FMU or spec differs from when the campaign was started.
-    """
-    problems = load_sources(task.request.problems)
-    check_unchanged(task.campaign, task.hashes, file_hashes(problems[0]))
+    """Carry out one run, or resume it; what comes of it stands in its journal."""
     carry_out(
         task.request,
-        problems,
+        [task.problem],
         run_directory(task.campaign, task.name),
+        hashes=task.hashes,
         listeners=[StopFile(task.campaign / STOP)],
         resume=True,
         patience=_PATIENCE,

@@ -169,8 +169,17 @@ def write(directory: Path, manifest: Manifest) -> None:
     write_sealed(directory / MANIFEST, manifest)
 
 
-def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> Manifest:
-    """Make the manifest of a run before it starts."""
+def describe(
+    request: RunRequest, problems: Sequence[Problem], engine: str, hashes: dict[str, str] | None = None
+) -> Manifest:
+    """Make the manifest of a run before it starts.
+
+    Args:
+        request: what to run.
+        problems: what is searched; they differ only in their requirement.
+        engine: name of the engine.
+        hashes: of the files when the problems were loaded, see file_hashes; None: as they are now.
+    """
     problem = problems[0]
     space = problem.space
     levels = levels_of(request, space)
@@ -195,7 +204,7 @@ def describe(request: RunRequest, problems: Sequence[Problem], engine: str) -> M
         stop_time=space.stop_time,
         allow=tuple(getattr(problem.model, "allow", ())),
         deny=tuple(getattr(problem.model, "deny", ())),
-        hashes=file_hashes(problem),
+        hashes=file_hashes(problem) if hashes is None else hashes,
         contexts={p.name: p.context for p in problems if p.context != Context()},
     )
 

@@ -251,6 +251,7 @@ def carry_out(
     problems: Sequence[Problem],
     directory: Path | None,
     *,
+    hashes: dict[str, str] | None = None,
     engine: Engine | None = None,
     chat: Chat | None = None,
     listeners: Iterable[Listener] = (),
@@ -263,6 +264,7 @@ def carry_out(
         request: what to run.
         problems: what is searched; they differ only in their requirement.
         directory: run directory; None: no record.
+        hashes: of the files when the problems were loaded; None: as they are now.
         engine: the engine, if it was made in Python.
         chat: chat with the language model, if it was made in Python.
         listeners: called with every event.
@@ -297,7 +299,7 @@ def carry_out(
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         all_listeners = tuple(listeners)
         if directory is not None:
-            described = manifest.describe(request, told, engines[0].name)
+            described = manifest.describe(request, told, engines[0].name, hashes)
             if recorded is not None:
                 manifest.check_unchanged(directory, recorded.hashes, described.hashes)
                 manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)

@@ -1,3 +1,4 @@
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from falsifier.campaigns import (
     resume_campaign,
     run_campaign,
 )
+from falsifier.campaigns.analysis import load as load_runs
 from falsifier.campaigns.directory import campaign_lock
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.store import load, replay
@@ -111,19 +113,38 @@ def test_another_worker_error_is_a_failed_run_in_its_journal(
     assert (run.status, run.reason) == ("failed", "RuntimeError: no memory")
 
 
-def test_a_changed_model_is_refused(tmp_path: Path) -> None:
-    spec = tmp_path / "lag.toml"
-    directory = tmp_path / "c"
-    fmu = Path(__file__).resolve().parents[2] / "fmus" / "AT.fmu"
-    spec.write_text(
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    file, fmu = tmp_path / "lag.toml", Path(__file__).resolve().parents[2] / "fmus" / "AT.fmu"
+    file.write_text(
         f'[model]\nfmu = "{fmu}"\ninterface = "co-simulation"\nstop_time = 1.0\noutput_interval = 0.1\n'
         "[inputs.throttle]\ncontrol_points = 1\n[requirements.R]\nformula = 'G[0,1] (speed <= -1)'\n"
     )
+    return file
+
+
+def of_spec(spec: Path) -> CampaignRequest:
     runs = cross([ProblemSource(target=f"{spec}:R")], ["uniform"], seeds=[0], budget=Budget(1))
-    run_campaign(CampaignRequest(runs=runs), directory)
+    return CampaignRequest(runs=runs)
+
+
+def test_a_changed_model_is_refused(spec: Path, tmp_path: Path) -> None:
+    directory = tmp_path / "c"
+    run_campaign(of_spec(spec), directory)
     spec.write_text(spec.read_text() + "# changed\n")
     with pytest.raises(JournalError, match=r"lag\.toml has changed"):
         resume_campaign(directory)
+
+
+def test_a_campaign_at_work_goes_on_with_the_spec_that_it_was_started_with(
+    spec: Path, tmp_path: Path
+) -> None:
+    directory, text = tmp_path / "c", spec.read_text()
+    end = run_campaign(of_spec(spec), directory, listeners=[lambda _: spec.unlink(missing_ok=True)])
+    assert end.progress.counts == {"falsified": 1}
+    spec.write_text(text)
+    (run,) = load_runs(directory)
+    assert run.manifest.hashes[str(spec)] == sha256(text.encode()).hexdigest()
 
 
 def test_requirements_of_the_same_name_are_refused(tmp_path: Path) -> None:

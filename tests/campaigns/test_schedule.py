@@ -14,6 +14,7 @@ from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.source import ProblemSource
 from falsifier.search.request import RunRequest
 from tests.patience import HANG
+from tests.problems import easy
 
 REQUEST = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"),))
 
@@ -21,7 +22,7 @@ REQUEST = RunRequest(problems=(ProblemSource(target="python:tests.problems:easy"
 def run(names: str, workers: list[LastingExecutor]) -> dict[str, str]:
     """Carry out a run per letter; return why it failed, in the order in which they ended."""
     done: dict[str, str] = {}
-    tasks = [RunTask(name, REQUEST, Path("unused"), {}) for name in names]
+    tasks = [RunTask(name, REQUEST, easy(), {}, Path("unused")) for name in names]
     Schedule(tasks, workers).run(lambda t, failure: done.__setitem__(t.name, failure), lambda: True)
     return done
 
