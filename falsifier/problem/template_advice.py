@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from falsifier.core.literals import toml_string
 from falsifier.core.model import ModelInfo
-from falsifier.fmu.description.structure import Units
+from falsifier.fmu.description.structure import Units, is_known
 from falsifier.problem.template_arguments import tidy
 from falsifier.problem.templates import TEMPLATES
 from falsifier.problem.unit_check import factor_and_offset, spelled
@@ -173,6 +173,8 @@ def _arguments(template: str, said: re.Match[str], info: ModelInfo, units: Units
             signal, own = _signal(words, info)
             found[key] = toml_string(signal)
             unit = own if kind == "signal" else unit
+    if {"low", "high"} <= found.keys() and float(found["low"]) > float(found["high"]):
+        raise _UnplacedError
     if "later" in found:
         found = {"conditions": f"[{found['first']}, {found['later']}]"}
     if "after" in found and template in _NEEDED_AFTER:
@@ -194,6 +196,8 @@ def _number(kind: str, words: str, own: str | None, units: Units) -> str:
     if kind == "rate":
         unit, _, per = re.sub(r"(?:^| )per ", "/", unit).rpartition("/")
         value /= _seconds(spelled(per))
+    if unit and not own and not is_known(unit, units):
+        raise _UnplacedError  # a word that is no unit, such as "mostly", says something else
     # Of a signal without a unit 5 % may be 5 or 0.05.
     is_plain = not unit or own is None or (not own and unit != "%")
     converted = (1.0, 0.0) if is_plain else factor_and_offset(unit, own or "", units)

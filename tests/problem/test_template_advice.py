@@ -83,6 +83,8 @@ def test_numbers_are_in_their_places_and_in_the_unit_of_the_model(sentence: str)
         "The speed stays within 5 m of the target.",  # of another kind than the speed
         "The speed is at most 50 m.",
         "The brake is at most 5 %.",  # 5 or 0.05?
+        "The brake is at most 5 mostly.",
+        "The speed is between 20 and 10.",
         "The speed exceeds 120.",  # not a limit
         "The speed is below 20 in 3 s.",
         "If the gate is open, the speed stays below 20.",
