@@ -171,11 +171,6 @@ def line_of_held_secret(text: str) -> int | None:
     return None
 
 
-def holds_secrets(environment: Mapping[str, str]) -> bool:
-    """Whether an environment contains anything that ``scrubbed`` would remove."""
-    return len(scrubbed(environment)) < len(environment)
-
-
 def scrubbed(environment: Mapping[str, str]) -> dict[str, str]:
     """Return the environment without variables whose name or value looks like a secret."""
     return {

@@ -67,7 +67,9 @@ class Token:
     Attributes:
         kind: its kind.
         text: the number, the signal's name in the model, or the canonical spelling of a symbol or reserved
-        word. written: the text as written in the formula. position: position of its first character, from 0.
+            word.
+        written: the text as written in the formula.
+        position: position of its first character, from 0.
     """
 
     kind: Literal["number", "name", "symbol", "end"]

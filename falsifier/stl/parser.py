@@ -17,7 +17,7 @@ Operators, lowest precedence first::
 
 So ``G[0,5] x <= 3 -> y <= 1`` means ``(G[0,5] (x <= 3)) -> (y <= 1)``. Windows are closed intervals, in
 seconds unless each bound has a unit (``us ms s min h``); an operator without a window extends to the stop
-time. A signal on its own is Boolean: ``b`` means ``b >= 0.5``. Names: see ``falsifier.stl.names``.
+time. A signal on its own is Boolean: ``b`` means ``b >= 0.5``. Names: see ``falsifier.stl.lexer``.
 """
 
 import math
@@ -93,6 +93,7 @@ _RIGHT_ASSOCIATIVE = {"->", "U", "^"}
 _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
     "<->": Iff, "->": Implies, "or": Or, "and": And,
 }  # fmt: skip
+_PREFIXES: dict[str, Callable[..., Formula]] = {"not": Not, "X": Next, "G": Always, "F": Eventually}
 _CLOSED = "only closed windows in seconds are supported: [a,b]"
 Node = Formula | Expression
 
@@ -219,27 +220,19 @@ class _Parser:
             return Constant(token.text == "true")
         if token.text in FUNCTIONS:
             return self._call(token)
-        if token.text in ("not", "G", "F", "X"):
+        if token.text in _PREFIXES:
             if level > PREFIX:
                 self._fail(
                     f"{token.shown} starts a formula, but a number or a signal is expected here",
                     token.position,
                     f'is a parenthesis missing? Write a signal of that name as "{token.written}"',
                 )
-            return self._prefix(token)
+            window = (self._window(),) if token.text in "GF" else ()
+            return _PREFIXES[token.text](self._formula_at(PREFIX), *window)
         problem = f"expected a formula, a signal or a number, not {token.shown}"
         if token.kind == "end":
             problem = "the formula ends too early"
         self._fail(problem, token.position, hint_at(self.tokens, self.index - 1))
-
-    def _prefix(self, token: Token) -> Formula:
-        if token.text == "not":
-            return Not(self._formula_at(PREFIX))
-        if token.text == "X":
-            return Next(self._formula_at(PREFIX))
-        window = self._window()
-        operand = self._formula_at(PREFIX)
-        return Always(operand, window) if token.text == "G" else Eventually(operand, window)
 
     def _named(self, token: Token) -> Name:
         if self._next.kind == "symbol" and self._next.position == token.end:

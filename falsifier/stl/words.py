@@ -62,11 +62,11 @@ def _read(formula: Formula, *, later: bool) -> str:
         case Iff(left, right):
             return f"{_part(left, later=later)} exactly when {_part(right, later=later)}"
         case Always(operand, window):
-            return f"{_throughout(window, later=later)}, {_read(operand, later=True)}"
+            return f"{_when(window, later=later, always=True)}, {_read(operand, later=True)}"
         case Eventually(operand, window):
-            return f"{_sometime(window, later=later)}, {_read(operand, later=True)}"
+            return f"{_when(window, later=later)}, {_read(operand, later=True)}"
         case Until(left, right, window):
-            end = _sometime(window, later=later).replace("at some time ", "")
+            end = _when(window, later=later).replace("at some time ", "")
             return f"{_part(left, later=True)} until, {end}, {_part(right, later=True)}"
         case Next(operand):
             return f"at the next recorded time, {_read(operand, later=True)}"
@@ -116,29 +116,17 @@ def _negated(predicate: Predicate) -> str:
     return _predicate(Predicate(OPPOSITE[predicate.operator], predicate.left, predicate.right))
 
 
-def _throughout(window: Window | None, *, later: bool) -> str:
+def _when(window: Window | None, *, later: bool, always: bool = False) -> str:
+    """Say at which times an operand must hold: always within a window, or at some time."""
+    absolute, open_ended, soon = (
+        ("at all times", "from then on", "throughout")
+        if always
+        else ("at some time", "at some later time", "at some time within")
+    )
     if window is None:
-        return "from then on" if later else "at all times"
+        return open_ended if later else absolute
     if window.start == window.end:
-        return _moment(window.start, later=later)
+        return f"{window.start:g} s later" if later else f"at {window.start:g} s"
     if later and window.start == 0:
-        return f"throughout the next {window.end:g} s"
-    return f"at all times {_between(window, later=later)}"
-
-
-def _sometime(window: Window | None, *, later: bool) -> str:
-    if window is None:
-        return "at some later time" if later else "at some time"
-    if window.start == window.end:
-        return _moment(window.start, later=later)
-    if later and window.start == 0:
-        return f"at some time within the next {window.end:g} s"
-    return f"at some time {_between(window, later=later)}"
-
-
-def _between(window: Window, *, later: bool) -> str:
-    return f"from {window.start:g} to {window.end:g} s{' later' if later else ''}"
-
-
-def _moment(time: float, *, later: bool) -> str:
-    return f"{time:g} s later" if later else f"at {time:g} s"
+        return f"{soon} the next {window.end:g} s"
+    return f"{absolute} from {window.start:g} to {window.end:g} s{' later' if later else ''}"

@@ -9,14 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from falsifier.core import posix_files
-from falsifier.core.files import (
-    check_seal,
-    checksum,
-    private_folder,
-    remove_partial,
-    seal,
-    write_whole,
-)
+from falsifier.core.files import check_seal, checksum, private_folder, remove_partial, seal, write_whole
 
 
 def test_text_and_bytes_are_written_into_folders_that_are_made(tmp_path: Path) -> None:

@@ -220,13 +220,6 @@ def test_bad_control_points_are_refused(
         Signal(times, values)
 
 
-def test_switches_and_dwell() -> None:
-    signal = Signal((0.0, 1.0, 1.5, 4.0), (0.0, 1.0, 0.0, 0.0), "constant")
-    assert signal.switches == 2
-    assert signal.shortest_dwell == 0.5
-    assert Signal((0.0,), (1.0,)).shortest_dwell is None
-
-
 RAMP = Signal(tuple(i / 10 for i in range(101)), tuple(i / 100 for i in range(101)), "linear")
 
 

@@ -18,18 +18,7 @@ from falsifier.stl.expression import (
     number_text,
     unit_of,
 )
-from falsifier.stl.formula import (
-    FALSE,
-    TRUE,
-    Constant,
-    Formula,
-    Iff,
-    Implies,
-    Predicate,
-    Until,
-    replaced,
-    without_constants,
-)
+from falsifier.stl.formula import FALSE, TRUE, Constant, Formula, Predicate, replaced, without_constants
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_formula, random_trajectory
 
@@ -162,11 +151,3 @@ def test_robustness_and_critical_time_are_those_of_the_definition_with_infinite_
         assert (verdict.robustness, verdict.critical_time) == (value, at * STEP), (seed, str(written))
         assert second_monitor.robustness(simple, trajectory) == value, (seed, str(written))
     assert judged > 20
-
-
-def test_both_operands_may_be_constant() -> None:
-    for value in (TRUE, FALSE):
-        assert without_constants(Until(TRUE, value)) == value
-        assert without_constants(Until(FALSE, value)) == FALSE
-        assert without_constants(Iff(value, value)) == TRUE
-        assert without_constants(Implies(TRUE, value)) == value

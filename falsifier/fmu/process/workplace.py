@@ -18,7 +18,7 @@ from uuid import uuid4
 from falsifier.core import posix, posix_files
 from falsifier.core.compiler import compile_c
 from falsifier.core.files import cache_directory, checksum, private_folder
-from falsifier.core.secrets import holds_secrets, scrubbed
+from falsifier.core.secrets import scrubbed
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import WINDOWS, extract, file_hash, this_platform
 
@@ -229,7 +229,7 @@ def _protect_secrets(environment: Mapping[str, str]) -> None:
     On Linux, any process could otherwise read the environment of another one of the same user. Without
     secrets, or if FMUs can be confined, this process stays open to debuggers.
     """
-    if holds_secrets(environment) and not posix.can_confine():
+    if scrubbed(environment) != environment and not posix.can_confine():
         posix.hide_memory()
 
 
