@@ -129,13 +129,17 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
 
     For replies of language models, whose words and names may look like keys without being any.
     """
-    held = [v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
+    held = _held()
     held += [part for value in held for part in _credentials_in(value)]
     # Longest first: a secret that contains another one would otherwise be left in pieces.
     for secret in sorted({s.strip() for s in (*secrets, *held)}, key=len, reverse=True):
         if len(secret) >= _SHORTEST:
             text = text.replace(secret, _REDACTED)
     return text
+
+
+def _held() -> list[str]:
+    return [v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
 
 
 def _credentials_in(address: str) -> list[str]:
@@ -163,8 +167,7 @@ def line_of_secret(text: str) -> int | None:
 
 def line_of_held_secret(text: str) -> int | None:
     """Return the number of the first line, from 1, with a secret of this process's environment, or None."""
-    held = [v.strip() for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
-    held = [value for value in held if len(value) >= _SHORTEST and value in text]
+    held = [value for v in _held() if len(value := v.strip()) >= _SHORTEST and value in text]
     for number, line in enumerate(text.splitlines() if held else (), start=1):
         if any(value in line for value in held):
             return number

@@ -59,19 +59,26 @@ def values(expression: Expression, ranges: Mapping[str, Interval]) -> Interval:
 def margins(formula: Formula, ranges: Mapping[str, Interval]) -> Interval:
     """Return bounds of a formula's robustness at any time."""
     if isinstance(formula, Predicate):
-        return _margin(formula, values(formula.left, ranges) - values(formula.right, ranges))
+        found = values(formula.left, ranges) - values(formula.right, ranges)
+        if formula.operator in ("==", "!="):
+            found = _absolute(found)
+        if formula.operator in ("<", "<=", "=="):
+            found = -found
+        at_zero = on_limit(formula.operator)
+        return Interval(found.low or at_zero, found.high or at_zero)
     parts = [margins(child, ranges) for child in formula.children]
-    if isinstance(formula, Not):
-        return -parts[0]
-    if isinstance(formula, And | Until):
-        return _smallest(parts)
-    if isinstance(formula, Or):
-        return _largest(parts)
-    if isinstance(formula, Implies):
-        return _largest([-parts[0], parts[1]])
-    if isinstance(formula, Iff):
-        left, right = parts
-        return _smallest([_largest([-left, right]), _largest([-right, left])])
+    match formula:
+        case Not():
+            return -parts[0]
+        case And() | Until():
+            return _smallest(parts)
+        case Or():
+            return _largest(parts)
+        case Implies():
+            return _largest([-parts[0], parts[1]])
+        case Iff():
+            left, right = parts
+            return _smallest([_largest([-left, right]), _largest([-right, left])])
     return parts[0]
 
 
@@ -88,17 +95,6 @@ def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[
     else:
         for child in formula.children:
             yield from decided(child, ranges)
-
-
-def _margin(predicate: Predicate, difference: Interval) -> Interval:
-    operator, found = predicate.operator, difference
-    if operator in ("<", "<="):
-        found = -difference
-    elif operator in ("==", "!="):
-        distance = _absolute(difference)
-        found = -distance if operator == "==" else distance
-    at_zero = on_limit(operator)
-    return Interval(found.low or at_zero, found.high or at_zero)
 
 
 def _smallest(parts: list[Interval]) -> Interval:
