@@ -30,12 +30,14 @@ from falsifier.stl.formula import (
     Iff,
     Implies,
     Next,
+    Node,
     Not,
     Or,
     Predicate,
     Temporal,
     Until,
     Window,
+    parts_of,
 )
 from falsifier.stl.margins import on_limit
 from falsifier.stl.program import Part, Place, Program
@@ -45,7 +47,6 @@ _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 _ARITHMETIC = OPERATORS | {"^": np.power}
 _NEGATION = op.scaled(-1.0)
 _CONNECTIVES: dict[type[Formula], op.Function] = {Not: _NEGATION, And: np.minimum, Or: np.maximum}
-Node = Formula | Expression
 
 
 def compile_formula(formula: Formula, *, step: float, samples: int, first: int = 0, last: int = 0) -> Program:
@@ -123,7 +124,7 @@ class _Compiler:
                 self._fail_past_end(node, beyond)
             start, end = window_samples(node.window, self.step)
             first, last = first if isinstance(node, Until) else first + start, last + end
-        for part in _parts(node):
+        for part in parts_of(node):
             self.demand(part, first, last)
 
     def _fail_past_end(self, node: Node, last: int) -> None:
@@ -279,9 +280,3 @@ def _constant(node: Expression) -> float:
             f"the constant {node} has no finite value; write a number or correct the expression"
         )
     return value
-
-
-def _parts(node: Node) -> tuple[Node, ...]:
-    if isinstance(node, Expression):
-        return node.operands
-    return (node.left, node.right) if isinstance(node, Predicate) else node.children

@@ -267,6 +267,16 @@ class Until(_Binary):
 Temporal = Always | Eventually | Until
 
 
+Node = Formula | Expression
+
+
+def parts_of(node: Node) -> tuple[Node, ...]:
+    """Return what is directly below a formula or expression: of a comparison, the expressions compared."""
+    if isinstance(node, Expression):
+        return node.operands
+    return (node.left, node.right) if isinstance(node, Predicate) else node.children
+
+
 def negated(formula: Formula) -> Formula:
     """Return what holds if a formula does not: the opposite comparison where there is one."""
     if isinstance(formula, Not):

@@ -28,7 +28,6 @@ _QUOTED_PATTERN = re.compile(r'"((?:[^"\\]|\\.)+)"', re.DOTALL)
 
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
-_SPACE = re.compile(r"\s*")
 _SPELLINGS = {
     "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
     "always": "G", "eventually": "F", "until": "U", "next": "X",
@@ -95,10 +94,13 @@ def tokenize(text: str) -> list[Token]:
         FormulaError: pointing at a character that cannot start a token.
     """
     tokens: list[Token] = []
-    position = _after_space(text, 0)
+    position = 0
     while position < len(text):
-        tokens.append(_token(text, position))
-        position = _after_space(text, tokens[-1].end)
+        if text[position].isspace():
+            position += 1
+        else:
+            tokens.append(_token(text, position))
+            position = tokens[-1].end
     return [*tokens, Token("end", "", "", len(text.rstrip()))]
 
 
@@ -168,11 +170,6 @@ def _token(text: str, position: int) -> Token:
         text[position], "it has no meaning in a formula; put names that contain it in double quotes"
     )
     raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
-
-
-def _after_space(text: str, position: int) -> int:
-    space = _SPACE.match(text, position)
-    return space.end() if space else position
 
 
 # -- names -----------------------------------------------------------------------------------------------

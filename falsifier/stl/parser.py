@@ -58,11 +58,13 @@ from falsifier.stl.formula import (
     Iff,
     Implies,
     Next,
+    Node,
     Not,
     Or,
     Predicate,
     Until,
     Window,
+    parts_of,
     without_constants,
 )
 from falsifier.stl.lexer import (
@@ -95,7 +97,6 @@ _CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
 }  # fmt: skip
 _PREFIXES: dict[str, Callable[..., Formula]] = {"not": Not, "X": Next, "G": Always, "F": Eventually}
 _CLOSED = "only closed windows in seconds are supported: [a,b]"
-Node = Formula | Expression
 
 
 def parse(text: str) -> Formula:
@@ -373,8 +374,5 @@ def _depth(formula: Formula) -> int:
     while below:
         node, depth = below.pop()
         deepest = max(deepest, depth)
-        parts: tuple[Node, ...] = node.children if isinstance(node, Formula) else node.operands
-        if isinstance(node, Predicate):
-            parts = (node.left, node.right)
-        below.extend((part, depth + 1) for part in parts)
+        below.extend((part, depth + 1) for part in parts_of(node))
     return deepest
