@@ -114,7 +114,8 @@ class Refining:
         for evaluation in self._best:
             if self._expresses(evaluation.candidate):
                 continue
-            copy = _copy(self._stage.space, evaluation.candidate)
+            why = f"one of the best samples so far, in finer pieces: {evaluation.candidate.rationale}"
+            copy = replace(fit(self._stage.space, evaluation.candidate).candidate, rationale=why)
             if _same(copy) in self._earlier:
                 known.append(replace(evaluation, candidate=copy))
             elif len(self._copies) < COPIES:
@@ -156,11 +157,6 @@ class Refining:
                 self._constant.setdefault(_same(evaluation.candidate), evaluation)
         judged = [e for e in (*self._best, *evaluations) if e.robustness is not None]
         self._best = sorted(judged, key=lambda e: e.robustness or 0.0)[:_KEPT]
-
-
-def _copy(space: SearchSpace, candidate: Candidate) -> Candidate:
-    finer = fit(space, candidate).candidate
-    return replace(finer, rationale=f"one of the best samples so far, in finer pieces: {candidate.rationale}")
 
 
 def _same(candidate: Candidate) -> object:

@@ -56,11 +56,19 @@ def make_engines(
 def _made(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
     """Make engines that do not refine, one per problem."""
     seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
-    if request.llm is None:
+    llm = request.llm
+    if llm is None:
         name = request.engine or DEFAULT_ENGINE
         return [make_engine(name, problem, seed=seed) for problem, seed in seeded]
-    chat = chat or open_chat(request.llm, max_cost=request.budget.cost)
-    return [_led_by_llm(request, request.llm, *each, chat) for each in seeded]
+    from falsifier.engines.llm import LLMEngine
+
+    chat = chat or open_chat(llm, max_cost=request.budget.cost)
+    engines: list[Engine] = []
+    for problem, seed in seeded:
+        led = LLMEngine(problem, chat, variant=llm.variant, sample=request.seed, anonymous=llm.anonymous)
+        is_hybrid = request.engine == "hybrid"
+        engines.append(make_engine("hybrid", problem, seed=seed, adviser=led) if is_hybrid else led)
+    return engines
 
 
 def told_problems(
@@ -152,18 +160,3 @@ def price_of(llm: LLMSettings) -> "Price | None":
     if llm.price:
         return Price(*llm.price)
     return Price(0.0, 0.0) if is_model_file(llm.name) else listed_price(llm.name, api_base=llm.api_base)
-
-
-def _led_by_llm(request: RunRequest, llm: LLMSettings, problem: Problem, seed: int, chat: Chat) -> Engine:
-    from falsifier.engines.llm import LLMEngine
-
-    led = LLMEngine(
-        problem,
-        chat,
-        variant=llm.variant,
-        sample=request.seed,
-        anonymous=llm.anonymous,
-    )
-    if request.engine == "hybrid":
-        return make_engine("hybrid", problem, seed=seed, adviser=led)
-    return led

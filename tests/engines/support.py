@@ -7,26 +7,16 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
-from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
-from falsifier.testing import FREE, START, EngineContract, lag_problem
+from falsifier.testing import FREE, START, lag_problem
 
 # Neither the contract nor who proposes when depends on how thorough a plan is.
 HASTY = Settings(cells=20, pool=40, children=20, generations=1, bound_steps=1, trial=2)
 TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
-
-
-class NamedEngine(EngineContract):
-    """The contract of the engine of this name."""
-
-    engine: str
-
-    def make(self, problem: Problem, seed: int) -> Engine:
-        return make_engine(self.engine, problem, seed=seed)
 
 
 def needs_botorch() -> None:

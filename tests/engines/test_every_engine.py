@@ -16,7 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
-from falsifier.testing import FREE, START, Array, Response, lag, lag_problem
+from falsifier.testing import FREE, START, Array, EngineContract, Response, lag, lag_problem
 from tests.engines.support import HASTY, needs_botorch
 
 NAMES = [name for name in ENGINES if name not in ("hybrid", "botorch")]
@@ -31,9 +31,22 @@ FORMULAS = (
 )
 
 
-def make(name: str, problem: Problem) -> Engine:
+def make(name: str, problem: Problem, seed: int = 2) -> Engine:
     options: dict[str, Settings] = {"settings": HASTY} if name == "surrogate" else {}
-    return make_engine(name, problem, seed=2, **options)
+    return make_engine(name, problem, seed=seed, **options)
+
+
+class TestContract(EngineContract):
+    @pytest.fixture(autouse=True, params=[*NAMES, "botorch"])
+    def _named(self, request: pytest.FixtureRequest) -> None:
+        self.engine = str(request.param)
+        if self.engine == "botorch":
+            needs_botorch()
+            # Enough to get beyond the Sobol points, which are twice the coordinates and two.
+            self.rounds = 15
+
+    def make(self, problem: Problem, seed: int) -> Engine:
+        return make(self.engine, problem, seed)
 
 
 def searched(problem: Problem, engine: Engine, *, simulations: int) -> list[Evaluation]:

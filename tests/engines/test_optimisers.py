@@ -15,34 +15,8 @@ from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardi
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.stl import Verdict
 from falsifier.testing import drive, lag_problem
-from tests.engines.support import NamedEngine, best_of, bowl, box_problem, needs_botorch
+from tests.engines.support import best_of, bowl, box_problem, needs_botorch
 from tests.patience import HANG
-
-
-class TestAnnealing(NamedEngine):
-    engine = "annealing"
-
-
-class TestCMA(NamedEngine):
-    engine = "cma"
-
-
-class TestBayesian(NamedEngine):
-    engine = "bayesian"
-
-
-class TestOptuna(NamedEngine):
-    engine = "optuna"
-
-
-class TestBoTorch(NamedEngine):
-    engine = "botorch"
-    # Enough to get beyond the Sobol points, which are twice the coordinates and two.
-    rounds = 15
-
-    @pytest.fixture(autouse=True)
-    def _installed(self) -> None:
-        needs_botorch()
 
 
 def made_if_installed(name: str) -> None:

@@ -11,19 +11,7 @@ from falsifier.engines.simple import Corners
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.stl import Verdict
 from falsifier.testing import START, drive, lag_problem
-from tests.engines.support import NamedEngine, box_problem
-
-
-class TestUniform(NamedEngine):
-    engine = "uniform"
-
-
-class TestSobol(NamedEngine):
-    engine = "sobol"
-
-
-class TestCorners(NamedEngine):
-    engine = "corners"
+from tests.engines.support import box_problem
 
 
 def test_uniform_points_fill_the_box_alone_or_in_batches() -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Proposal
-from falsifier.engines.coverage.marks import MODES, Mark, Marker, is_discrete_event
+from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
@@ -55,7 +55,7 @@ class Explorer:
     """Proposes inputs that reach something that no simulation so far has reached."""
 
     def __init__(self, problem: Problem, layout: Layout) -> None:
-        self._marker = Marker.of(problem)
+        self._marker = Marker(problem)
         self._programs = Programs(layout)
         self._interval = problem.experiment.output_interval
         levels: dict[str, list[float]] = defaultdict(list)
@@ -103,7 +103,8 @@ class Explorer:
                 self._programs.remember(point, time, self._interval)
             if known is None or time < 0.95 * known.time:
                 self._reached[mark] = Reached(point, time, known.tries if known else 0)
-        return any(is_discrete_event(mark) and mark.source in (MODES, *self._marker.kinds) for mark in new)
+        events, sources = ("is", "changes", "after"), self._marker.kinds
+        return any(m.source == MODES or (m.source in sources and m.what[0] in events) for m in new)
 
     def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Proposal:
         """Return the next input: one that reached a rare mark, continued differently after it.

@@ -7,7 +7,6 @@ has to be known and marks do not multiply with the sampling rate.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -44,11 +43,6 @@ class Mark(NamedTuple):
     what: tuple[float | str, ...]
 
 
-def is_discrete_event(mark: Mark) -> bool:
-    """Whether a mark is a value or a change of signals with few values, not a level or a distance."""
-    return mark.source == MODES or mark.what[0] in ("is", "changes", "after")
-
-
 class Change(NamedTuple):
     """A change of a discrete signal, or of the truth of a predicate.
 
@@ -65,7 +59,6 @@ class Change(NamedTuple):
     new: float
 
 
-@dataclass(frozen=True, slots=True)
 class Marker:
     """Finds the marks of trajectories.
 
@@ -74,19 +67,12 @@ class Marker:
         predicates: predicates of the formula that depend on such a signal.
     """
 
-    kinds: Mapping[str, str]
-    predicates: tuple[Predicate, ...]
-
-    @classmethod
-    def of(cls, problem: Problem) -> "Marker":
-        """Return the marker for a problem."""
+    def __init__(self, problem: Problem) -> None:
         driven = {r.name for r in problem.space.inputs}
         formula = problem.requirement.formula
-        outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *formula.signals)))
-        return cls(
-            {name: problem.info.kind(name) for name in outputs if name not in driven},
-            tuple(p for p in formula.predicates if not driven.issuperset(p.signals)),
-        )
+        outputs = dict.fromkeys((*problem.experiment.outputs, *formula.signals))
+        self.kinds = {name: problem.info.kind(name) for name in outputs if name not in driven}
+        self.predicates = [p for p in formula.predicates if not driven.issuperset(p.signals)]
 
     def marks(self, trajectory: Trajectory) -> dict[Mark, float]:
         """Return the marks of a trajectory and the time in s at which each was reached first."""

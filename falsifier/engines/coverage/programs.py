@@ -37,12 +37,12 @@ class Programs:
     """
 
     def __init__(self, layout: Layout, levels: Mapping[str, Sequence[float]] = MappingProxyType({})) -> None:
-        space = layout.space
         self._layout = layout
-        ranges: tuple[InputRange | ParameterRange, ...] = (*space.inputs, *space.parameters)
-        self._levels = [_levels(r) for r in ranges]
-        self._cuts = [_cuts(r, levels.get(r.name, ())) for r in ranges]
-        self._telling: list[list[float]] = [[] for _ in ranges]
+        self._levels = [_levels(r) for r in layout.ranges]
+        self._cuts = [_cuts(r, levels.get(r.name, ())) for r in layout.ranges]
+        self._telling: list[list[float]] = [[] for _ in layout.ranges]
+        # Slices, so that what is written to the values of a group is written to the point.
+        self._groups = [slice(int(group[0]), int(group[-1]) + 1) for group in layout.groups]
         self._times = [np.asarray(coding.times) for coding in layout.codings]
         self._longest = max((len(times) for times in self._times), default=1)
 
@@ -62,7 +62,7 @@ class Programs:
         for j, times in enumerate(self._times):
             if self._levels[j] is not None or self._layout.codings[j].interpolation != "constant":
                 continue
-            known, values = self._telling[j], point[self._layout.groups[j]]
+            known, values = self._telling[j], point[self._groups[j]]
             for at in (time - interval, time):
                 value = float(values[max(0, int(np.searchsorted(times, at, side="right")) - 1)])
                 if 0.0 < value < 1.0 and value not in known:
@@ -72,7 +72,7 @@ class Programs:
     def fresh(self, rng: np.random.Generator) -> Array:
         """Return a new program, shape (d,)."""
         point = rng.random(self._layout.dimension)
-        for j, group in enumerate(self._layout.groups):
+        for j, group in enumerate(self._groups):
             point[group] = self._level(rng, j, None)
         return self.another_end(rng, point, -1.0)
 
@@ -88,9 +88,7 @@ class Programs:
         for j, times in enumerate(self._times):
             if moving[j]:
                 start = int(np.searchsorted(times, time, side="right"))
-                point[self._layout.groups[j]] = self._pieces(
-                    rng, j, point[self._layout.groups[j]], start, pace
-                )
+                self._fill(rng, j, point[self._groups[j]], start, pace)
         return point
 
     def repeated(
@@ -108,7 +106,7 @@ class Programs:
         result = self._parameters(rng, point)
         pause = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2))))) - 1.0
         for j, times in enumerate(self._times):
-            group = self._layout.groups[j]
+            group = self._groups[j]
             first, stop = (int(np.searchsorted(times, t, side="left")) for t in span)
             start = int(np.searchsorted(times, time, side="right"))
             begin = min(len(times), start + round(pause))
@@ -120,7 +118,6 @@ class Programs:
                 )
             values[begin : begin + len(piece)] = piece
             values[begin + len(piece) :] = values[begin + len(piece) - 1]
-            result[group] = values
         return result
 
     def again(self, rng: np.random.Generator, point: Array, time: float, length: float) -> Array:
@@ -129,13 +126,12 @@ class Programs:
         What made a counter count once may do so as often as it is done.
         """
         result = self._parameters(rng, point)
-        for times, group in zip(self._times, self._layout.groups, strict=False):
+        for times, group in zip(self._times, self._groups, strict=False):
             first, stop = (int(np.searchsorted(times, t, side="right")) for t in (time - length, time))
             first = min(max(first, 0), max(stop - 1, 0))
             span = max(stop - first, 1)
             values = result[group]
             values[stop:] = values[first + np.arange(len(values) - stop) % span]
-            result[group] = values
         return result
 
     def sooner(self, rng: np.random.Generator, point: Array, time: float) -> tuple[Array, float]:
@@ -143,12 +139,11 @@ class Programs:
         result = point.copy()
         begin = float(rng.uniform(0.0, time))
         cut = float((time - begin) * rng.random() ** 2)
-        for times, group in zip(self._times, self._layout.groups, strict=False):
+        for times, group in zip(self._times, self._groups, strict=False):
             first, stop = (int(np.searchsorted(times, t, side="left")) for t in (begin, begin + cut))
             values = result[group]
             moved = len(values) - stop
             values[first : first + moved] = values[stop:].copy()
-            result[group] = values
         return result, time - cut
 
     def moved(self, rng: np.random.Generator, point: Array) -> Array:
@@ -157,7 +152,7 @@ class Programs:
         if not self._times:
             return point
         j = int(rng.integers(len(self._times)))
-        group = self._layout.groups[j]
+        group = self._groups[j]
         values = point[group]
         switches = np.flatnonzero(np.diff(values)) + 1
         kind = rng.random()
@@ -176,17 +171,17 @@ class Programs:
             at = int(rng.choice(switches))
             later = switches[switches > at]
             values[at : int(later[0]) if len(later) else len(values)] = values[at - 1]
-        point[group] = values
         return point
 
     def _parameters(self, rng: np.random.Generator, point: Array) -> Array:
         point = point.copy()
-        for j in range(len(self._times), len(self._layout.groups)):
+        for j in range(len(self._times), len(self._groups)):
             if not self._times or rng.random() < _PARAMETER_REDRAWN:
-                point[self._layout.groups[j]] = self._level(rng, j, None)
+                point[self._groups[j]] = self._level(rng, j, None)
         return point
 
-    def _pieces(self, rng: np.random.Generator, j: int, values: Array, start: int, pace: float) -> Array:
+    def _fill(self, rng: np.random.Generator, j: int, values: Array, start: int, pace: float) -> None:
+        """Draw new pieces of an input from one of its cells on, in place."""
         at = start
         last = float(values[start - 1]) if start else None
         while at < len(values):
@@ -194,7 +189,6 @@ class Programs:
             last = self._level(rng, j, last)
             values[at : at + length] = last
             at += length
-        return values
 
     def _level(self, rng: np.random.Generator, j: int, last: float | None) -> float:
         """Draw a value in [0, 1] of an input or parameter, another one than the last if it is discrete."""

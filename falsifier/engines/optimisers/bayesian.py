@@ -7,7 +7,7 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
 from falsifier.engines.box import Proposal, Vector
-from falsifier.engines.optimisers.gaussian_process import GaussianProcess, fit_lengths, standardised
+from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
 from falsifier.engines.simple import Sobol
 from falsifier.problem.problem import Problem
 
@@ -68,36 +68,33 @@ class Bayesian(GaussianProcessEngine):
     def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
         process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
         self._lengths = process.lengths
-        best, improvement = _most_promising(process, targets, rng)
-        return Proposal(best, f"log expected improvement {improvement:.3g} of the scaled robustness")
+        best = float(targets.min())
+        d = self.box.dimension
+        incumbent = process.points[int(np.argmin(targets))]
+        near = np.clip(incumbent + 0.1 * rng.standard_normal((_SAMPLES // 2, d)), 0.0, 1.0)
+        samples = np.concatenate([rng.random((_SAMPLES // 2, d)), near])
+        values = log_improvement(*process.predict(samples), best)
+        step = 1e-4
 
+        def loss_and_slope(x: Vector) -> tuple[float, Vector]:
+            shifts = np.where(x > 0.5, -step, step)
+            around = np.concatenate([x[None], x + np.diag(shifts)])
+            loss = -log_improvement(*process.predict(around), best)
+            return float(loss[0]), (loss[1:] - loss[0]) / shifts
 
-def _most_promising(
-    process: GaussianProcess, targets: Vector, rng: np.random.Generator
-) -> tuple[Vector, float]:
-    """Return the point with the largest log expected improvement below the best target, and that value."""
-    best = float(targets.min())
-    d = process.points.shape[1]
-    incumbent = process.points[int(np.argmin(targets))]
-    near = np.clip(incumbent + 0.1 * rng.standard_normal((_SAMPLES // 2, d)), 0.0, 1.0)
-    samples = np.concatenate([rng.random((_SAMPLES // 2, d)), near])
-    values = log_improvement(*process.predict(samples), best)
-    step = 1e-4
-
-    def loss_and_slope(x: Vector) -> tuple[float, Vector]:
-        shifts = np.where(x > 0.5, -step, step)
-        around = np.concatenate([x[None], x + np.diag(shifts)])
-        loss = -log_improvement(*process.predict(around), best)
-        return float(loss[0]), (loss[1:] - loss[0]) / shifts
-
-    winner, value = samples[int(np.argmax(values))], float(values.max())
-    for start in samples[np.argsort(-values, kind="stable")[:_STARTS]]:
-        found = minimize(
-            loss_and_slope, start, jac=True, method="L-BFGS-B", bounds=[(0, 1)] * d, options={"maxiter": 30}
-        )
-        if -found.fun > value:
-            winner, value = np.asarray(found.x), -float(found.fun)
-    return winner, value
+        winner, value = samples[int(np.argmax(values))], float(values.max())
+        for start in samples[np.argsort(-values, kind="stable")[:_STARTS]]:
+            found = minimize(
+                loss_and_slope,
+                start,
+                jac=True,
+                method="L-BFGS-B",
+                bounds=[(0, 1)] * d,
+                options={"maxiter": 30},
+            )
+            if -found.fun > value:
+                winner, value = np.asarray(found.x), -float(found.fun)
+        return Proposal(winner, f"log expected improvement {value:.3g} of the scaled robustness")
 
 
 def log_improvement(mean: Vector, deviation: Vector, best: float) -> Vector:

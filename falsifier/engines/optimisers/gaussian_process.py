@@ -11,16 +11,14 @@ from falsifier.engines.layout import Array, learnable
 _SHORTEST, _LONGEST = 1e-3, 1e3
 
 
-def matern(distance: Array) -> Array:
-    """Return the Matern-5/2 correlation at distances in units of the length scale."""
-    d = np.sqrt(5.0) * distance
-    return np.asarray((1.0 + d + d * d / 3.0) * np.exp(-d))
+def _correlation(x: Array, z: Array) -> Array:
+    """Return the Matern-5/2 correlations of the rows of x, (n, d), with those of z, (m, d), shape (n, m).
 
-
-def distances(x: Array, z: Array) -> Array:
-    """Return the Euclidean distances between the rows of x, (n, d), and those of z, (m, d), shape (n, m)."""
+    Both are in units of the length scales.
+    """
     squared = (x**2).sum(1)[:, None] + (z**2).sum(1)[None] - 2.0 * x @ z.T
-    return np.asarray(np.sqrt(np.maximum(squared, 0.0)))
+    d = np.sqrt(5.0) * np.sqrt(np.maximum(squared, 0.0))
+    return np.asarray((1.0 + d + d * d / 3.0) * np.exp(-d))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +43,7 @@ class GaussianProcess:
     def fit(cls, points: Array, targets: Array, lengths: Array, *, noise: float) -> "GaussianProcess":
         """Condition on targets, shape (n,), observed at points, shape (n, d), with this noise variance."""
         scaled = points / lengths
-        covariance = matern(distances(scaled, scaled)) + noise * np.eye(len(points))
+        covariance = _correlation(scaled, scaled) + noise * np.eye(len(points))
         factor = np.tril(cho_factor(covariance, lower=True)[0])
         weights = cho_solve((factor, True), targets)
         evidence = -0.5 * float(targets @ weights) - float(np.log(np.diag(factor)).sum())
@@ -53,7 +51,7 @@ class GaussianProcess:
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (m,) each, at points, shape (m, d)."""
-        cross = matern(distances(points / self.lengths, self.points / self.lengths))
+        cross = _correlation(points / self.lengths, self.points / self.lengths)
         explained = solve_triangular(self.factor, cross.T, lower=True)
         variance = 1.0 - (explained**2).sum(axis=0)
         return cross @ self.weights, np.sqrt(np.maximum(variance, 1e-12))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.engines.layout import Array, Layout, TimeGrid, learnable
 from falsifier.engines.surrogate.dynamics import Trace
@@ -66,7 +65,7 @@ class History:
             return None
         if self.cost is None:
             self.cost = self._first_cost(trajectory)
-        trace = trace_of(self.problem.space, self.grid, self.cost.outputs, evaluation.candidate, trajectory)
+        trace = self._trace(evaluation.candidate, trajectory)
         cells = self.grid.cells
         margins = self.cost.margins(trace.states[None, : cells + 1], trace.inputs[None, :cells])
         critical = evaluation.verdict.critical_time / (self.grid.step * cells) if evaluation.verdict else 1.0
@@ -96,6 +95,23 @@ class History:
             },
         )
 
+    def _trace(self, candidate: Candidate, trajectory: Trajectory) -> Trace:
+        """Return a simulation on the grid; only samples at the grid points are read of the trajectory."""
+        space, grid = self.problem.space, self.grid
+        points = np.round(np.arange(grid.all_cells + 1) * grid.step / trajectory.step).astype(int)
+        points = np.minimum(points, len(trajectory) - 1)
+        columns = [learnable(trajectory[name][points]) for name in self.outputs]
+        states = np.stack(columns, axis=1) if columns else np.empty((len(points), 0))
+        fine = (np.arange(grid.all_cells * _FINE) + 0.5) * grid.step / _FINE
+        inputs = []
+        for r in space.inputs:
+            means = candidate.signals[r.name].sample(fine).reshape(grid.all_cells, _FINE).mean(axis=1)
+            inputs.append((means - r.low) / ((r.high - r.low) or 1.0))
+        for p in space.parameters:
+            value = (candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)
+            inputs.append(np.full(grid.all_cells, value))
+        return Trace(np.stack(inputs, axis=1), states)
+
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of the outputs in the traces, in order."""
@@ -119,11 +135,6 @@ class History:
         """Points of all samples, shape (samples, d)."""
         return np.array([s.point for s in self.samples]).reshape(-1, self.layout.dimension)
 
-    @property
-    def robustness(self) -> Array:
-        """Robustness of all samples, shape (samples,)."""
-        return np.array([s.robustness for s in self.samples])
-
     def by_scaled_cost(self) -> list[int]:
         """Return the indices of the samples, that with the lowest scaled robustness first."""
         cost = self.scaled_cost()
@@ -131,29 +142,3 @@ class History:
             np.concatenate(predicate) for predicate in zip(*(s.margins for s in self.samples), strict=True)
         ]
         return [int(i) for i in np.argsort(cost.cost(stacked), kind="stable")]
-
-
-def trace_of(
-    space: SearchSpace,
-    grid: TimeGrid,
-    outputs: tuple[str, ...],
-    candidate: Candidate,
-    trajectory: Trajectory,
-) -> Trace:
-    """Return a simulation on the grid; of the trajectory, only the samples at the grid points are read."""
-    points = np.round(np.arange(grid.all_cells + 1) * grid.step / trajectory.step).astype(int)
-    points = np.minimum(points, len(trajectory) - 1)
-    states = (
-        np.stack([learnable(trajectory[n][points]) for n in outputs], axis=1)
-        if outputs
-        else np.empty((len(points), 0))
-    )
-    fine = (np.arange(grid.all_cells * _FINE) + 0.5) * grid.step / _FINE
-    inputs = []
-    for r in space.inputs:
-        means = candidate.signals[r.name].sample(fine).reshape(grid.all_cells, _FINE).mean(axis=1)
-        inputs.append((means - r.low) / ((r.high - r.low) or 1.0))
-    for p in space.parameters:
-        value = (candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)
-        inputs.append(np.full(grid.all_cells, value))
-    return Trace(np.stack(inputs, axis=1), states)

@@ -5,7 +5,6 @@ and shrinks while they fail; when it is small, the search starts again elsewhere
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -40,49 +39,43 @@ _AT_BOUND = 0.1
 _NOISE = 1e-4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
-    """What was simulated.
-
-    Attributes:
-        points: shape (n, d).
-        costs: shape (n,).
-        decided: time in s by which the inputs had decided each cost, shape (n,).
-    """
-
-    points: Array
-    costs: Array
-    decided: Array
-
-
 def propose_change(
-    seen: Seen, layout: Layout, rng: np.random.Generator, risk: Callable[[Array], Array], *, draws: int
+    layout: Layout,
+    points: Array,
+    costs: Array,
+    decided: Array,
+    rng: np.random.Generator,
+    *,
+    risk: Callable[[Array], Array],
+    draws: int,
 ) -> tuple[Array, str]:
     """Return a change of one of the best points, or a random point, and what it is.
 
     What comes after the time that decided a cost cannot lower it, so such changes are not proposed.
 
     Args:
-        seen: what was simulated.
         layout: layout of the points.
+        points: what was simulated, shape (n, d).
+        costs: shape (n,).
+        decided: time in s by which the inputs had decided each cost, shape (n,).
         rng: random generator.
         risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,).
         draws: number of random points among which the least risky one is chosen.
     """
-    if len(seen.costs) >= _FEWEST and rng.random() >= _FRESH:
-        children = _changes(seen, layout, rng)
+    if len(costs) >= _FEWEST and rng.random() >= _FRESH:
+        children = _changes(layout, points, costs, decided, rng)
         if len(children):
             return children[np.argmin(risk(children))], "a change of one of the best candidates"
     fresh = np.array([paced(layout, rng) for _ in range(draws)])
     return fresh[np.argmin(risk(fresh))], "random: a new start of the search by changes"
 
 
-def _changes(seen: Seen, layout: Layout, rng: np.random.Generator) -> Array:
+def _changes(layout: Layout, points: Array, costs: Array, decided: Array, rng: np.random.Generator) -> Array:
     """Return changes of good points that can matter, shape (m, d); m may be 0."""
     # Among equal costs, any order: the first one would else be changed for ever.
-    order = np.lexsort((rng.random(len(seen.costs)), seen.costs))
+    order = np.lexsort((rng.random(len(costs)), costs))
     chosen = order[np.minimum(rng.exponential(_MEAN_RANK, _TRIES).astype(np.intp), len(order) - 1)]
-    parents, decided = seen.points[chosen], seen.decided[chosen]
+    parents, decided = points[chosen], decided[chosen]
     children = changed(layout, rng, parents)
     held = rng.random(_TRIES) < _HELD
     children[held] = held_from(layout, rng, parents[held], decided[held])

@@ -15,7 +15,7 @@ from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecasts, LinearDynamics
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.history import History
-from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
+from falsifier.engines.surrogate.local_search import TrustRegion, propose_change
 from falsifier.engines.surrogate.planning import Push, Pushes, is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import Margins, inner_windows, needs_several
@@ -370,9 +370,12 @@ class Surrogate:
         # one may be decided later.
         rest = horizon if self._levels.is_staircase else min(self._windows, default=0.0)
         decided = np.array([s.critical * horizon + rest for s in samples])
-        seen = Seen(self.history.points, self.history.robustness, decided)
+        robustness = np.array([s.robustness for s in samples])
         draws = max(self.settings.retries, 1) if self.feasibility.has_failures else 1
-        point, why = propose_change(seen, self.layout, rng, self.feasibility.excess, draws=draws)
+        risk = self.feasibility.excess
+        point, why = propose_change(
+            self.layout, self.history.points, robustness, decided, rng, risk=risk, draws=draws
+        )
         return self._made("changes", point, why)
 
 

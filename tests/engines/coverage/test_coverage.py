@@ -16,14 +16,9 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
 from falsifier.testing import FREE, START, drive, lag_problem
 from tests.engines.coverage.support import lock_problem, safe_problem
-from tests.engines.support import NamedEngine
 
 # Of uniform inputs one in 3600 opens the lock: a tenth of that is what the engine may use at most.
 TENTH = 360
-
-
-class TestContract(NamedEngine):
-    engine = "coverage"
 
 
 @pytest.mark.parametrize("free", [None, Freedom(100, 0.1)])
@@ -59,7 +54,7 @@ def test_a_small_space_is_searched_as_a_whole() -> None:
 def lock_marks(stage: list[float], opened: list[float]) -> dict[Mark, float]:
     times = np.linspace(0.0, 0.5 * (len(stage) - 1), len(stage))
     columns = {"stage": np.array(stage), "open": np.array(opened)}
-    return Marker.of(lock_problem()).marks(Trajectory(times, columns))
+    return Marker(lock_problem()).marks(Trajectory(times, columns))
 
 
 def test_values_changes_and_modes_are_marks_with_the_time_of_their_first_occurrence() -> None:
@@ -92,7 +87,7 @@ def test_a_signal_that_chatters_does_not_hide_the_others() -> None:
 
 def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9)")
-    marker = Marker.of(problem)
+    marker = Marker(problem)
     times = np.linspace(0.0, 10.0, 101)
 
     def found(scale: float) -> set[Mark]:
@@ -111,7 +106,7 @@ def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
 )
 @example([0.0, float(np.nextafter(2.0**-10, 0.0))])  # its logarithm is rounded up to that of 2 ** -10
 def test_any_numbers_have_marks(values: list[float]) -> None:
-    marker = Marker.of(lag_problem("G[0,10] (x <= 0.9)"))
+    marker = Marker(lag_problem("G[0,10] (x <= 0.9)"))
     times = np.linspace(0.0, 1.0, len(values))
     marker.marks(Trajectory(times, {"x": np.array(values), "u": np.zeros(len(values))}))
 

@@ -6,7 +6,7 @@ import pytest
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
-from falsifier.engines.surrogate.local_search import Seen, TrustRegion, propose_change
+from falsifier.engines.surrogate.local_search import TrustRegion, propose_change
 from falsifier.engines.surrogate.variation import mutations, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -20,17 +20,17 @@ def layout_of(cells: int = 100) -> Layout:
     return planning_layout(problem.space, TimeGrid.over(10.0, 10.0, cells=cells, shortest=0.05))
 
 
-def seen(points: Array, costs: list[float], decided: float) -> Seen:
-    return Seen(points, np.array(costs), np.full(len(points), decided))
+def no_risk(points: Array) -> Array:
+    return np.zeros(len(points))
 
 
 def test_the_best_are_changed_before_the_time_that_decided() -> None:
     layout, rng = layout_of(), np.random.default_rng(1)
     points = np.repeat(np.linspace(0.2, 0.8, 9)[:, None], 101, axis=1)
-    history = seen(points, list(range(9)), 3.0)
+    costs, decided = np.arange(9.0), np.full(9, 3.0)
     parents = []
     for _ in range(60):
-        point, why = propose_change(history, layout, rng, lambda points: np.zeros(len(points)), draws=1)
+        point, why = propose_change(layout, points, costs, decided, rng, risk=no_risk, draws=1)
         if why.startswith("random"):
             continue
         same = (np.abs(points - point) < 1e-9).mean(axis=1)
@@ -42,13 +42,15 @@ def test_the_best_are_changed_before_the_time_that_decided() -> None:
 
 def test_risky_changes_are_avoided() -> None:
     layout, rng = layout_of(), np.random.default_rng(3)
-    history = seen(np.full((9, 101), 0.5), list(range(9)), 10.0)
+    points, costs, decided = np.full((9, 101), 0.5), np.arange(9.0), np.full(9, 10.0)
 
     def risk(points: Array) -> Array:
         return np.asarray(points.max(axis=1))
 
-    highest = [float(propose_change(history, layout, rng, risk, draws=12)[0].max()) for _ in range(40)]
-    assert np.mean(highest) < 0.75
+    proposed = [
+        propose_change(layout, points, costs, decided, rng, risk=risk, draws=12)[0] for _ in range(40)
+    ]
+    assert np.max(proposed, axis=1).mean() < 0.75
 
 
 def parameters_problem(kind: str, count: int) -> Problem:

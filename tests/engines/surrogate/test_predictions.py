@@ -6,7 +6,7 @@ import pytest
 from falsifier.core.space import SearchSpace
 from falsifier.engines.layout import TimeGrid, planning_layout
 from falsifier.engines.surrogate.dynamics import LinearDynamics
-from falsifier.engines.surrogate.history import trace_of
+from falsifier.engines.surrogate.history import History
 from falsifier.engines.surrogate.predicted_cost import PredictedCost
 from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
@@ -70,7 +70,8 @@ def test_inputs_on_the_grid_are_those_of_the_point_and_times_beyond_the_horizon_
     layout = planning_layout(problem.space, grid)
     (point,) = random_points(layout, np.random.default_rng(4), 1)
     evaluation = evaluate(problem, layout.candidate(point, origin="t", rationale="t"))
-    assert evaluation.trajectory is not None
-    trace = trace_of(problem.space, grid, ("x",), evaluation.candidate, evaluation.trajectory)
+    sample = History(problem, grid, layout).add(evaluation, point)
+    assert sample is not None
+    trace = sample.trace
     assert trace.inputs[:25] == pytest.approx(layout.inputs(point[None], grid)[0])
     assert trace.states.shape == (51, 1) and len(trace.inputs) == 50

@@ -11,20 +11,14 @@ from falsifier.context.values import Context, Crossing
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines import make_engine
-from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
-from falsifier.testing import BIAS, FREE, START, Array, EngineContract, drive, lag_problem
+from falsifier.testing import BIAS, FREE, START, Array, drive, lag_problem
 from tests.engines.coverage.support import lock_problem
 from tests.engines.support import HASTY
-
-
-class TestContract(EngineContract):
-    def make(self, problem: Problem, seed: int) -> Engine:
-        return make_engine("surrogate", problem, seed=seed, settings=HASTY)
 
 
 def simulations_until_violation(problem: Problem, *, seed: int, budget: int) -> int | None:
