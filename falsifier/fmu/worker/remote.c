@@ -136,6 +136,7 @@ void start_process(struct component *c)
             other->process = NULL;
         }
     }
+    c->system->progress = NULL; /* what it points to, of a simulation of the master, is in memory that has left */
     serve(c);
 }
 

@@ -46,6 +46,15 @@ def test_trajectories_are_those_of_one_process_to_the_last_digit(
     np.testing.assert_array_equal(found[0], found[1])
 
 
+def test_libraries_that_must_be_loaded_again_cost_no_process_of_the_master() -> None:
+    model = system({"a": solved("Lag_2"), "b": "KeepsStatic_2"}, {}, EACH)
+    used = set()
+    for _ in range(4):
+        run(model, "a.y", "b.y")
+        used |= set(pids(model))
+    assert len(used) == 1
+
+
 def children(pid: int | str) -> list[str]:
     return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
 
