@@ -55,11 +55,6 @@ class _Seen:
     highest: _Extreme = _Extreme(-inf)
 
     @property
-    def is_far(self) -> bool:
-        """Whether it kept one truth, by much more than it moved."""
-        return not is_on_limit(self.distance) and self.distance > _FAR * self.range
-
-    @property
     def distance(self) -> float:
         """Smallest distance to its threshold, if it kept one truth."""
         return max(self.lowest.margin, -self.highest.margin)
@@ -124,7 +119,9 @@ class Vacuity:
         said = {predicate for part in never for predicate in part.part.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
         predicates = [part for part in self._parts if isinstance(part.formula, Predicate) and not constant]
-        far = [part for part in predicates if part.is_far and part.formula not in said]
+        # Those that kept one truth, by much more than they moved.
+        kept = [part for part in predicates if part.distance > _FAR * part.range]
+        far = [part for part in kept if not is_on_limit(part.distance) and part.formula not in said]
         found = (*map(self._condition, never), *map(self._disjunct, always), *map(self._far, far))
         unique = {(finding.kind, finding.part): finding for finding in found}
         # If nothing moves the requirement's signals, that has been said of everything that was searched.

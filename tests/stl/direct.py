@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from operator import eq, ge, gt, le, lt, ne
+from operator import eq, ge, gt, itemgetter, le, lt, ne
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,38 +50,38 @@ class Direct:
             return math.inf if f.value else -math.inf, k
         if isinstance(f, Predicate):
             here = {name: column[k] for name, column in self.columns.items()}
-            left, right = float(f.left.evaluate(here)), float(f.right.evaluate(here))
+            one, other = float(f.left.evaluate(here)), float(f.right.evaluate(here))
             margin = {
-                "<": right - left, "<=": right - left, ">": left - right, ">=": left - right,
-                "==": -abs(left - right), "!=": abs(left - right),
+                "<": other - one, "<=": other - one, ">": one - other, ">=": one - other,
+                "==": -abs(one - other), "!=": abs(one - other),
             }[f.operator]  # fmt: skip
             return margin or on_limit(f.operator), k
-        if isinstance(f, Not):
-            value, at = self.judge(f.operand, k)
-            return -value, at
-        if isinstance(f, And):
-            return smaller(self.judge(f.left, k), self.judge(f.right, k))
-        if isinstance(f, Or):
-            return self.judge(Not(And(Not(f.left), Not(f.right))), k)
-        if isinstance(f, Implies):
-            return self.judge(Not(And(f.left, Not(f.right))), k)
-        if isinstance(f, Iff):
-            return self.judge(And(Implies(f.left, f.right), Implies(f.right, f.left)), k)
-        if isinstance(f, Next):
-            return self.judge(f.operand, k + 1)
-        if isinstance(f, Always):
-            return first_smallest([self.judge(f.operand, i) for i in self.samples(f.window, k)])
-        if isinstance(f, Eventually):
-            value, at = first_smallest([self.judge(Not(f.operand), i) for i in self.samples(f.window, k)])
-            return -value, at
-        assert isinstance(f, Until)
-        ends = [self._until(f, k, end) for end in self.samples(f.window, k)]
-        return max(ends, key=lambda pair: pair[0])
+        match f:
+            case Not(operand):
+                value, at = self.judge(operand, k)
+                return -value, at
+            case And(left, right):
+                return smaller(self.judge(left, k), self.judge(right, k))
+            case Or(left, right):
+                return self.judge(Not(And(Not(left), Not(right))), k)
+            case Implies(left, right):
+                return self.judge(Not(And(left, Not(right))), k)
+            case Iff(left, right):
+                return self.judge(And(Implies(left, right), Implies(right, left)), k)
+            case Next(operand):
+                return self.judge(operand, k + 1)
+            case Always(operand, window):
+                return min((self.judge(operand, i) for i in self.samples(window, k)), key=itemgetter(0))
+            case Eventually(operand, window):
+                return self.judge(Not(Always(Not(operand), window)), k)
+            case Until(left, right, window):
+                ends = [self._until(left, right, k, end) for end in self.samples(window, k)]
+                return max(ends, key=itemgetter(0))
+        raise TypeError(f"not a formula: {f!r}")
 
-    def _until(self, f: Until, k: int, end: int) -> tuple[float, int]:
-        left = first_smallest([self.judge(f.left, i) for i in range(k, end + 1)])
-        right = self.judge(f.right, end)
-        return smaller(left, right)
+    def _until(self, left: Formula, right: Formula, k: int, end: int) -> tuple[float, int]:
+        lowest = min((self.judge(left, i) for i in range(k, end + 1)), key=itemgetter(0))
+        return smaller(lowest, self.judge(right, end))
 
     def holds(self, f: Formula, k: int = 0) -> bool:
         """Whether a formula is true at sample k, without any margin."""
@@ -115,7 +115,3 @@ class Direct:
 
 def smaller(left: tuple[float, int], right: tuple[float, int]) -> tuple[float, int]:
     return left if left[0] <= right[0] else right
-
-
-def first_smallest(pairs: list[tuple[float, int]]) -> tuple[float, int]:
-    return min(pairs, key=lambda pair: pair[0])
