@@ -133,7 +133,7 @@ def _fixed(variable: Variable, value: float | str) -> float:
     if isinstance(value, str):
         raise SpecError(
             f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
-            f"{variable.kind}",
+            f"{variable.kind}; to search a range: --search {variable.name}=LOW:HIGH",
             key="value",
         )
     _check(variable, value)

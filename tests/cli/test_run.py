@@ -52,6 +52,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
             "expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search throttle=0:100:7",
         ),
         ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=LOW:HIGH"),
+        ((*SPEED, "--set", "airLoad=0:1"), "to search a range: --search airLoad=LOW:HIGH"),
         ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
         (("AT1", "--set", "throtle=3"), "did you mean 'throttle'?"),
