@@ -12,8 +12,6 @@ from falsifier.engines.layout import Array, fixed_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-Vector = Array
-
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
@@ -24,7 +22,7 @@ class Proposal:
         rationale: the reason, in words.
     """
 
-    point: Vector
+    point: Array
     rationale: str
 
 
@@ -59,7 +57,7 @@ class BoxEngine(ABC):
             if self.box.represents(evaluation.candidate):
                 self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
 
-    def _is_same(self, told: Vector, own: Vector) -> bool:
+    def _is_same(self, told: Array, own: Array) -> bool:
         """Whether a point that was told is one that was proposed; its candidate has settled values."""
         return bool(np.allclose(told, self.box.settled(own), rtol=0, atol=1e-9))
 
@@ -67,5 +65,5 @@ class BoxEngine(ABC):
     def _propose(self, rng: np.random.Generator) -> Proposal:
         """Return the next point; ``rng`` is the only source of randomness to use."""
 
-    def _learn(self, point: Vector, cost: float | None) -> None:  # noqa: B027 - most engines do not learn
+    def _learn(self, point: Array, cost: float | None) -> None:  # noqa: B027 - most engines do not learn
         """Learn the cost of a point; None if its evaluation failed."""

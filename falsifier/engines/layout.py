@@ -43,20 +43,15 @@ class TimeGrid:
     all_cells: int
 
     @classmethod
-    def over(cls, horizon: float, stop_time: float, *, cells: int, shortest: float) -> "TimeGrid":
-        """Return a grid of ``cells`` cells over the horizon, fewer if needed for cells of ``shortest`` s."""
+    def of(cls, problem: Problem, *, cells: int = CELLS) -> "TimeGrid":
+        """Return the grid over the horizon of a requirement, with fewer cells if these were too short."""
+        interval, stop_time = problem.experiment.output_interval, problem.space.stop_time
+        horizon = problem.requirement.formula.horizon(interval)
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
-        count = max(1, min(cells, round(horizon / shortest)))
+        count = max(1, min(cells, round(horizon / interval)))
         step = horizon / count
         rest = int(stop_time / step + 1e-6)
         return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
-
-    @classmethod
-    def of(cls, problem: Problem, *, cells: int = CELLS) -> "TimeGrid":
-        """Return the grid over the horizon of a problem's requirement."""
-        interval = problem.experiment.output_interval
-        horizon = problem.requirement.formula.horizon(interval)
-        return cls.over(horizon, problem.space.stop_time, cells=cells, shortest=interval)
 
     @property
     def middles(self) -> Array:

@@ -4,7 +4,8 @@ from math import inf
 
 import numpy as np
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal
+from falsifier.engines.layout import Array
 from falsifier.problem.problem import Problem
 
 # A corner: whether each input and parameter is constant at its highest value, 1, or its lowest one, 0.
@@ -61,7 +62,7 @@ class Corners(BoxEngine):
         """Whether all corners have been tried."""
         return len(self._costs) >= 1 << len(self._groups)
 
-    def hear(self, point: Vector, cost: float) -> None:
+    def hear(self, point: Array, cost: float) -> None:
         """Let a point near a corner stand for it, unless its own cost is known: it need not be simulated."""
         levels = self._levels(np.rint(point))
         if levels is not None and self._costs.get(levels, inf) == inf:
@@ -78,7 +79,7 @@ class Corners(BoxEngine):
         words = [f"{n} {'high' if level else 'low'}" for n, level in zip(self._groups, levels, strict=True)]
         return Proposal(point, f"constant extremes: {', '.join(words) or 'nothing varies'}")
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         levels = self._levels(point)
         if levels is not None:
             self._costs[levels] = inf if cost is None else cost
@@ -95,7 +96,7 @@ class Corners(BoxEngine):
                     return levels
         return None
 
-    def _levels(self, point: Vector) -> Levels | None:
+    def _levels(self, point: Array) -> Levels | None:
         """Return the levels of the corner at a point; None if it is none."""
         levels = []
         for indices in self._groups.values():

@@ -1,6 +1,7 @@
 """What engines are tested on: the contract by name, and a bowl over the box of a small problem."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,16 +13,17 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
-from falsifier.testing import FREE, START, lag_problem
+from falsifier.testing import FREE, START, drive, lag_problem
 
 # Neither the contract nor who proposes when depends on how thorough a plan is.
 HASTY = Settings(cells=20, pool=40, children=20, generations=1, bound_steps=1, trial=2)
 TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
 
 
-def needs_botorch() -> None:
-    """Skip where botorch is not installed."""
-    pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
+def skip_if_absent(name: str) -> None:
+    """Skip the tests of botorch where it is not installed."""
+    if name == "botorch":
+        pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
 
 
 def box_problem() -> Problem:
@@ -45,6 +47,11 @@ def bowl(problem: Problem, candidate: Candidate) -> Evaluation:
     return Evaluation(candidate, verdict=Verdict(1.0 + 4.0 * float(distance @ distance), 0.0, "bowl"))
 
 
+def flat(candidate: Candidate) -> Evaluation:
+    """Judge all the same."""
+    return Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))
+
+
 def doubtful(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """A violation of robustness -1 that does not count, because it is fragile."""
     return Confirmation(
@@ -54,12 +61,6 @@ def doubtful(problem: Problem, evaluation: Evaluation) -> Confirmation:
 
 def best_of(name: str, *, simulations: int) -> float:
     """Least robustness that an engine finds in the bowl."""
-    problem = box_problem()
-    engine = make_engine(name, problem, seed=1)
-    found = []
-    for _ in range(simulations):
-        evaluation = bowl(problem, *engine.ask())
-        engine.tell([evaluation])
-        assert evaluation.robustness is not None
-        found.append(evaluation.robustness)
-    return min(found)
+    judge = partial(bowl, box_problem())
+    asked = drive(make_engine(name, box_problem(), seed=1), judge, rounds=simulations)
+    return min(judge(candidate).robustness or 0.0 for candidate in asked)

@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,12 +13,12 @@ from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
 from falsifier.errors import SpecError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
-from falsifier.testing import FREE, START, Array, EngineContract, Response, lag, lag_problem
-from tests.engines.support import HASTY, needs_botorch
+from falsifier.testing import FREE, START, Array, EngineContract, Response, drive, lag, lag_problem
+from tests.engines.support import HASTY, skip_if_absent
 
 NAMES = [name for name in ENGINES if name not in ("hybrid", "botorch")]
 FORMULAS = (
@@ -40,8 +41,8 @@ class TestContract(EngineContract):
     @pytest.fixture(autouse=True, params=[*NAMES, "botorch"])
     def _named(self, request: pytest.FixtureRequest) -> None:
         self.engine = str(request.param)
+        skip_if_absent(self.engine)
         if self.engine == "botorch":
-            needs_botorch()
             # Enough to get beyond the Sobol points, which are twice the coordinates and two.
             self.rounds = 15
 
@@ -49,18 +50,9 @@ class TestContract(EngineContract):
         return make(self.engine, problem, seed)
 
 
-def searched(problem: Problem, engine: Engine, *, simulations: int) -> list[Evaluation]:
-    found = []
-    for _ in range(simulations):
-        found.append(evaluate(problem, *engine.ask(1)))
-        engine.tell(found[-1:])
-    return found
-
-
 @pytest.mark.parametrize("name", [*NAMES, "botorch"])
 def test_every_engine_loads_and_bears_its_name(name: str) -> None:
-    if name == "botorch":
-        needs_botorch()
+    skip_if_absent(name)
     assert make_engine(name, lag_problem(), seed=0).name == name
 
 
@@ -107,7 +99,8 @@ def test_signals_that_are_not_searched_are_no_obstacle(name: str, formula: str) 
     if "x" not in problem.requirement.formula.signals:  # of inputs alone: nothing need be recorded
         problems.append(replace(problem, experiment=replace(problem.experiment, outputs=())))
     for each in problems:
-        for evaluation in searched(each, make(name, each), simulations=8):
+        for candidate in drive(make(name, each), partial(evaluate, each), rounds=8):
+            evaluation = evaluate(each, candidate)
             assert evaluation.verdict is not None, evaluation.reason
 
 
@@ -141,4 +134,4 @@ def often_failing(
 @pytest.mark.parametrize("name", NAMES)
 def test_no_number_ends_a_search_or_warns(name: str, response: Response) -> None:
     problem = lag_problem("G[0,10] (x <= 3)", free=FREE, points=2, parameters=[START], response=response)
-    assert len(searched(problem, make(name, problem), simulations=12)) == 12
+    assert len(drive(make(name, problem), partial(evaluate, problem), rounds=12)) == 12

@@ -5,8 +5,8 @@ import pytest
 
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.engines.box import BoxEngine, Proposal, Vector
-from falsifier.engines.layout import Coding, Layout, TimeGrid, fixed_layout, planning_layout
+from falsifier.engines.box import BoxEngine, Proposal
+from falsifier.engines.layout import Array, Coding, Layout, TimeGrid, fixed_layout, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.stl import Verdict
@@ -15,7 +15,7 @@ from falsifier.testing import FREE, START, lag_problem
 
 def test_layouts_keep_to_the_allowed_parameterization() -> None:
     free, fixed = (lag_problem(free=free, inputs=2, parameters=[START]) for free in (FREE, None))
-    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid(0.1, 100, 100)
     rng = np.random.default_rng(0)
     for problem in (free, fixed):
         layout = planning_layout(problem.space, grid)
@@ -37,7 +37,7 @@ def test_points_are_settled_where_their_candidates_are() -> None:
     gear = ParameterRange("gear", 0.5, 3.7, kind="integer")
     mode = ParameterRange("mode", 1.0, 7.0, kind="enumeration", items=items)
     space = SearchSpace((switch, still, real), (gear, mode), 10.0)
-    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid(0.1, 100, 100)
     layout = planning_layout(space, grid)
     points = np.random.default_rng(0).random((20, layout.dimension))
     settled = layout.settled(points)
@@ -60,7 +60,7 @@ def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolati
     space = lag_problem(free=None, inputs=1, parameters=[START]).space
     layout = Layout(space, (Coding(times, interpolation, fine=False),))
     assert layout.starts.tolist() == [times[max(i - back, 0)] for i in range(6)] + [0.0]
-    grid = TimeGrid.over(10.0, 10.0, cells=100, shortest=0.05)
+    grid = TimeGrid(0.1, 100, 100)
     point = np.random.default_rng(0).random(7)
     before = layout.inputs(point[None], grid)[0, :, 0]
     for i, start in enumerate(layout.starts[:5]):
@@ -83,12 +83,12 @@ class Noting(BoxEngine):
 
     def __init__(self) -> None:
         super().__init__(PROBLEM, seed=5)
-        self.learnt: list[tuple[Vector, float | None]] = []
+        self.learnt: list[tuple[Array, float | None]] = []
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         return Proposal(rng.random(self.box.dimension), "a reason")
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         self.learnt.append((point, cost))
 
 

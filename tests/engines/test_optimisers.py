@@ -13,22 +13,16 @@ from falsifier.engines import make_engine
 from falsifier.engines.optimisers.bayesian import log_improvement
 from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.stl import Verdict
 from falsifier.testing import drive, lag_problem
-from tests.engines.support import best_of, bowl, box_problem, needs_botorch
+from tests.engines.support import best_of, bowl, box_problem, flat, skip_if_absent
 from tests.patience import HANG
-
-
-def made_if_installed(name: str) -> None:
-    if name == "botorch":
-        needs_botorch()
 
 
 @pytest.mark.parametrize(
     ("name", "simulations"), [("cma", 150), ("bayesian", 40), ("optuna", 80), ("botorch", 30)]
 )
 def test_it_gets_deeper_into_a_bowl_than_random_points(name: str, simulations: int) -> None:
-    made_if_installed(name)
+    skip_if_absent(name)
     assert best_of(name, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
 
 
@@ -38,7 +32,7 @@ def test_annealing_gets_deeper_than_a_few_random_points() -> None:
 
 @pytest.mark.parametrize("name", ["optuna", "botorch"])
 def test_in_a_known_valley_it_does_not_ask_for_the_same_place_several_times_at_once(name: str) -> None:
-    made_if_installed(name)
+    skip_if_absent(name)
     problem = box_problem()
     engine = make_engine(name, problem, seed=2)
     for _ in range(20):
@@ -90,11 +84,7 @@ def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() 
 def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
     problem = box_problem()
     engine = make_engine("cma", problem, seed=0)
-    generations = set()
-    for _ in range(100):
-        (candidate,) = engine.ask()
-        generations.add(int(candidate.rationale.split()[1]))
-        engine.tell([Evaluation(candidate, verdict=Verdict(1.0, 0.0, "flat"))])
+    generations = {int(c.rationale.split()[1]) for c in drive(engine, flat, rounds=100)}
     assert generations == {1}, "a plateau ends a start after its first generation"
 
 

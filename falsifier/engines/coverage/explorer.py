@@ -62,7 +62,9 @@ class Explorer:
         searched = problem.space.names
         for level in (found for found in problem.context.crossings if found.signal in searched):
             levels[level.signal].append(level.value)
-        self._aimed = Programs(layout, levels) if levels else None
+        self._aimed = Programs(layout, levels)
+        # Whether levels are known at which something changes.
+        self.has_levels = bool(levels)
         self._reached: dict[Mark, Reached] = {}
         self._by_source: dict[str, list[Mark]] = defaultdict(list)
         self._hits: Counter[Mark] = Counter()
@@ -70,11 +72,6 @@ class Explorer:
         self._at_lowest: list[Reached] = []
         self._new: Counter[str] = Counter()
         self._seen = 0
-
-    @property
-    def has_levels(self) -> bool:
-        """Whether levels are known at which something changes."""
-        return self._aimed is not None
 
     def learn(self, point: Array, trajectory: Trajectory, robustness: float, critical: float) -> bool:
         """Add a simulation to the archive; return whether a discrete signal did something new.
@@ -113,7 +110,7 @@ class Explorer:
             rng: random generator.
             aimed: whether new values are drawn between the levels at which something changes.
         """
-        programs = (self._aimed if aimed else None) or self._programs
+        programs = self._aimed if aimed else self._programs
         if not programs.has_inputs:
             return Proposal(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)

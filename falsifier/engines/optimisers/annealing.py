@@ -13,7 +13,8 @@ from threading import Thread
 import numpy as np
 from scipy.optimize import dual_annealing
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal
+from falsifier.engines.layout import Array
 from falsifier.problem.problem import Problem
 
 # Limits of iterations and evaluations that are never reached: the loop's budget ends the search.
@@ -30,11 +31,11 @@ class Annealing(BoxEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._points: SimpleQueue[Vector] = SimpleQueue()
+        self._points: SimpleQueue[Array] = SimpleQueue()
         self._costs: SimpleQueue[float | None] = SimpleQueue()
         walk = self.box.dimension, seed, self._points, self._costs
         Thread(target=_walk, args=walk, name="annealing", daemon=True).start()
-        self._awaited: Vector | None = None
+        self._awaited: Array | None = None
         self._worst = 0.0
         weakref.finalize(self, self._costs.put, None)
 
@@ -44,7 +45,7 @@ class Annealing(BoxEngine):
         self._awaited = self._points.get()
         return Proposal(self._awaited, "a step of simulated annealing")
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         if cost is not None:
             self._worst = max(self._worst, cost)
         # A failed simulation counts as the worst cost so far: annealing needs a number for every point.
@@ -53,10 +54,10 @@ class Annealing(BoxEngine):
             self._costs.put(self._worst if cost is None else cost)
 
 
-def _walk(dimension: int, seed: int, points: SimpleQueue[Vector], costs: SimpleQueue[float | None]) -> None:
+def _walk(dimension: int, seed: int, points: SimpleQueue[Array], costs: SimpleQueue[float | None]) -> None:
     """Put the points of annealing, started again and again, until there is None in place of a cost."""
 
-    def cost_of(point: Vector) -> float:
+    def cost_of(point: Array) -> float:
         points.put(np.array(point))
         cost = costs.get()
         if cost is None:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
 
-from falsifier.engines.box import Proposal, Vector
+from falsifier.engines.box import Proposal
+from falsifier.engines.layout import Array
 from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
 from falsifier.engines.simple import Sobol
 from falsifier.problem.problem import Problem
@@ -26,7 +27,7 @@ class GaussianProcessEngine(Sobol):
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
         self._start = min(20, 2 * self.box.dimension + 2)
-        self._points: list[Vector] = []
+        self._points: list[Array] = []
         self._costs: list[float] = []
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
@@ -37,15 +38,15 @@ class GaussianProcessEngine(Sobol):
         return self._most_promising(points, standardised(costs), rng)
 
     @abstractmethod
-    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+    def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
         """Return the next point, given standardised costs, shape (n,), at points, shape (n, d)."""
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         if cost is not None:
             self._points.append(point)
             self._costs.append(cost)
 
-    def _kept(self) -> tuple[Vector, Vector]:
+    def _kept(self) -> tuple[Array, Array]:
         points, costs = np.array(self._points), np.array(self._costs)
         if len(costs) <= _MAX_POINTS:
             return points, costs
@@ -65,7 +66,7 @@ class Bayesian(GaussianProcessEngine):
         # Distances in the unit box grow with the square root of its dimension, and so must length scales.
         self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
 
-    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+    def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
         process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
         self._lengths = process.lengths
         best = float(targets.min())
@@ -76,7 +77,7 @@ class Bayesian(GaussianProcessEngine):
         values = log_improvement(*process.predict(samples), best)
         step = 1e-4
 
-        def loss_and_slope(x: Vector) -> tuple[float, Vector]:
+        def loss_and_slope(x: Array) -> tuple[float, Array]:
             shifts = np.where(x > 0.5, -step, step)
             around = np.concatenate([x[None], x + np.diag(shifts)])
             loss = -log_improvement(*process.predict(around), best)
@@ -97,7 +98,7 @@ class Bayesian(GaussianProcessEngine):
         return Proposal(winner, f"log expected improvement {value:.3g} of the scaled robustness")
 
 
-def log_improvement(mean: Vector, deviation: Vector, best: float) -> Vector:
+def log_improvement(mean: Array, deviation: Array, best: float) -> Array:
     """Return the logarithm of the expected improvement below ``best``.
 
     It is finite even if the mean is so far above ``best`` that the expected improvement underflows to 0;

@@ -15,7 +15,8 @@ from botorch.sampling import SobolQMCNormalSampler
 from botorch.utils.sampling import manual_seed
 from gpytorch.mlls import ExactMarginalLogLikelihood
 
-from falsifier.engines.box import Proposal, Vector
+from falsifier.engines.box import Proposal
+from falsifier.engines.layout import Array
 from falsifier.engines.optimisers.bayesian import GaussianProcessEngine
 from falsifier.problem.problem import Problem
 
@@ -33,18 +34,18 @@ class BoTorch(GaussianProcessEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._pending: list[Vector] = []
+        self._pending: list[Array] = []
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         proposal = super()._propose(rng)
         self._pending.append(np.clip(proposal.point, 0.0, 1.0))
         return proposal
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         super()._learn(point, cost)
         self._pending = [p for p in self._pending if not self._is_same(point, p)]
 
-    def _most_promising(self, points: Vector, targets: Vector, rng: np.random.Generator) -> Proposal:
+    def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
         seed = int(rng.integers(2**31))
         with warnings.catch_warnings(), manual_seed(seed), _one_thread():
             warnings.simplefilter("ignore")  # about our scaling of the data and about repeated fits
@@ -53,7 +54,7 @@ class BoTorch(GaussianProcessEngine):
             except ModelFittingError:
                 return Proposal(rng.random(self.box.dimension), "random: fitting the Gaussian process failed")
 
-    def _maximum(self, points: Vector, targets: Vector, seed: int) -> Proposal:
+    def _maximum(self, points: Array, targets: Array, seed: int) -> Proposal:
         inputs, gains = torch.as_tensor(points), torch.as_tensor(-targets)[:, None]
         process = SingleTaskGP(inputs, gains)
         fit_gpytorch_mll(ExactMarginalLogLikelihood(process.likelihood, process))

@@ -3,7 +3,8 @@
 import numpy as np
 from cma import CMAEvolutionStrategy
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal
+from falsifier.engines.layout import Array
 from falsifier.problem.problem import Problem
 
 # Initial standard deviation as a share of the ranges: the authors recommend about a third.
@@ -26,7 +27,7 @@ class CMA(BoxEngine):
         self._rng = np.random.default_rng([seed, 1])
         self._worst = 0.0
         self._strategy = self._start()
-        self._generation: list[Vector] = []
+        self._generation: list[Array] = []
         self._costs: list[float | None] = []
         self._next = 0
         # Where different points have the same candidate, its cost is known from the first one.
@@ -64,7 +65,7 @@ class CMA(BoxEngine):
         why = "uniform random: what the evolution strategy proposes was simulated"
         return Proposal(rng.random(self.box.dimension), why)
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         if cost is not None:
             self._worst = max(self._worst, cost)
         # A failed simulation counts as the worst cost so far: the strategy needs a number for every point.
@@ -77,7 +78,7 @@ class CMA(BoxEngine):
                 break
         self._end()
 
-    def _own(self, i: int) -> Vector:
+    def _own(self, i: int) -> Array:
         """Return a point of the generation, as its candidate has it."""
         return self.box.settled(self._generation[i][: self.box.dimension])
 
@@ -98,5 +99,5 @@ class CMA(BoxEngine):
         return True
 
 
-def _key(point: Vector) -> bytes:
+def _key(point: Array) -> bytes:
     return np.round(point, 6).tobytes()

@@ -5,7 +5,8 @@ import warnings
 import numpy as np
 import optuna
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal
+from falsifier.engines.layout import Array
 from falsifier.problem.problem import Problem
 
 
@@ -25,7 +26,7 @@ class TPE(BoxEngine):
             name: optuna.distributions.FloatDistribution(0.0, 1.0) for name in self._names
         }
         self._study = _quiet_study(seed)
-        self._open: list[tuple[optuna.Trial, Vector]] = []
+        self._open: list[tuple[optuna.Trial, Array]] = []
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         trial = self._study.ask(self._distributions)
@@ -33,7 +34,7 @@ class TPE(BoxEngine):
         self._open.append((trial, point))
         return Proposal(point, f"trial {trial.number + 1} of the tree-structured Parzen estimator")
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         for i, (trial, own) in enumerate(self._open):
             if self._is_same(point, own):
                 del self._open[i]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from falsifier.engines.box import BoxEngine, Proposal, Vector
+from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array, Layout
 from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
 from falsifier.engines.surrogate.variation import changed, held_from, paced
@@ -91,9 +91,9 @@ class TrustRegion(BoxEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._points: list[Vector] = []
+        self._points: list[Array] = []
         self._costs: list[float] = []
-        self._own: list[Vector] = []
+        self._own: list[Array] = []
         self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
         self._restart(first=0)
 
@@ -105,7 +105,7 @@ class TrustRegion(BoxEngine):
         d = self.box.dimension
         costs = np.array(self._costs[self._first :])
         if len(costs) < min(d + 2, 12):
-            drawn: Vector = rng.random(d)
+            drawn: Array = rng.random(d)
             why = "a new start of the trust region"
         else:
             drawn = self._step(np.array(self._points[self._first :]), costs, rng)
@@ -114,7 +114,7 @@ class TrustRegion(BoxEngine):
         self._own.append(point)
         return Proposal(point, why)
 
-    def _step(self, points: Vector, costs: Vector, rng: np.random.Generator) -> Vector:
+    def _step(self, points: Array, costs: Array, rng: np.random.Generator) -> Array:
         d = self.box.dimension
         best = points[int(np.argmin(costs))]
         near = np.argsort(np.abs(points - best).max(axis=1), kind="stable")[:_MOST_POINTS]
@@ -137,7 +137,7 @@ class TrustRegion(BoxEngine):
         mean, deviation = process.predict(candidates)
         return np.asarray(candidates[np.argmin(mean - np.abs(rng.standard_normal(len(mean))) * deviation)])
 
-    def _learn(self, point: Vector, cost: float | None) -> None:
+    def _learn(self, point: Array, cost: float | None) -> None:
         is_own = any(self._is_same(point, own) for own in self._own)
         best = min(self._costs[self._first :], default=np.inf)
         if cost is not None:

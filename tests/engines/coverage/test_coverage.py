@@ -123,7 +123,7 @@ def test_marks_are_said_in_words() -> None:
     assert describe(Mark(MODES, ("gear = 1", "brake = 0"))) == "gear = 1 and brake = 0"
 
 
-GRID = TimeGrid.over(10.0, 10.0, cells=50, shortest=0.1)
+GRID = TimeGrid(0.2, 50, 50)
 
 
 def layout_of(*, inputs: int) -> Layout:

@@ -1,9 +1,8 @@
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from falsifier.engines.layout import Array as Points
 from falsifier.engines.layout import TimeGrid, planning_layout
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.surrogate import Surrogate
@@ -19,19 +18,13 @@ def diverges(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return lag(times, inputs, parameters)
 
 
-def learned(points: Points, failed: Sequence[bool]) -> Points:
-    problem = lag_problem(points=1)
-    grid = TimeGrid.over(10.0, 10.0, cells=10, shortest=0.1)
-    layout = planning_layout(problem.space, grid)
-    feasibility = Feasibility(layout, grid)
-    for point, bad in zip(points, failed, strict=True):
-        feasibility.add(point, failed=bad)
-    return feasibility.risk(np.array([[0.0], [0.25], [0.75], [1.0]]))
-
-
 def test_the_risk_grows_towards_failures() -> None:
     points = np.linspace(0.0, 1.0, 9)[:, None]
-    risk = learned(points, [bool(p > 0.6) for p in points[:, 0]])
+    grid = TimeGrid(1.0, 10, 10)
+    feasibility = Feasibility(planning_layout(lag_problem(points=1).space, grid), grid)
+    for point in points:
+        feasibility.add(point, failed=bool(point[0] > 0.6))
+    risk = feasibility.risk(np.array([[0.0], [0.25], [0.75], [1.0]]))
     assert (np.diff(risk) > 0).all()
     assert risk[0] < 0.1 < 0.5 < risk[2]
 

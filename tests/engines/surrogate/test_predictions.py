@@ -12,7 +12,6 @@ from falsifier.engines.surrogate.variation import random_points
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import Monitor, parse
 from falsifier.testing import FREE, START, lag_problem
-from tests.engines.surrogate.support import history_of
 
 STEP, CELLS = 0.5, 40
 
@@ -55,7 +54,11 @@ def test_windows_between_grid_points_are_rounded(text: str) -> None:
 
 
 def test_dynamics_predict_an_unseen_input_from_a_few_trajectories() -> None:
-    history = history_of(lag_problem(free=FREE, inputs=2, parameters=[START]), simulations=12)
+    problem = lag_problem(free=FREE, inputs=2, parameters=[START])
+    grid, rng = TimeGrid.of(problem, cells=50), np.random.default_rng(0)
+    history = History(problem, grid, planning_layout(problem.space, grid))
+    for point in random_points(history.layout, rng, 12):
+        history.add(evaluate(problem, history.layout.candidate(point, origin="t", rationale="t")), point)
     traces = [s.trace for s in history.samples]
     fitted = LinearDynamics(traces[:-2], 0, np.random.default_rng(0))
     for trace in traces[-2:]:
