@@ -10,6 +10,7 @@ from falsifier.views.report.wording import (
     differences,
     input_table,
     limit_facts,
+    margin_beside,
     parameter_facts,
     replay_command,
     result_text,
@@ -18,7 +19,7 @@ from falsifier.views.report.wording import (
     trouble_lines,
     unshown_lines,
 )
-from falsifier.views.text import Fact, margin_facts
+from falsifier.views.text import Fact
 
 
 def markdown_report(*directories: Path) -> str:
@@ -83,8 +84,8 @@ def _found(shown: Shown) -> list[str]:
         parts.append(markdown_text(one_line(shown.explanation)))
     if shown.confirmed:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
-    if shown.run.falsified:
-        parts.append(_facts(margin_facts(shown.verdict, shown.units)))
+    if beside := margin_beside(shown.verdict, shown.units):
+        parts.append(_facts(beside))
     if advice(shown):
         parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
     return parts

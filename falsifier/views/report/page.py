@@ -24,6 +24,7 @@ from falsifier.views.report.wording import (
     input_table,
     level_facts,
     limit_facts,
+    margin_beside,
     parameter_facts,
     replay_command,
     result_text,
@@ -33,7 +34,7 @@ from falsifier.views.report.wording import (
     trouble_lines,
     unshown_lines,
 )
-from falsifier.views.text import Fact, margin_facts
+from falsifier.views.text import Fact
 
 if TYPE_CHECKING:
     from falsifier.views.plotting import Figure
@@ -274,8 +275,7 @@ def _seconds(run: Run) -> str:
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     run, rationale = shown.run, shown.candidate.rationale
-    facts = margin_facts(shown.verdict, shown.units) if run.falsified else []
-    facts += level_facts(run)
+    facts = [*margin_beside(shown.verdict, shown.units), *level_facts(run)]
     facts += [("rationale", rationale)] if rationale else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:

@@ -88,6 +88,11 @@ def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
     return broken_facts(verdict) or margin_facts(verdict, units)
 
 
+def margin_beside(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
+    """Return the margin of what broke, also if it was not confirmed; ``limit_facts`` has it of the rest."""
+    return margin_facts(verdict, units) if broken_facts(verdict) else []
+
+
 def input_table(shown: Shown) -> Table:
     """Return the inputs of a simulation as a table of their control points over time.
 

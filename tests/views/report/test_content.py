@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.store import save, to_store
+from falsifier.engines import make_engine
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.shorthand import changes_from_options
@@ -21,6 +22,7 @@ from falsifier.views.report.page import html_report
 from falsifier.views.report.wording import run_command
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import hard, mostly_broken
+from tests.stepped import euler_problem
 
 
 def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) -> None:
@@ -38,6 +40,15 @@ def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -
     for place in places:
         assert f"## HARD in {place}: violated" in text
         assert f"{place}: falsifier " in text, "its versions"
+
+
+def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) -> None:
+    problem = euler_problem("G[1,1] (x <= 0.65)")
+    result = falsify(problem, make_engine("corners", problem, seed=0), budget=2, directory=tmp_path)
+    assert result.fragile and result.counterexample is None
+    for text in (markdown_report(tmp_path), html_report(tmp_path)):
+        assert "was violated" in text
+        assert "-0.00132156 (violated by this margin)" in text.replace("\\", "").replace("−", "-")
 
 
 def test_a_search_can_be_repeated_from_its_command() -> None:
