@@ -12,11 +12,15 @@ from io import FileIO
 from pathlib import Path
 
 
-def unnamed_file() -> FileIO:
-    """Open a file without a name, in memory if the system supports that."""
+def unnamed_file(*, may_be_sealed: bool = False) -> FileIO:
+    """Open a file without a name, in memory if the system supports that.
+
+    Args:
+        may_be_sealed: whether anybody who has it, an FMU too, may forbid all others to resize or write it.
+    """
     if sys.platform == "linux" and hasattr(os, "memfd_create"):
-        descriptor = os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-        return FileIO(descriptor, "w+b")
+        sealing = os.MFD_ALLOW_SEALING if may_be_sealed else 0
+        return FileIO(os.memfd_create("falsifier-fmu", os.MFD_CLOEXEC | sealing), "w+b")
     return tempfile.TemporaryFile(buffering=0)
 
 
@@ -41,7 +45,7 @@ def sealed_file(size: int) -> FileIO:
     Raises:
         OSError: as for ``enlarge``.
     """
-    file = unnamed_file()
+    file = unnamed_file(may_be_sealed=True)
     enlarge(file, size)
     if sys.platform == "linux" and hasattr(os, "memfd_create"):
         fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_SEAL)

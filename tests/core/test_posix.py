@@ -1,3 +1,4 @@
+import fcntl
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,12 @@ def test_on_windows_the_import_says_where_to_install_it() -> None:
     code = "import sys; sys.platform = 'win32'; import falsifier"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 1 and "ImportError: " in done.stderr and "WSL2" in done.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="files have seals on Linux only")
+def test_nobody_can_keep_others_from_writing_a_file_without_a_name() -> None:
+    with posix_files.unnamed_file() as file, pytest.raises(PermissionError):
+        fcntl.fcntl(file, fcntl.F_ADD_SEALS, fcntl.F_SEAL_GROW)
 
 
 def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
