@@ -45,7 +45,7 @@ _EXHAUSTED = {
 # name: (module, summary in --help). A group has a table of its own in place of a module.
 _Table = dict[str, "tuple[str | _Table, str]"]
 _LLM: _Table = {
-    "check": ("falsifier.cli.llm", "Check name and key of a language model with one short request."),
+    "check": ("falsifier.cli.llm", "Check a language model with a few short requests."),
     "prompt": ("falsifier.cli.llm", "Print the prompt that a language model would get, or was sent."),
 }
 _TOOLS: _Table = {

@@ -112,9 +112,8 @@ def simulate(
             raise CandidateError(f"the model has no input {name!r}; {did_you_mean(name, known)}")
     for name in parameters or {}:
         if name not in settable:
-            raise CandidateError(
-                f"the model has no parameter {name!r} to set; {did_you_mean(name, settable)}"
-            )
+            others = [other for other in (*known, *settable) if other != name]
+            raise CandidateError(f"the model has no parameter {name!r} to set; {did_you_mean(name, others)}")
     signals = {n: s if isinstance(s, Signal) else Signal((0.0,), (float(s),)) for n, s in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
     candidate = Candidate(signals, {n: float(v) for n, v in (parameters or {}).items()}, "user")

@@ -134,7 +134,7 @@ def join_formula(
     """
     path = model if isinstance(model, Path) else Path(model.name)
     if isinstance(model, Path) and not model.is_file():
-        raise SpecError(f"{path}: no such file; give the path of an .fmu file")
+        raise SpecError(f"{path}: no such file, or a folder; give the path of an .fmu file")
     if isinstance(model, Path) and is_package(model):
         model = replace(read_package(model), logging=bool(changes.logging))
     data: dict[str, Any]

@@ -68,6 +68,9 @@ def find_spec(target: str) -> tuple[Path, str | None]:
             f"falsifier resume {shlex.quote(target)} continues it, "
             f"falsifier llm prompt {shlex.quote(target)} --at N prints what was asked before sample N"
         )
+    if Path(f"{name}.toml").is_file():
+        meant = f"{name}.toml{target.removeprefix(name)}"
+        raise SpecError(f"no spec file or bundled requirement {target!r}; did you mean {meant!r}?")
     raise SpecError(
         f"no spec file or bundled requirement {target!r}; give a file like my.toml:REQ, or a bundled name; "
         f"{did_you_mean(name, names)}"

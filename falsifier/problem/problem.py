@@ -219,7 +219,7 @@ def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str
         if not variable.is_bounded:
             return f"no range is given, and the {info.noun} specifies no min and max"
         low, high = variable.limits
-        return f"it is not named beside what is searched; its range is {low:g} to {high:g}"
+        return f"not named beside what is searched; range {low:g} to {high:g}"
     return "no range is given"
 
 

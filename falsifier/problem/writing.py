@@ -238,7 +238,7 @@ def subject_of(target: str) -> Subject:
 
 def _of_model(fmu: Path) -> Subject:
     if not fmu.is_file():
-        raise SpecError(f"{fmu}: no such file; give the path of an .fmu file, or a spec")
+        raise SpecError(f"{fmu}: no such file, or a folder; give the path of an .fmu file, or a spec")
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
     path, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
     return Subject(problem_of_starter(text, path), path, text, is_new=True, free_grid=True)

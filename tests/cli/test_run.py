@@ -60,6 +60,8 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         (("AT1", "--parameterization", "free,fixed"), "for example instance2,fixed"),
         (("AT1", "--parameterization", "free:x"), "expected a time in s"),
         (("at1",), "did you mean 'AT1'?"),
+        (("empty:R",), "did you mean 'empty.toml:R'?"),
+        (("folder.fmu", "--stl", "G (speed <= 1)"), "folder.fmu: no such file, or a folder"),
         (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
         ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
         ((*SPEED, "--search", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
@@ -71,6 +73,7 @@ def test_what_newcomers_get_wrong_is_answered_with_what_to_write(
 ) -> None:
     (tmp_path / "my.fmu").symlink_to(bundled("fmus") / "AT.fmu")
     (tmp_path / "empty.toml").write_text("# nothing yet\n")
+    (tmp_path / "folder.fmu").mkdir()
     result = command("run", *arguments)
     assert result.exit_code != 0
     assert message in f"{result.output} {result.exception}"

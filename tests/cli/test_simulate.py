@@ -98,3 +98,8 @@ def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) ->
     assert resumed.code == 0, resumed.err
     assert resumed.json["best"] == done.json["best"]
     assert falsifier("run", target, "--inputs", "run", *start[2:], cwd=tmp_path).code == 0
+
+
+def test_a_misspelt_input_is_recognised_among_the_parameters(tmp_path: Path) -> None:
+    done = falsifier("simulate", "AT1", "--set", "throtle=100", cwd=tmp_path)
+    assert (done.code, "did you mean 'throttle'?" in done.err) == (2, True)

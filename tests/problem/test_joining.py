@@ -117,7 +117,7 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
     assert found["in_Integer"] == (0, 5, "integer", "constant")
     chosen = Problem.from_fmu(fmu, "G[0,1] (out_Real <= 1)", inputs={"in_Real": (0, 1), "in_Boolean": 1.0})
     held = {h.name: (h.value, h.reason) for h in chosen.held}
-    assert held["in_Integer"] == (0.0, "it is not named beside what is searched; its range is 0 to 5")
+    assert held["in_Integer"] == (0.0, "not named beside what is searched; range 0 to 5")
     assert held["in_Boolean"] == (1.0, "its value is given")
 
 

@@ -125,9 +125,14 @@ def overview(side: Side) -> str:
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
         total(run.spent for run in searches(runs)).simulations_text,
-        f"started {min((run.manifest.started for run in runs), default='')}",
+        *([f"started {_minute(min(run.manifest.started for run in runs))}"] if runs else []),
     ]
     return ", ".join(parts) + "."
+
+
+def _minute(started: str) -> str:
+    """To the minute: of 2026-03-01T10:20:30+00:00, as manifests have it, 2026-03-01 10:20 UTC."""
+    return f"{started[:16].replace('T', ' ')} UTC"
 
 
 def drawn(make: "Callable[[], Figure]", description: str) -> Html:

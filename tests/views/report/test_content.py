@@ -81,7 +81,7 @@ def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_pa
     for report in (html_report(tmp_path), markdown_report(tmp_path), junit_report(tmp_path)):
         plain = unescape(report).replace("\\", "")
         assert result.failures[0].text in plain
-        assert "not searched: v = 0 (it is not named beside what is searched" in plain
+        assert "not searched: v = 0 (not named beside what is searched" in plain
     assert "gain = 1" in html_report(tmp_path)
 
 
