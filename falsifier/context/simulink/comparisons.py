@@ -20,6 +20,7 @@ _COMPARING: Mapping[str, str] = {
 }
 _WORD = re.compile(r"\b[A-Za-z]\w*+")
 _PORT = re.compile(r"\bu(\d*+)\b(?!\()")
+_LONGEST = 160  # characters of a threshold
 _NUMBER = re.compile(r"[-+]?(\d++\.?\d*+|\.\d++)([eE][-+]?\d++)?$")
 # A constant may state its type: single(5), int8(3).
 _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\)$")
@@ -109,7 +110,7 @@ def _quoted(name: str) -> str:
 def _compared(block: Block, inputs: Mapping[str, str]) -> str:
     """Return what a block compares, separated by commas; empty if it compares nothing."""
     stated = {"Threshold": "0", **dict(block.parameters)}
-    text = _COMPARING.get(block.type, "")
-    for _ in range(2):  # the criteria of a switch name its threshold
-        text = _WORD.sub(lambda word: stated.get(word[0], word[0]), text)
+    text = _WORD.sub(lambda word: stated.get(word[0], word[0]), _COMPARING.get(block.type, ""))
+    if block.type == "Switch" and len(stated["Threshold"]) <= _LONGEST:  # its criteria name it
+        text = text.replace("Threshold", stated["Threshold"])
     return _PORT.sub(lambda port: inputs.get(port[1] or "1", port[0]), text).replace("~=", "!=")
