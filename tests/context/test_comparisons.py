@@ -40,15 +40,16 @@ def test_ports_in_expressions_are_named_by_what_leads_to_them() -> None:
         Block("Inport", "Threshold speed", number=2),
         Block("If", "if", (("IfExpression", "u1 > 3"), ("ElseIfExpressions", "u2 ~= 4, u1 < 1"))),
         Block("Fcn", "fcn", (("Expr", "u > 5"),)),
+        Block("Fcn", "itself", (("Expr", "u > 5 * Expr"),)),
         Block("Switch", "s", (("Criteria", "u2 > Threshold"), ("Threshold", "7"))),
     )
     wires = (
-        Wire(End("u2", "1"), (End("if", "1"), End("fcn", "1"))),
+        Wire(End("u2", "1"), (End("if", "1"), End("fcn", "1"), End("itself", "1"))),
         Wire(End("Threshold speed", "1"), (End("if", "2"), End("s", "2"))),
     )
     texts = [text for text, _ in told(Diagram("m", BlockSystem(blocks, wires)))]
     speed = "'Threshold speed'"
-    assert texts == ["u2 > 3", f"{speed} != 4", "u2 < 1", "u2 > 5", f"{speed} > 7"]
+    assert texts == ["u2 > 3", f"{speed} != 4", "u2 < 1", "u2 > 5", "u2 > 5 * Expr", f"{speed} > 7"]
 
 
 @pytest.mark.parametrize(

@@ -71,9 +71,6 @@ DIAGRAMS = {
     ),
     "pieces of text": of_blocks(lambda n: BLOCK.format("Gain", "g", 'Gain "1"\n' + '"23"\n' * (n // 5), "u")),
     "a number that is none": of_blocks(lambda n: BLOCK.format("Constant", "1" * n + "x", "", "u")),
-    "a name that stands for itself": of_blocks(
-        lambda n: BLOCK.format("Fcn", "f", f'Expr "{"Expr " * (n // 5)}"', "u")
-    ),
     "transitions": lambda n: simulink.MDL.replace(
         "Stateflow {\n",
         "Stateflow {\n"
