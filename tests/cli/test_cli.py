@@ -26,6 +26,7 @@ from tests.command import ROOT, falsifier
         (["run", "python:gone_module:problem"], "start the command line with python -m falsifier"),
         (["run", "python:tests.problems:gone"], "expected python:MODULE:NAME that can be imported"),
         (["init", "AT.fmu", "--out", "gone/x.toml"], "no such folder gone"),
+        (["init", "my.toml"], "is a spec, not an FMU"),
         (["explain", "."], "not a run directory; expected a counterexample file"),
         (["coverage", "."], ".: not a run directory"),
         (["run", "AT1", "--stl", "x <= 1", "--stl", "x <= 2"], "--stl: given 2 times"),
