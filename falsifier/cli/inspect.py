@@ -112,7 +112,8 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     from falsifier.problem.writing import problem_of_starter
 
     if spec := next((f for f in fmus if f.suffix == ".toml"), None):
-        raise SpecError(f"{spec} is a spec, not an FMU; to check it: falsifier check {shlex.quote(str(spec))}")
+        command = f"falsifier check {shlex.quote(str(spec))}"
+        raise SpecError(f"{spec} is a spec, not an FMU; to check it: {command}")
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     in_existing_folder(path)
     if path.exists():

@@ -1,4 +1,4 @@
-"""The settings of the surrogate engine that measurements vary, with the reasons for them; the same for every model."""
+"""The settings of the surrogate engine that measurements vary, with the reasons; the same for every model."""
 
 from dataclasses import dataclass
 
