@@ -39,7 +39,7 @@ def test_known_names_are_listed_with_the_nearest_first() -> None:
     [
         ("Value error, low < high", [1, 0], "low < high"),
         ("Input should be 1 or 2", 3, "expected 1 or 2, got 3"),
-        ("Field required", None, "Field required"),
+        ("Field required", None, "a value is missing"),
         ("Input should be greater than 0", -5.0, "expected a number greater than 0, got -5.0"),
         ("Input should be a valid number, unable to parse string", "x", "expected a number, got 'x'"),
         ("Input should be a valid integer, got a number with", 2.5, "expected a whole number, got 2.5"),
