@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import converse
-from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, ToolCall
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.replay import ScriptedChat
 from falsifier.llm.replies import ReplyForm
 
@@ -76,8 +76,6 @@ def odd_replies() -> Iterator[tuple[str, ChatReply]]:
     }
     for name, text in texts.items():
         yield name, ChatReply(text=text)
-    call = ToolCall(id="1", name="reply", arguments=TEXT)
-    yield "JSON in a call of a tool that was not offered", ChatReply(text="", tool_calls=(call,))
     yield "JSON in the reasoning only", ChatReply(text="", reasoning=TEXT)
     yield "refusal, told by the server", ChatReply(text="I will not.", finish_reason="refusal")
     yield "cut off, told by the server", ChatReply(text=TEXT[:-20], finish_reason="length")

@@ -15,9 +15,9 @@ from falsifier.llm import CONTEXT_VARIANT
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import Questions, Variant, View, variant_named
 from falsifier.llm.prompts.disguise import Disguise
+from falsifier.llm.prompts.numbers import number
 from falsifier.llm.prompts.published import as_point
 from falsifier.llm.replies import ReplyForm
-from falsifier.llm.tools import MOST_CANDIDATES, PredictionTool, Predictor, predicted
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
@@ -108,28 +108,22 @@ class Briefing:
 
     def foretold(self, verdict: Verdict) -> str:
         """Return a predicted verdict in words, limited to what the variant shows of samples."""
-        return predicted(self.variant, self._hidden_verdict(verdict))
+        verdict = self._disguise.hidden_verdict(verdict) if self._disguise else verdict
+        text = f"predicted robustness {signed(verdict.robustness, 3)}"
+        if not self.variant.has("critical"):
+            return text
+        by = f" by {verdict.predicate}" if self.variant.has("requirement") and verdict.predicate else ""
+        return f"{text}, decided at about t = {number(verdict.critical_time, 4)} s{by}"
 
-    def form(self, count: int, *, reasoned: bool = True) -> ReplyForm:
-        """Return the form of replies with up to ``count`` candidates.
-
-        Args:
-            count: maximum number of candidates.
-            reasoned: whether the LLM says why, and what it learnt; predictions need neither.
-        """
+    def form(self, count: int) -> ReplyForm:
+        """Return the form of replies with up to ``count`` candidates."""
         return ReplyForm(
             self.view.space,
             named=self.variant.has("names"),
             free=self.variant.has("freedom"),
             count=count,
-            reasoned=reasoned,
-            lessons=reasoned and self.variant.has("lessons"),
+            lessons=self.variant.has("lessons"),
         )
-
-    def tool(self, predictor: Predictor) -> PredictionTool:
-        """Return the tool with which the LLM requests predictions."""
-        form = self.form(MOST_CANDIDATES, reasoned=False)
-        return PredictionTool(predictor, form, self.variant, reveal=self.revealed, hide=self._hidden_verdict)
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
@@ -191,9 +185,6 @@ class Briefing:
                 start = self._disguise.hidden_values(start)
             self._questions = Questions(self.view, self.variant, start=start, llm=self._llm)
         return self._questions
-
-    def _hidden_verdict(self, verdict: Verdict) -> Verdict:
-        return self._disguise.hidden_verdict(verdict) if self._disguise else verdict
 
 
 def told_context(

@@ -7,8 +7,7 @@ next, from what each half has brought.
 A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
 starts of its own search; the best predicted one is simulated if that is worth it. One that is the same
 experiment as an earlier sample is not simulated on untested predictions, and the LLM is told so. Before it
-answers, the LLM is told why the surrogate chose its samples and what it would do next, and may request
-predictions.
+answers, the LLM is told why the surrogate chose its samples and what it would do next.
 """
 
 import logging
@@ -218,8 +217,7 @@ class Hybrid:
         """Ask for several candidates; return them, the most promising one first."""
         notes = [*self._standing(), *self._repeats, *self._reasons_told()]
         self._repeats.clear()
-        predictor = self.surrogate if self._is_trusted else None
-        candidates = self.adviser.propose(_COUNT, notes, predictor=predictor, dispensable=True)
+        candidates = self.adviser.propose(_COUNT, notes, dispensable=True)
         self.surrogate.suggest(candidates)
         predictions = self.surrogate.foresee(candidates) if self._is_trusted else []
         if not predictions:

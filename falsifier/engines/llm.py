@@ -18,7 +18,6 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.candidate_text import lessons_in
 from falsifier.llm.conversation import NoValidReplyError, OnExchange, RejectedReplyError, converse
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
-from falsifier.llm.tools import Predictor
 from falsifier.problem.problem import Problem
 
 # Questions in a row without a valid answer after which an LLM is not worth its money.
@@ -117,21 +116,12 @@ class LLMEngine:
                 candidates.append(self._instead(error))
         return candidates
 
-    def propose(
-        self,
-        count: int,
-        notes: Sequence[str] = (),
-        *,
-        predictor: Predictor | None = None,
-        dispensable: bool = False,
-    ) -> list[Candidate]:
+    def propose(self, count: int, notes: Sequence[str] = (), *, dispensable: bool = False) -> list[Candidate]:
         """Ask one question of an engine that leads the search; return new candidates, at least one.
 
         Args:
             count: maximum number of candidates.
             notes: lines to add to the question, after problem and history.
-            predictor: makes the predictions that the LLM may request before it answers; ignored if the LLM
-                does not support tools.
             dispensable: whether the search continues without an answer. A missing answer is then recorded, so
                 that a resumed run continues in the same way.
 
@@ -140,14 +130,8 @@ class LLMEngine:
         """
         briefing = self.briefing
         messages = briefing.question(count, notes)
-        tool = None if predictor is None else briefing.tool(predictor)
         form = briefing.form(count)
-        request = ChatRequest(
-            messages=messages,
-            reply_schema=form.schema(),
-            tools=() if tool is None else (tool.offer,),
-            sample=self._sample,
-        )
+        request = ChatRequest(messages=messages, reply_schema=form.schema(), sample=self._sample)
 
         def read(text: str) -> list[Candidate]:
             new = self._new(form.read(text, origin=self.name))
@@ -156,9 +140,7 @@ class LLMEngine:
             return new[:count]
 
         try:
-            found = converse(
-                self._chat, request, read, self._on_exchange, respond=None if tool is None else tool.respond
-            )
+            found = converse(self._chat, request, read, self._on_exchange)
         except NoValidReplyError:
             raise
         except ChatError as error:

@@ -1,6 +1,5 @@
 """Whether a language model can be used: a few short requests, and what was found on what runs need."""
 
-import json
 from dataclasses import dataclass
 from textwrap import shorten
 from typing import Any
@@ -8,17 +7,12 @@ from typing import Any
 from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.json_text import objects_in, schema_of_list, schema_of_object
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Message, Tool, Usage
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Message, Usage
 
 # Tokens; enough for a model that reasons before a short answer.
 _SHORT, _CUT = 4000, 8
 _LONGEST_SHOWN = 60
 _SCHEMA = schema_of_object(values=schema_of_list({"type": "number"}, 3, 3), rationale={"type": "string"})
-_TOOL = Tool(
-    name="measure",
-    description="Measures the temperature.",
-    parameters=schema_of_object(place={"type": "string"}),
-)
 _ASKED = (
     'Reply with one JSON object in this form, with three numbers that sum to 6: {"values": [3 numbers], '
     '"rationale": "why these"}'
@@ -72,48 +66,23 @@ def check_chat(chat: Chat) -> tuple[list[Feature], Usage]:
     elif "effort" in sent:
         said = f"sent; {usage.reasoning_tokens} tokens of reasoning reported"
         features.append(Feature("effort", works=True, said=said))
-    for name, request, judge in (
-        ("tools", _request("How warm is it in Paris? Measure it.", tools=(_TOOL,)), _on_tools),
-        ("length", _request("Count from 1 to 100 in words.", most=_CUT), _on_length),
-    ):
-        try:
-            reply = chat.complete(request)
-        except ChatError as error:
-            features.append(Feature(name, works=False, said=str(error)))
-        else:
-            features.append(Feature(name, *judge(reply)))
-            usage += reply.usage
+    try:
+        reply = chat.complete(_request("Count from 1 to 100 in words.", most=_CUT))
+    except ChatError as error:
+        features.append(Feature("length", works=False, said=str(error)))
+    else:
+        usage += reply.usage
+        works = reply.finish_reason == "length"
+        failed = f"a limit of {_CUT} tokens was not kept or not told ({reply.finish_reason})"
+        features.append(Feature("length", works, "a reply that is cut off says so" if works else failed))
     return features, usage
 
 
-def _request(
-    question: str, *, schema: dict[str, Any] | None = None, tools: tuple[Tool, ...] = (), most: int = _SHORT
-) -> ChatRequest:
+def _request(question: str, *, schema: dict[str, Any] | None = None, most: int = _SHORT) -> ChatRequest:
     message = Message(role="user", content=question)
-    return ChatRequest(messages=(message,), reply_schema=schema, tools=tools, max_tokens=most)
+    return ChatRequest(messages=(message,), reply_schema=schema, max_tokens=most)
 
 
 def _read_values(text: str) -> None:
     if not any(isinstance(one, dict) and isinstance(one.get("values"), list) for one in objects_in(text)):
         raise RejectedReplyError(f"not the JSON that was asked for: {shorten(text, _LONGEST_SHOWN)!r}")
-
-
-def _on_tools(reply: ChatReply) -> tuple[bool, str]:
-    if not reply.parameters.get("tools"):
-        return False, "not taken; the hybrid engine tells predictions afterwards"
-    if not reply.tool_calls:
-        return False, "offered, but not called"
-    arguments = reply.tool_calls[0].arguments
-    try:
-        given = json.loads(arguments)
-    except ValueError:
-        given = None
-    if not isinstance(given, dict) or "place" not in given:
-        return False, f"called with wrong arguments: {shorten(arguments, _LONGEST_SHOWN)!r}"
-    return True, "called with the arguments that were asked for"
-
-
-def _on_length(reply: ChatReply) -> tuple[bool, str]:
-    if reply.finish_reason == "length":
-        return True, "a reply that is cut off says so"
-    return False, f"a limit of {_CUT} tokens was not kept or not told ({reply.finish_reason})"

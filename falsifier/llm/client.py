@@ -1,20 +1,13 @@
 """An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures."""
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
 from time import perf_counter
 from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.errors import ChatError
-from falsifier.llm.failures import (
-    FormatUnsupportedError,
-    ToolsUnsupportedError,
-    UnreadableReplyError,
-    classify,
-)
+from falsifier.llm.failures import FormatUnsupportedError, UnreadableReplyError, classify
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
     completed,
@@ -29,7 +22,6 @@ from falsifier.llm.messages import (
     ChatRequest,
     Message,
     Mode,
-    ToolCall,
     Usage,
     cleaned,
 )
@@ -53,9 +45,6 @@ class LiteLLMChat:
 
     It is asked by JSON Schema, else for any JSON object, else in words only; what worked is remembered. The
     next way is tried if the server rejects one, or repeatedly cannot parse what it makes the LLM write.
-    Requests that offer tools have ways of their own: some servers accept a schema and accept tools but reject
-    the two together. Below the last way, or if the server rejects tools altogether, they are sent without
-    tools.
 
     Attributes:
         llm: litellm's name, e.g. ``openai/gpt-5-mini``.
@@ -64,7 +53,7 @@ class LiteLLMChat:
         options: further parameters of litellm's ``completion``, passed unchanged.
         timeout: seconds to wait for a complete reply.
         price: price stated by the user; None: litellm's table.
-        mode: how the next reply that follows a schema is asked for, if no tools are offered.
+        mode: how the next reply that follows a schema is asked for.
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
         attempts: maximum number of requests per reply if failures are temporary.
@@ -81,12 +70,7 @@ class LiteLLMChat:
     content: str = ""
     attempts: int = DEFAULT_ATTEMPTS
     first_delay: float = FIRST_DELAY
-    _mode_with_tools: Mode = field(init=False)
-    _takes_tools: bool = field(init=False, default=True)
     _unreadable: int = field(init=False, default=0)
-
-    def __post_init__(self) -> None:
-        self._mode_with_tools = self.mode
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -114,49 +98,23 @@ class LiteLLMChat:
 
     def _asked(self, request: ChatRequest) -> ChatReply:
         while True:
-            if not self._takes_tools:
-                request = request.model_copy(update={"tools": ()})
-            mode = max(self.mode, self._mode_with_tools, key=MODES.index) if request.tools else self.mode
-            below = MODES[MODES.index(mode) + 1 :] if request.reply_schema is not None else ()
+            below = MODES[MODES.index(self.mode) + 1 :] if request.reply_schema is not None else ()
             try:
-                reply = self.send(request, mode)
-            except (FormatUnsupportedError, ToolsUnsupportedError) as error:
-                if below and isinstance(error, FormatUnsupportedError):
-                    self._descend(request, below[0])
-                elif request.tools:
-                    self._refuse_tools(request)
-                else:
+                reply = self.send(request)
+            except FormatUnsupportedError:
+                if not below:
                     raise
+                self.mode = below[0]
             else:
                 # After several that the server could not parse, ask in a plainer way from now on.
                 self._unreadable = self._unreadable + 1 if reply.finish_reason == UNREADABLE else 0
                 if self._unreadable >= _MOST_UNREADABLE and below:
                     self._unreadable = 0
-                    self._descend(request, below[0])
+                    self.mode = below[0]
                 return reply
 
-    def _descend(self, request: ChatRequest, plainer: Mode) -> None:
-        if request.tools:
-            self._mode_with_tools = plainer
-        else:
-            self.mode = plainer
-
-    def _refuse_tools(self, request: ChatRequest) -> None:
-        """Remember that the server rejects tools."""
-        if any(message.role == "tool" for message in request.messages):
-            # The conversation contains tool calls already, which cannot be sent without the tools.
-            raise ChatError(
-                f"{self.llm}: the server first accepted a tool, then rejected it in the same turn; "
-                "use --engine llm, which offers no tools"
-            )
-        self._takes_tools = False
-
-    def send(self, request: ChatRequest, mode: Mode | None = None) -> ChatReply:
+    def send(self, request: ChatRequest) -> ChatReply:
         """Send one request.
-
-        Args:
-            request: what is sent.
-            mode: how to ask for a reply that follows a schema; None: as the next one is asked for.
 
         Returns:
             The reply; one without text, and with the finish reason ``UNREADABLE``, if the server could not
@@ -165,14 +123,12 @@ class LiteLLMChat:
         Raises:
             TransientChatError: if a retry may succeed.
             FormatUnsupportedError: if the server rejects this way of asking for JSON.
-            ToolsUnsupportedError: if the server rejects the tools that are offered.
             ChatError: for any other failure; it names the LLM and the key's variable.
         """
-        mode = mode or self.mode
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
         load_litellm()
-        arguments = self._arguments(request, mode)
+        arguments = self._arguments(request)
         left = request.seconds_left
         if left is not None and left <= 0:  # the import above may have taken it
             raise ChatError(f"{self.llm}: nothing was sent: the time limit ended while the client was loaded")
@@ -187,18 +143,13 @@ class LiteLLMChat:
                 timeout=timeout,
                 **{"api_key": key, **arguments},
             )
-            return self._reply(request, response, arguments, mode, perf_counter() - started)
+            return self._reply(request, response, arguments, perf_counter() - started)
 
         try:
             return cleaned(within(timeout if left is None else min(timeout, left), ask), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
-                error,
-                llm=self.llm,
-                api_base=self.api_base,
-                secrets=secrets,
-                offers_tools=bool(request.tools),
-                options=self.options,
+                error, llm=self.llm, api_base=self.api_base, secrets=secrets, options=self.options
             )
             if isinstance(failure, UnreadableReplyError):
                 return ChatReply(
@@ -206,7 +157,7 @@ class LiteLLMChat:
                     finish_reason=UNREADABLE,
                     usage=self._lost(request, timed_out=0),
                     seconds=perf_counter() - started,
-                    parameters=self._effective(arguments, mode),
+                    parameters=self._effective(arguments),
                 )
             if isinstance(error, TimeoutError) or type(error).__name__ == "Timeout":
                 failure.lost = self._lost(request, timed_out=1)
@@ -219,74 +170,68 @@ class LiteLLMChat:
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}
 
-    def _arguments(self, request: ChatRequest, mode: Mode) -> dict[str, Any]:
+    def _arguments(self, request: ChatRequest) -> dict[str, Any]:
         arguments = self._options()
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
             if known(self.llm).effort == "allowed":
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
-        if request.reply_schema is not None and mode in ("bounded_schema", "json_schema"):
-            schema = request.reply_schema
-            schema = schema if mode == "bounded_schema" else without_limits(schema)
+        schema = request.reply_schema
+        if schema is not None and self.mode in ("bounded_schema", "json_schema"):
+            schema = schema if self.mode == "bounded_schema" else without_limits(schema)
             arguments["response_format"] = {
                 "type": "json_schema",
                 "json_schema": {"name": "reply", "strict": True, "schema": schema},
             }
-        elif request.reply_schema is not None and mode == "json_object":
+        elif schema is not None and self.mode == "json_object":
             arguments["response_format"] = {"type": "json_object"}
-        if request.tools:
-            functions = [without_limits(tool.model_dump()) for tool in request.tools]
-            arguments["tools"] = [{"type": "function", "function": each} for each in functions]
         if request.max_tokens:
             arguments["max_tokens"] = max(request.max_tokens, arguments.get("max_tokens") or 0)
         return arguments
 
     def _reply(
-        self, request: ChatRequest, response: Any, arguments: Mapping[str, Any], mode: Mode, seconds: float
+        self, request: ChatRequest, response: Any, arguments: Mapping[str, Any], seconds: float
     ) -> ChatReply:
         choice = response.choices[0]
         refusal = _refusal(choice.message)
         refused = bool(refusal) and not choice.message.content
-        text = storable(choice.message.content or refusal)
-        echo = known(self.llm).echo
-        calls = calls_in(choice.message, echo)
+        # Some servers put the whole answer into a call of a tool that nobody offered.
+        calls = (call.function.arguments for call in getattr(choice.message, "tool_calls", None) or ())
+        places = (choice.message.content or refusal, *calls)
+        text = storable(next((place for place in places if (place or "").strip()), ""))
         cost = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         # Another server under a listed name has its own prices, and zero is true of local ones only.
         is_true = known(self.llm).local or (cost and self.api_base is None)
         return ChatReply(
             text=text,
-            tool_calls=calls,
-            echo=echo_of(choice.message, echo) if calls else {},
             reasoning=storable(getattr(choice.message, "reasoning_content", None) or ""),
             finish_reason="refusal" if refused else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
                 llm=self.llm,
                 request=request,
-                text="".join((text, *(call.arguments for call in calls))),
+                text=text,
                 price=self.price,
                 reported_cost=cost if is_true else None,
             ),
             seconds=seconds,
-            parameters=self._effective(arguments, mode),
+            parameters=self._effective(arguments),
         )
 
-    def _effective(self, arguments: Mapping[str, Any], mode: Mode) -> dict[str, Any]:
+    def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
         dropped = dropped_parameters(self.llm, arguments)
         own_names = {"reasoning_effort": "effort"}
         omitted = {own_names.get(name, name) for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
-        effective["mode"] = mode if "response_format" in arguments else "prompt"
-        if "tools" in arguments and "tools" not in omitted:
-            effective["tools"] = [tool["function"]["name"] for tool in arguments["tools"]]
+        effective["mode"] = self.mode if "response_format" in arguments else "prompt"
         if "max_tokens" in effective:
             effective["max_tokens"] = arguments["max_tokens"]
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
 
 
 def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
-    """Message with OpenAI's field names; an assistant's message that only makes calls has no content.
+    """Message with OpenAI's field names.
 
     Args:
         message: what is sent.
@@ -299,66 +244,12 @@ def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
             {"type": "text", "text": kept, "cache_control": {"type": "ephemeral"}},
             *([{"type": "text", "text": rest}] if rest else []),
         ]
-    if message.tool_call_id:
-        sent["tool_call_id"] = message.tool_call_id
-    if message.tool_calls:
-        sent |= {
-            "content": message.content or None,
-            "tool_calls": [_sent_call(c) for c in message.tool_calls],
-        }
-    return {**sent, **message.echo}
-
-
-def calls_in(message: Any, echo: Sequence[str]) -> tuple[ToolCall, ...]:
-    """Calls in a reply, in order.
-
-    Args:
-        message: as the client library returns it.
-        echo: fields of a call that must be sent back to the provider.
-    """
-    return tuple(
-        ToolCall(
-            id=call.id or f"call-{number}",
-            name=call.function.name or "",
-            arguments=storable(call.function.arguments or ""),
-            echo=echo_of(call, echo),
-        )
-        for number, call in enumerate(getattr(message, "tool_calls", None) or (), start=1)
-    )
-
-
-def echo_of(source: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The non-empty fields of a reply, or of a call in it, that must be sent back to the provider."""
-    found = {name: getattr(source, name, None) for name in names}
-    return {name: value for name, value in found.items() if value}
+    return sent
 
 
 def storable(text: str) -> str:
     """Text without unpaired surrogates, which UTF-8 cannot encode: the journal could not store them."""
     return text.encode("utf-8", "replace").decode("utf-8")
-
-
-def _sent_call(call: ToolCall) -> dict[str, Any]:
-    function = {"name": call.name, "arguments": _as_servers_take(call.arguments)}
-    return {"id": call.id, "type": "function", "function": function, **call.echo}
-
-
-def _as_servers_take(arguments: str) -> str:
-    """Arguments of an earlier call; empty ones if they are not JSON, because servers reject the conversation.
-
-    The answer to the call says what was wrong with them.
-    """
-    try:
-        json.loads(arguments, parse_float=_finite, parse_constant=_finite)
-    except (ValueError, RecursionError):
-        return "{}"
-    return arguments
-
-
-def _finite(number: str) -> float:
-    if not isfinite(float(number)):
-        raise ValueError(f"{number} is not finite")
-    return float(number)
 
 
 def _refusal(message: Any) -> str:

@@ -29,7 +29,6 @@ _FORMAT_WORDS = (
     "response mime type",
     "failed to initialize samplers",  # llama.cpp, if it cannot constrain this LLM in this way
 )
-_TOOL_WORDS = ("tool", "function call", "function_call")
 # Some servers parse what the LLM wrote, and fail if it does not have the required form: two versions of
 # llama.cpp, and Groq.
 _UNREADABLE_WORDS = (
@@ -37,7 +36,6 @@ _UNREADABLE_WORDS = (
     "failed to parse input at pos",
     "failed to generate json",
     "failed to validate json",
-    "failed to call a function",
 )
 _LONGEST_DETAIL = 600
 _FULL_STOP = re.compile(r"(?<!\.)\.$")
@@ -76,10 +74,6 @@ class FormatUnsupportedError(ChatError):
     """The server does not accept this way of asking for JSON."""
 
 
-class ToolsUnsupportedError(ChatError):
-    """The server, or the LLM behind it, does not support tools."""
-
-
 class ContextExceededError(ChatError):
     """The prompt has more tokens than the LLM, or its server as it was started, takes."""
 
@@ -113,8 +107,6 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
     ),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
-    # Some servers report this as 404 (no route with tools) or 500 (started without tool support).
-    ((400, 404, 422, 500, 501), _TOOL_WORDS, ToolsUnsupportedError, "{detail}"),
     (
         (400, 422),
         (),
@@ -157,7 +149,6 @@ def classify(
     llm: str,
     api_base: str | None,
     secrets: Iterable[str],
-    offers_tools: bool = False,
     options: Iterable[str] = (),
 ) -> ChatError:
     """Translate an exception raised by a request into an error of this package, without secrets.
@@ -167,7 +158,6 @@ def classify(
         llm: name of the LLM.
         api_base: address of the server, if stated.
         secrets: texts to remove from the message.
-        offers_tools: whether the request offered tools.
         options: names of the options that the user passes on.
     """
     provider, address = known(llm), server_address(llm, api_base)
@@ -187,10 +177,6 @@ def classify(
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
     lowered = _shortened(text).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
-    impossible = {
-        ToolsUnsupportedError: not offers_tools or any(word in lowered for word in _FORMAT_WORDS),
-        _RefusedOptionError: not refused,
-    }
     filled = {
         "keys": " or ".join(provider.keys) or "the API key",
         "longer": _LONGER if api_base is not None or provider.local else "",
@@ -199,7 +185,8 @@ def classify(
     }
     for statuses, words, kind, cure in _CURES:
         fits = not words or any(word in lowered for word in words)
-        if fits and (status in statuses or not statuses) and not impossible.get(kind):
+        is_possible = bool(refused) or kind is not _RefusedOptionError
+        if fits and (status in statuses or not statuses) and is_possible:
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:

@@ -9,8 +9,7 @@ github.com/BerriAI/litellm that tells of it:
   (1.106.2, #11759): ``_WARNINGS`` are not shown.
 - It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` tells its own handler how to
   make one.
-- Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124), and with tools its
-  MCP gateway is imported, whose packages are not among its requirements (1.106.2, #32993): ``completed``.
+- Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124): ``completed``.
 - Of some providers it drops an effort that they take, unless the parameter is named (1.106.2, #14039):
   ``Provider.effort``.
 - It lists prices that nobody knows as zero (huggingface, 1.106.2, no issue): ``listed_price``.
@@ -45,7 +44,7 @@ _ROUTERS = frozenset({"openrouter", "huggingface"})
 # Parameters that litellm drops for LLMs that do not accept them.
 _DROPPABLE = frozenset(
     {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
-     "frequency_penalty", "tools"}
+     "frequency_penalty"}
 )  # fmt: skip
 
 
@@ -80,8 +79,6 @@ def completed(llm: str, **arguments: Any) -> Any:
     """Send one request, and only one, and return litellm's response; arguments as of its ``completion``."""
     if known(llm).openai_client:
         arguments["max_retries"] = 0
-    if arguments.get("tools"):
-        arguments["_skip_mcp_handler"] = True
     # What the LLM does not accept is omitted; dropped_parameters() tells it.
     return load_litellm().completion(model=llm, drop_params=True, **arguments)
 

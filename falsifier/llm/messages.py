@@ -1,6 +1,5 @@
 """What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
-import json
 from collections.abc import Iterable
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
@@ -10,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact_held
 
-Role = Literal["system", "user", "assistant", "tool"]
+Role = Literal["system", "user", "assistant"]
 Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["bounded_schema", "json_schema", "json_object", "prompt"]
@@ -19,48 +18,13 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 UNREADABLE = "unreadable"
 # Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
 LONGEST_REPLY = 1_000_000
-# Each call is answered with a message; no LLM makes more than a few at a time.
-_MOST_CALLS = 100
 
 
 class _Value(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-class _Sparse(_Value):
-    """Omits empty fields that few messages use: a journal contains many messages."""
-
-    @model_serializer(mode="wrap")
-    def _without_empty_fields(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {k: v for k, v in handler(self).items() if v or k not in _SPARSE_FIELDS}
-
-
-_SPARSE_FIELDS = frozenset({"tools", "tool_calls", "tool_call_id", "echo", "stable"})
-
-
-class Tool(_Value):
-    """A function that an LLM may call before it answers."""
-
-    name: str
-    description: str
-    parameters: dict[str, Any] = Field(
-        description="JSON Schema of the arguments, within the subset of strict servers."
-    )
-
-
-class ToolCall(_Sparse):
-    """One call of a tool, as the LLM made it."""
-
-    id: str
-    name: str
-    arguments: str = Field(description="JSON text, not validated yet.")
-    echo: dict[str, Any] = Field(
-        default_factory=dict,
-        description="What the provider requires to be sent back with the call, such as a signature.",
-    )
-
-
-class Message(_Sparse):
+class Message(_Value):
     """One message of a conversation."""
 
     role: Role
@@ -68,12 +32,11 @@ class Message(_Sparse):
     stable: int = Field(
         default=0, description="Characters at its beginning that the next question will begin with, too."
     )
-    tool_calls: tuple[ToolCall, ...] = Field(default=(), description="Of an assistant's message.")
-    tool_call_id: str = Field(default="", description="Of a tool's message: the call that it answers.")
-    echo: dict[str, Any] = Field(
-        default_factory=dict,
-        description="What the provider requires to be sent back with the message, such as signed reasoning.",
-    )
+
+    @model_serializer(mode="wrap")
+    def _without_an_empty_beginning(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Few messages have one, and a journal contains many messages.
+        return {k: v for k, v in handler(self).items() if v or k != "stable"}
 
 
 class Usage(_Value):
@@ -115,7 +78,7 @@ class Usage(_Value):
         )
 
 
-class ChatRequest(_Sparse):
+class ChatRequest(_Value):
     """One request.
 
     Everything that influences the reply is either here or among the parameters of ``LiteLLMChat``: together
@@ -126,7 +89,6 @@ class ChatRequest(_Sparse):
     reply_schema: dict[str, Any] | None = Field(
         default=None, description="JSON Schema of the reply, within the subset of strict servers."
     )
-    tools: tuple[Tool, ...] = Field(default=(), description="What may be called before the reply.")
     sample: int = Field(
         default=0, description="Distinguishes runs that ask the same question and want different replies."
     )
@@ -146,17 +108,10 @@ class ChatRequest(_Sparse):
         return None if self.deadline is None else max(0.0, self.deadline - monotonic())
 
 
-class ChatReply(_Sparse):
+class ChatReply(_Value):
     """One reply."""
 
     text: str
-    tool_calls: tuple[ToolCall, ...] = Field(
-        default=(), description="Calls to answer before the LLM gives its reply."
-    )
-    echo: dict[str, Any] = Field(
-        default_factory=dict,
-        description="What the provider requires to be sent back with the calls, such as signed reasoning.",
-    )
     reasoning: str = Field(default="", description="The LLM's reasoning as far as the provider shows it.")
     finish_reason: str = "stop"
     usage: Usage = Usage()
@@ -207,28 +162,9 @@ def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
     """
     secrets = tuple(secrets)
 
-    def text(sent: str) -> str:
-        return redact_held(printable(sent[:LONGEST_REPLY]), secrets)
-
-    def echo(sent: dict[str, Any]) -> dict[str, Any]:
-        # Sent back to the provider as it is, and never shown.
-        plain = json.dumps(sent, default=str) if sent else ""
-        clean = redact_held(plain, secrets)
-        return sent if clean == plain else dict(json.loads(clean))
-
-    def call(sent: ToolCall) -> ToolCall:
-        return ToolCall(
-            id=text(sent.id), name=text(sent.name), arguments=text(sent.arguments), echo=echo(sent.echo)
-        )
-
+    texts = {"text": reply.text, "reasoning": reply.reasoning, "finish_reason": reply.finish_reason}
     return reply.model_copy(
-        update={
-            "text": text(reply.text),
-            "reasoning": text(reply.reasoning),
-            "finish_reason": text(reply.finish_reason),
-            "tool_calls": tuple(map(call, reply.tool_calls[:_MOST_CALLS])),
-            "echo": echo(reply.echo),
-        }
+        update={k: redact_held(printable(sent[:LONGEST_REPLY]), secrets) for k, sent in texts.items()}
     )
 
 

@@ -25,8 +25,6 @@ class Provider:
         defaults: parameters that are sent unless the user states them.
         effort: how reasoning effort is passed: ``native``, or ``allowed`` if the client library passes it
             only on an explicit list.
-        echo: fields of tool calls that must be sent back with them, such as signed reasoning; the provider
-            rejects the conversation without them.
         marks: whether it keeps only what is marked of a prompt.
         limits: whether schemas may state numbers of items and ranges of numbers.
     """
@@ -38,7 +36,6 @@ class Provider:
     openai_client: bool = False
     defaults: Mapping[str, Any] = field(default_factory=dict)
     effort: Literal["native", "allowed"] = "native"
-    echo: tuple[str, ...] = ()
     marks: bool = False
     limits: bool = False
 
@@ -57,12 +54,12 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
     {
         "openai": Provider(("OPENAI_API_KEY",), openai_client=True, limits=True),
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
-        "anthropic": Provider(("ANTHROPIC_API_KEY",), echo=("thinking_blocks",), marks=True),
-        "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY"), echo=("provider_specific_fields",)),
+        "anthropic": Provider(("ANTHROPIC_API_KEY",), marks=True),
+        "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY")),
         "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), effort="allowed"),
         "mistral": Provider(("MISTRAL_API_KEY",)),
         "groq": Provider(("GROQ_API_KEY",)),
-        "deepseek": Provider(("DEEPSEEK_API_KEY",), echo=("reasoning_content",)),
+        "deepseek": Provider(("DEEPSEEK_API_KEY",)),
         "openrouter": Provider(("OPENROUTER_API_KEY",)),
         "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
         "xai": Provider(("XAI_API_KEY",)),

@@ -41,7 +41,6 @@ class ReplyForm:
         named: signals and parameters by name; else one list of numbers in the order of the dimensions.
         free: whether a free parameterization may be used if the space allows it.
         count: number of candidates.
-        reasoned: whether each candidate comes with a rationale.
         lessons: whether the LLM may write down what it is to be told again.
     """
 
@@ -49,7 +48,6 @@ class ReplyForm:
     named: bool = True
     free: bool = False
     count: int = 1
-    reasoned: bool = True
     lessons: bool = False
 
     def schema(self) -> dict[str, Any]:
@@ -59,7 +57,7 @@ class ReplyForm:
         same. What an input cannot have is found when the reply is read. Numbers of items and ranges are
         stated as far as all inputs share them, and left out where a server does not take them.
         """
-        candidate: dict[str, Any] = {"rationale": _TEXT} if self.reasoned else {}
+        candidate: dict[str, Any] = {"rationale": _TEXT}
         if self.named:
             candidate |= self._named_parts()
         else:

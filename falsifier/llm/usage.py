@@ -7,7 +7,6 @@ LLM the larger count is used, so that limits hold.
 
 import os
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -80,7 +79,7 @@ def usage_of(
             tokens are counted here.
         llm: name of the LLM.
         request: what was sent.
-        text: what was received, including tool calls.
+        text: what was received.
         price: price stated by the user; overrides any reported cost.
         reported_cost: US dollars as computed by the client library; None if the price is unknown.
     """
@@ -92,7 +91,7 @@ def usage_of(
     cached = _count(getattr(kept, "cached_tokens", None)) or 0
     estimated = not prompt and not completion
     if prompt is None or estimated:
-        prompt, estimated = sum(count_tokens(part, llm) for part in _sent(request)), True
+        prompt, estimated = _sent(request, llm), True
     if completion is None or estimated:
         completion, estimated = count_tokens(text, llm), True
     if price is not None:
@@ -111,7 +110,7 @@ def usage_of(
 
 def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, timed_out: int = 1) -> Usage:
     """Usage of a request that brought nothing: the provider charges at least for what was sent."""
-    sent = sum(count_tokens(part, llm) for part in _sent(request))
+    sent = _sent(request, llm)
     cost = None if price is None else price.cost(sent, 0)
     return Usage(prompt_tokens=sent, cost=cost, estimated=True, timed_out=timed_out)
 
@@ -132,11 +131,8 @@ def _believable(cost: Any) -> float | None:
     return float(cost)
 
 
-def _sent(request: ChatRequest) -> Iterator[str]:
-    for message in request.messages:
-        yield message.content
-        yield from (call.arguments for call in message.tool_calls)
-    yield from (tool.model_dump_json() for tool in request.tools)
+def _sent(request: ChatRequest, llm: str) -> int:
+    return sum(count_tokens(message.content, llm) for message in request.messages)
 
 
 def count_tokens(text: str, llm: str = "") -> int:

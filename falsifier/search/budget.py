@@ -133,7 +133,7 @@ _CLOCK_TOLERANCE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class BoundedChat:
-    """Checks the budget before every request, whether it opens a turn, asks again or follows a tool call.
+    """Checks the budget before every request, whether it opens a turn or asks again.
 
     Attributes:
         inner: chat to ask.

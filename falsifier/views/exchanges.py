@@ -69,10 +69,6 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
         *(join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]),
     ]
     usage, reply = exchange.usage, exchange.reply
-    answer = "(none)"
-    if reply:
-        calls = [f"{call.name}({call.arguments})" for call in reply.tool_calls]
-        answer = "\n".join([reply.text, *calls]).strip()
     return join(
         el(
             "details",
@@ -81,7 +77,7 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
             class_="prompt",
         ),
         el("p", f"Reply of {exchange.llm}: {counted(usage.completion_tokens, 'token')}"),
-        _text(answer),
+        _text(reply.text.strip() if reply else "(none)"),
         el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem)
         if exchange.problem
         else Html(""),

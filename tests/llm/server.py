@@ -22,7 +22,6 @@ class Step:
     headers: dict[str, str] = field(default_factory=dict)
     raw: str | None = None
     extra: dict[str, Any] = field(default_factory=dict)
-    calls: tuple[tuple[str, dict[str, Any]], ...] = ()
     usage: dict[str, Any] | None = field(
         default_factory=lambda: {
             "prompt_tokens": 100,
@@ -125,29 +124,14 @@ def serving(*script: Step) -> Iterator[Server]:
 
 def _openai(step: Step, body: dict[str, Any]) -> dict[str, Any]:
     message = {"role": "assistant", "content": step.content, **step.extra}
-    if step.calls:
-        message |= {"content": None, "tool_calls": _openai_calls(step)}
     answer = {
         "id": "1",
         "object": "chat.completion",
         "created": 1,
         "model": body.get("model", "m"),
-        "choices": [
-            {"index": 0, "message": message, "finish_reason": "tool_calls" if step.calls else step.finish}
-        ],
+        "choices": [{"index": 0, "message": message, "finish_reason": step.finish}],
     }
     return answer if step.usage is None else {**answer, "usage": step.usage}
-
-
-def _openai_calls(step: Step) -> list[dict[str, Any]]:
-    return [
-        {
-            "id": f"call_{number}",
-            "type": "function",
-            "function": {"name": name, "arguments": json.dumps(arguments)},
-        }
-        for number, (name, arguments) in enumerate(step.calls)
-    ]
 
 
 def _dialect(path: str) -> Callable[[Step, dict[str, Any]], dict[str, Any]]:
@@ -159,32 +143,19 @@ def _dialect(path: str) -> Callable[[Step, dict[str, Any]], dict[str, Any]]:
 
 
 def _anthropic(step: Step, body: dict[str, Any]) -> dict[str, Any]:
-    content: list[dict[str, Any]] = [{"type": "text", "text": step.content}]
-    if step.calls:
-        content = [
-            {"type": "thinking", "thinking": "hm", "signature": "signed"},
-            *(
-                {"type": "tool_use", "id": f"toolu_{number}", "name": name, "input": arguments}
-                for number, (name, arguments) in enumerate(step.calls)
-            ),
-        ]
     return {
         "id": "1",
         "type": "message",
         "role": "assistant",
         "model": body["model"],
-        "content": content,
-        "stop_reason": "tool_use" if step.calls else "end_turn",
+        "content": [{"type": "text", "text": step.content}],
+        "stop_reason": "end_turn",
         "usage": {"input_tokens": 100, "output_tokens": 20},
     }
 
 
 def _gemini(step: Step, body: dict[str, Any]) -> dict[str, Any]:
-    calls: list[dict[str, Any]] = [
-        {"functionCall": {"name": name, "args": arguments}, "thoughtSignature": "signed"}
-        for name, arguments in step.calls
-    ]
-    content = {"role": "model", "parts": calls or [{"text": step.content}]}
+    content = {"role": "model", "parts": [{"text": step.content}]}
     return {
         "candidates": [{"content": content, "finishReason": "STOP", "index": 0}],
         "usageMetadata": {"promptTokenCount": 100, "candidatesTokenCount": 20, "totalTokenCount": 120},
@@ -195,11 +166,7 @@ def _ollama(step: Step, body: dict[str, Any]) -> dict[str, Any]:
     return {
         "model": "m",
         "created_at": "2025-01-01T00:00:00Z",
-        "message": {
-            "role": "assistant",
-            "content": "" if step.calls else step.content,
-            "tool_calls": [{"function": {"name": name, "arguments": a}} for name, a in step.calls],
-        },
+        "message": {"role": "assistant", "content": step.content},
         "done": True,
         "done_reason": step.finish,
         "prompt_eval_count": 100,

@@ -12,7 +12,6 @@ from falsifier.llm.providers import first_mode
 from tests.llm.server import Step, serving
 
 GOOD = Step(json.dumps({"values": [1, 2, 3], "rationale": "they sum to 6"}))
-CALL = Step(None, calls=(("measure", {"place": "Paris"}),), finish="tool_calls")
 CUT = Step("one two", finish="length")
 REFUSED = Step(status=400, message="response_format is not supported")
 
@@ -27,12 +26,12 @@ def checked(*steps: Step, effort: str | None = None) -> tuple[dict[str, Feature]
 
 
 def test_a_model_that_does_it_all() -> None:
-    found, usage = checked(GOOD, CALL, CUT, effort="low")
-    assert list(found) == ["answer", "effort", "tools", "length"]
+    found, usage = checked(GOOD, CUT, effort="low")
+    assert list(found) == ["answer", "effort", "length"]
     assert all(f.works for f in found.values())
     assert "by a schema with numbers of values" in found["answer"].said
     assert "12 tokens of reasoning" in found["effort"].said
-    assert usage.tokens == 360
+    assert usage.tokens == 240
 
 
 @pytest.mark.parametrize(
@@ -45,7 +44,7 @@ def test_a_model_that_does_it_all() -> None:
     ],
 )
 def test_no_usable_answer(step: Step, said: str) -> None:
-    answer = checked(step, CALL, CUT)[0]["answer"]
+    answer = checked(step, CUT)[0]["answer"]
     assert not answer.works and said in answer.said
 
 
@@ -58,18 +57,14 @@ def test_no_usable_answer(step: Step, said: str) -> None:
     ],
 )
 def test_how_an_answer_came(steps: tuple[Step, ...], said: str) -> None:
-    answer = checked(*steps, CALL, CUT)[0]["answer"]
+    answer = checked(*steps, CUT)[0]["answer"]
     assert answer.works and said in answer.said
 
 
-def test_tools_and_limits_that_are_not_taken() -> None:
-    found, _ = checked(GOOD, Step("It is warm."), Step("one two three", finish="stop"))
-    assert [f.works for f in found.values()] == [True, False, False]
-    assert "not called" in found["tools"].said
-    refused, _ = checked(GOOD, Step(status=400, message="tools are not supported"), Step("It is warm."), CUT)
-    assert "not taken" in refused["tools"].said
-    wrong, _ = checked(GOOD, Step(None, calls=(("measure", {"town": "Paris"}),)), CUT)
-    assert "wrong arguments" in wrong["tools"].said
+def test_a_limit_that_is_not_kept() -> None:
+    found, _ = checked(GOOD, Step("one two three", finish="stop"))
+    assert [f.works for f in found.values()] == [True, False]
+    assert "not kept" in found["length"].said
 
 
 def test_a_wrong_key_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:

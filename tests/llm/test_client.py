@@ -201,6 +201,13 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
     assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
 
 
+def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> None:
+    call = {"id": "1", "type": "function", "function": {"name": "json", "arguments": '{"rationale": ""}'}}
+    with serving(Step(None, extra={"tool_calls": [call]}, finish="tool_calls")) as server:
+        reply = LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
+    assert reply.text == '{"rationale": ""}'
+
+
 @pytest.mark.usefixtures("keys")
 def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
     with serving(Step("{}")) as server:

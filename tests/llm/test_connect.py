@@ -6,8 +6,7 @@ import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.connect import CachedChat, connect, preflight
-from falsifier.llm.conversation import converse
-from falsifier.llm.messages import ChatReply, ChatRequest, Message, Tool, ToolCall, Usage
+from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.replay import ScriptedChat
 
@@ -148,18 +147,3 @@ class TestCache:
         ]
         for llm, other in others:
             assert CachedChat(ScriptedChat(["two"], llm=llm), tmp_path).complete(other).text == "two"
-
-    def test_calls_of_tools_are_kept_like_answers(self, tmp_path: Path) -> None:
-        question = QUESTION.model_copy(update={"tools": (Tool(name="t", description="", parameters={}),)})
-        call = ChatReply(text="", tool_calls=(ToolCall(id="1", name="t", arguments="{}"),), usage=PAID.usage)
-        inner = ScriptedChat([call, PAID])
-
-        def ask(answer: str) -> str:
-            chat = CachedChat(inner, tmp_path)
-            return converse(chat, question, str, lambda _: None, respond=lambda _: answer)
-
-        assert [ask("seen") for _ in range(2)] == ["answer", "answer"]
-        assert len(inner.requests) == 2
-        # Another answer of the tool makes another question of what follows.
-        with pytest.raises(ChatError, match="the script"):
-            ask("other")

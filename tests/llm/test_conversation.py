@@ -5,9 +5,8 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.failures import ContextExceededError
-from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, ToolCall
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.replay import ScriptedChat
-from tests.llm.support import ADD, ask_with_tools, calling, wrong
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="a number, please"),))
 
@@ -30,7 +29,6 @@ def asked(*script: str | ChatReply | Exception) -> tuple[int, ScriptedChat, list
         ChatReply(text="0"),
         ChatReply(text="0", finish_reason="length"),
         ChatReply(text="", reasoning="0"),
-        ChatReply(text="", tool_calls=(ToolCall(id="1", name="json", arguments="0"),)),
     ],
 )
 def test_a_complete_answer_is_read_wherever_it_stands(reply: ChatReply) -> None:
@@ -107,25 +105,3 @@ def test_a_question_that_outgrows_the_context_when_asked_again_has_no_valid_repl
         asked("x", ContextExceededError("too long"))
     with pytest.raises(ContextExceededError):
         asked(ContextExceededError("too long"))
-
-
-class TestTools:
-    def test_a_call_is_answered_and_the_question_goes_on(self) -> None:
-        value, chat, exchanges = ask_with_tools(calling(1, 2), "3")
-        assert value == "3"
-        following = chat.requests[1]
-        assert following.tools == (ADD,)
-        assert [m.role for m in following.messages] == ["user", "assistant", "tool"]
-        assert following.messages[1].tool_calls[0].arguments == '{"terms": [1, 2]}'
-        assert following.messages[2] == Message(role="tool", content="3", tool_call_id="c1")
-        assert [e.problem for e in exchanges] == [None, None]
-
-    def test_a_wrong_call_is_told_what_is_wrong_and_may_be_corrected(self) -> None:
-        value, chat, exchanges = ask_with_tools(wrong(), calling(1, 2), "3")
-        assert value == "3"
-        assert "no terms" in chat.requests[1].messages[-1].content
-        assert "no terms" in (exchanges[0].problem or "")
-
-    def test_wrong_calls_do_not_go_on_for_ever(self) -> None:
-        with pytest.raises(NoValidReplyError, match="no terms"):
-            ask_with_tools(wrong(), wrong(), wrong(), "3")

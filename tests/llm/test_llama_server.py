@@ -15,18 +15,17 @@ from falsifier.errors import ChatSetupError
 from falsifier.llm import model_file
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.connect import connect
-from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.messages import UNREADABLE, ChatRequest, Exchange, Mode, ToolCall
+from falsifier.llm.messages import UNREADABLE, Mode
 from falsifier.llm.replies import ReplyForm
 from falsifier.testing import START, lag_problem
 from tests import patience
 from tests.command import falsifier
-from tests.llm.support import PLAIN, QUESTION, add
-from tests.llm.tiny_model import CALL, FIRST_BYTE, write_tiny_model
+from tests.llm.support import QUESTION
+from tests.llm.tiny_model import FIRST_BYTE, write_tiny_model
 
 # It ends most replies by itself.
 SHORT = {"max_tokens": 600}
-TEXT = PLAIN.model_copy(
+TEXT = QUESTION.model_copy(
     update={
         "reply_schema": {
             "type": "object",
@@ -58,9 +57,8 @@ def chat(server: str, mode: Mode = "json_schema", **options: Any) -> LiteLLMChat
     return LiteLLMChat("openai/tiny", api_base=server, options=SHORT | options, mode=mode)
 
 
-@pytest.mark.parametrize("question", [PLAIN, QUESTION], ids=["alone", "with-a-tool"])
-def test_a_schema_is_enforced(server: str, question: ChatRequest) -> None:
-    reply = chat(server).complete(question)
+def test_a_schema_is_enforced(server: str) -> None:
+    reply = chat(server).complete(QUESTION)
     assert reply.parameters["mode"] == "json_schema"
     assert list(json.loads(reply.text)) == ["sum"]
     assert reply.usage.prompt_tokens > 10 and not reply.usage.estimated
@@ -68,7 +66,7 @@ def test_a_schema_is_enforced(server: str, question: ChatRequest) -> None:
 
 def test_numbers_of_values_are_enforced(server: str) -> None:
     form = ReplyForm(lag_problem(inputs=2, parameters=[START]).space, count=3, lessons=True)
-    request = PLAIN.model_copy(update={"reply_schema": form.schema()})
+    request = QUESTION.model_copy(update={"reply_schema": form.schema()})
     answers = chat(server, "bounded_schema", max_tokens=2000)
     texts = [answers.send(request.model_copy(update={"sample": n})).text for n in range(3)]
     for text in texts:
@@ -78,28 +76,10 @@ def test_numbers_of_values_are_enforced(server: str) -> None:
 
 
 def test_plainer_ways_and_replies_that_are_too_long(server: str) -> None:
-    assert isinstance(json.loads(chat(server, "json_object", seed=1).complete(PLAIN).text), dict)
-    words = chat(server, "prompt").complete(PLAIN)
+    assert isinstance(json.loads(chat(server, "json_object", seed=1).complete(QUESTION).text), dict)
+    words = chat(server, "prompt").complete(QUESTION)
     assert words.text and words.finish_reason in ("stop", "length")
-    assert chat(server, max_tokens=3).complete(PLAIN).finish_reason == "length"
-
-
-def test_calls_of_a_tool_are_read_and_their_answers_sent(server: str) -> None:
-    exchanges: list[Exchange] = []
-
-    def respond(call: ToolCall) -> str:
-        if len(exchanges) > 0:
-            raise RejectedReplyError("that was the last call")
-        return add(call)
-
-    eager = chat(server, "prompt", logit_bias={str(CALL): 24.0})
-    with suppress(NoValidReplyError):
-        converse(eager, QUESTION, str.strip, exchanges.append, respond=respond, reasks=0)
-    first, second = exchanges[:2]
-    assert first.reply is not None and second.reply is not None
-    assert first.reply.tool_calls[0].name == "add"
-    assert list(json.loads(first.reply.tool_calls[0].arguments)) == ["terms"]
-    assert [m.role for m in second.messages[:3]] == ["user", "assistant", "tool"]
+    assert chat(server, max_tokens=3).complete(QUESTION).finish_reason == "length"
 
 
 def test_a_reply_that_the_server_cannot_parse_is_one_that_cannot_be_used(server: str) -> None:

@@ -2,26 +2,22 @@
 
 import pytest
 
-from falsifier.llm.messages import LONGEST_REPLY, ChatReply, Exchange, ToolCall, cleaned
-from tests.llm.support import PLAIN, ask_with_tools, calling
+from falsifier.llm.messages import LONGEST_REPLY, ChatReply, Exchange, Message, cleaned
 
 
-def test_exchanges_come_back_whole_and_without_calls_no_field_of_theirs_is_written() -> None:
-    _, _, exchanges = ask_with_tools(calling(1, 2), "3")
-    assert [bool(e.reply and e.reply.tool_calls) for e in exchanges] == [True, False]
-    assert [Exchange.model_validate_json(e.model_dump_json()) for e in exchanges] == exchanges
-    plain = Exchange(llm="m", messages=PLAIN.messages, reply=ChatReply(text="3")).model_dump_json()
-    assert "tool" not in plain and "echo" not in plain
+def test_exchanges_come_back_whole_and_an_empty_field_of_few_messages_is_not_written() -> None:
+    messages = (Message(role="system", content="always", stable=6), Message(role="user", content="now"))
+    exchange = Exchange(llm="m", messages=messages, reply=ChatReply(text="3"))
+    written = exchange.model_dump_json()
+    assert Exchange.model_validate_json(written) == exchange
+    assert written.count('"stable"') == 1
 
 
 KEY = "an-ordinary-looking-key"
 
 
 def reply_with(text: str) -> ChatReply:
-    call = ToolCall(id=text, name=text, arguments=text, echo={"signature": text})
-    return ChatReply(
-        text=text, reasoning=text, finish_reason=text, tool_calls=(call,), echo={"thought": text}
-    )
+    return ChatReply(text=text, reasoning=text, finish_reason=text)
 
 
 def test_secrets_are_removed_from_every_part(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -41,7 +37,4 @@ def test_an_ordinary_reply_stays_as_it_is() -> None:
 
 
 def test_a_long_reply_is_cut() -> None:
-    call = ToolCall(id="1", name="f", arguments="")
-    clean = cleaned(ChatReply(text="x" * (LONGEST_REPLY + 5), tool_calls=(call,) * 1000))
-    assert len(clean.text) == LONGEST_REPLY
-    assert len(clean.tool_calls) == 100
+    assert len(cleaned(ChatReply(text="x" * (LONGEST_REPLY + 5))).text) == LONGEST_REPLY

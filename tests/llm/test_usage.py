@@ -10,7 +10,6 @@ import pytest
 from falsifier.llm import usage as tokens
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.usage import Price, count_tokens, usage_of
-from tests.llm.support import QUESTION
 
 REQUEST = ChatRequest(messages=(Message(role="user", content="x" * 400),))
 COUNTED = SimpleNamespace(
@@ -40,15 +39,6 @@ def test_missing_counts_are_estimated_and_only_a_price_of_ones_own_makes_a_cost_
     assert (found.prompt_tokens, found.completion_tokens, found.estimated) == (*counted, True)
     assert found.cost is None
     assert usage(sent, price=PRICE).cost == pytest.approx(PRICE.cost(*counted))
-
-
-def test_tools_and_calls_are_sent_too() -> None:
-    plain = QUESTION.model_copy(update={"tools": ()})
-    with_tools, without = (
-        usage_of(None, llm="", request=r, text="", price=None, reported_cost=None).prompt_tokens
-        for r in (QUESTION, plain)
-    )
-    assert with_tools > without + 20
 
 
 NUMBERS = "speed: 0:0 2.5:34.7 5:54.21 20:119.581"

@@ -18,24 +18,16 @@ _UINT32, _INT32, _FLOAT32, _STRING, _ARRAY = 4, 5, 6, 8, 9
 _ALIGNMENT = 32
 
 # Types of tokens in GGUF.
-_UNKNOWN, _CONTROL, _USER_DEFINED, _BYTE = 2, 3, 4, 6
-_SPECIAL = ("<unk>", "<s>", "</s>", "<tool_call>")
+_UNKNOWN, _CONTROL, _BYTE = 2, 3, 6
+_SPECIAL = ("<unk>", "<s>", "</s>")
 _END = 2
-CALL = 3
 FIRST_BYTE = len(_SPECIAL)
 
 _WIDTH, _HEADS, _INNER = 32, 2, 64
 
-# Shows calls as many models write them; from this the server derives how to constrain and to read them.
 _TEMPLATE = """\
-{%- if tools %}{{ '<|system|>Tools: ' + (tools | tojson) + '\n' }}{% endif -%}
 {%- for message in messages -%}
-{{ '<|' + message.role + '|>' }}{{ message.content or '' }}
-{%- for call in message.tool_calls or [] %}
-{{- '<tool_call>' }}
-{{- {"name": call.function.name, "arguments": call.function.arguments} | tojson }}
-{{- '</tool_call>' }}
-{%- endfor %}{{ '\n' }}
+{{ '<|' + message.role + '|>' }}{{ message.content or '' }}{{ '\n' }}
 {%- endfor -%}
 {{- '<|assistant|>' }}"""
 
@@ -61,7 +53,7 @@ def write_tiny_model(file: Path, *, context: int = 65_536, seed: int = 0) -> Non
         "tokenizer.ggml.model": "llama",
         "tokenizer.ggml.tokens": tokens,
         "tokenizer.ggml.scores": [0.0] * len(tokens),
-        "tokenizer.ggml.token_type": [_UNKNOWN, _CONTROL, _CONTROL, _USER_DEFINED, *[_BYTE] * 256],
+        "tokenizer.ggml.token_type": [_UNKNOWN, _CONTROL, _CONTROL, *[_BYTE] * 256],
         "tokenizer.ggml.bos_token_id": 1,
         "tokenizer.ggml.eos_token_id": _END,
         "tokenizer.ggml.unknown_token_id": 0,
