@@ -52,7 +52,8 @@ class Shortfall:
         quantity: what it compares, the side that is not a plain number.
         value: its value at ``time``.
         limit: value of the other side at ``time``.
-        start: start of the violating interval in s; of what was never reached, of its window.
+        start: start of the violating interval in s, the one with ``time`` if there are several; of what was
+            never reached, of its window.
         end: end of that interval in s.
         time: when it was farthest from holding, in s; of what was never reached, when it was nearest.
         never: whether it had to hold at some time of the interval only, and never did.
@@ -294,7 +295,7 @@ class _Search:
         """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
         predicate = demand.formula
         assert isinstance(predicate, Predicate)
-        first, last = window or self._stretch(spot)
+        (first, last), several = (window, False) if window else self._stretch(spot)
         margins = demand.margins(self.buffer, (first, last))
         sample = first + int(margins.argmax() if window else margins.argmin())
         values, units = self._signals(sample), self.trajectory.units
@@ -313,7 +314,8 @@ class _Search:
         if window and first != last:
             what = f"{demand.text} held at no time {over}" + ("" if is_truth else f"; nearest was {reading}")
         else:
-            what = f"{demand.text} was violated {over}: {reading}"
+            when = f"several times, worst {over}" if several else over
+            what = f"{demand.text} was violated {when}: {reading}"
         return Shortfall(
             part=demand.text,
             quantity=str(quantity),
@@ -327,15 +329,16 @@ class _Search:
             context=(*spot.notes, *(f"while {self._held(d, sample, now=True)}" for d in spot.held)),
         )
 
-    def _stretch(self, spot: _Spot) -> Span:
-        """The samples around one at which all demands down to the comparison were not met."""
+    def _stretch(self, spot: _Spot) -> tuple[Span, bool]:
+        """The samples around one at which no demand was met down to the comparison; if there are others."""
         if spot.scope is None:
-            return spot.sample, spot.sample
+            return (spot.sample, spot.sample), False
         low, high = spot.scope
         met = np.any([guard.met(self.buffer, spot.scope) for guard in spot.guards], axis=0)
         good = np.flatnonzero(met) + low
         before, after = good[good < spot.sample], good[good > spot.sample]
-        return int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
+        first, last = int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
+        return (first, last), len(good) + last - first < high - low
 
     def _settled(self, spot: _Spot) -> _Spot:
         """The same spot; its conditions are told with the time at which they were asked."""

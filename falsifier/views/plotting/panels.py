@@ -55,7 +55,7 @@ class Panel:
         bounds: what it is compared with; empty for inputs.
         critical: time in s to mark if this quantity broke, or if nothing broke and it decided the verdict.
         decided: critical time in s if this quantity decided the verdict, but another one broke.
-        broken: intervals in s over which a comparison of it did not hold.
+        broken: intervals in s over which a comparison of it did not hold; of several, the worst one.
         points: control points (time, value) of an input.
         limits: range of an input.
         steps: whether values are held until the next sample.

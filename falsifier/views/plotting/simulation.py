@@ -138,7 +138,7 @@ def _keys(drawn: Sequence[Panel], verdict: Verdict | None) -> list[Any]:
     if any(bound.start > times[0] or bound.end < times[-1] for bound, times in bounds):
         keys.append(Patch(facecolor=QUIET, alpha=0.15, label="time in which it counts"))
     if any(panel.broken for panel in drawn):
-        keys.append(Patch(facecolor=colour, alpha=0.25, label="violated"))
+        keys.append(Patch(facecolor=colour, alpha=0.25, label="violated (worst interval)"))
     if any(panel.critical is not None for panel in drawn):
         marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
         keys.append(Line2D([], [], **dot, label=marked))
