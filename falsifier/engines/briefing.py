@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property
 
 from falsifier.context.values import NOTHING
 from falsifier.core.candidate import Candidate
@@ -23,9 +23,6 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 from falsifier.stl.margins import signed
 
-# Number of latest and best evaluations whose trajectories are kept in memory; prompts show few older samples.
-_KEPT_RECENT = 40
-_KEPT_BEST = 10
 _WORD = re.compile(r"[^\W\d]\w*")
 
 
@@ -57,13 +54,10 @@ class Briefing:
         anonymous: bool = False,
         llm: str = "",
     ) -> None:
-        problem, self.variant = told_context(problem, variant, anonymous=anonymous)
-        self._view = View.of(problem)
+        self._problem, self.variant = told_context(problem, variant, anonymous=anonymous)
+        self._view = View.of(self._problem)
         self._disguise = Disguise.of(self._view) if anonymous else None
         self._llm = llm
-        self._start = partial(start_values, problem)
-        self._questions: Questions | None = None
-        self._untold: list[Evaluation] = []
         self._doubts: dict[Hashable, str] = {}
         self._smallest = float("inf")
         self.simulations: int | None = None
@@ -136,19 +130,19 @@ class Briefing:
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add samples, whoever proposed their candidates."""
-        told = list(evaluations)
+        questions = self._questions  # first: values at time 0 determine scales before trajectories do
         if self._disguise:
-            self._begin()  # first: values at time 0 determine scales before trajectories do
             self._disguise = disguise = self._disguise.fitted(evaluations)
-            told = [disguise.hidden(e) for e in evaluations]
-        for evaluation in told:
+            evaluations = [disguise.hidden(e) for e in evaluations]
+            questions.view = disguise.view
+        for evaluation in evaluations:
+            key = evaluation.candidate.key
             self.told += 1
-            self.numbers[evaluation.candidate.key] = self.told
+            self.numbers[key] = self.told
             if evaluation.robustness is not None and evaluation.robustness < self._smallest:
                 self._smallest, self.best = evaluation.robustness, evaluation.candidate
+            questions.tell(evaluation, doubt=self._doubts.get(key, ""), why=self.rationales.get(key, ""))
         self.pending = [c for c in self.pending if c.key not in self.numbers]
-        # What is told of a sample takes longer than some simulations; it is made when a question needs it.
-        self._untold = _thinned([*self._untold, *told])
 
     def question(self, count: int, notes: Sequence[str] = ()) -> tuple[Message, ...]:
         """Return the messages of the next question.
@@ -157,8 +151,7 @@ class Briefing:
             count: maximum number of candidates.
             notes: lines to add to the question, after problem and history.
         """
-        questions = self._caught_up()
-        return questions.ask(
+        return self._questions.ask(
             count,
             simulations=self.simulations,
             pending=self.pending,
@@ -166,25 +159,14 @@ class Briefing:
             lessons=self.lessons,
         )
 
-    def _caught_up(self) -> Questions:
-        """Return the questions, with all samples so far."""
-        questions = self._begin()
-        questions.view = self.view
-        for evaluation in self._untold:
-            key = evaluation.candidate.key
-            questions.tell(evaluation, doubt=self._doubts.get(key, ""), why=self.rationales.get(key, ""))
-        self._untold.clear()
-        return questions
-
-    def _begin(self) -> Questions:
-        """Return the questions; made once, because the outputs at time 0 are simulated for them."""
-        if self._questions is None:
-            start = self._start() if self._disguise or self.variant.has("circumstances") else {}
-            if self._disguise:
-                self._disguise = Disguise.of(self._view, start)
-                start = self._disguise.hidden_values(start)
-            self._questions = Questions(self.view, self.variant, start=start, llm=self._llm)
-        return self._questions
+    @cached_property
+    def _questions(self) -> Questions:
+        """Made when it is first needed, because the FMU is initialised for the outputs at time 0."""
+        start = start_values(self._problem) if self._disguise or self.variant.has("circumstances") else {}
+        if self._disguise:
+            self._disguise = Disguise.of(self._view, start)
+            start = self._disguise.hidden_values(start)
+        return Questions(self.view, self.variant, start=start, llm=self._llm)
 
 
 def told_context(
@@ -249,7 +231,6 @@ def preview(
         if candidate.origin.endswith(f" {briefing.variant.name}") and not anonymous:
             briefing.rationales[candidate.key] = candidate.rationale
         briefing.tell([evaluation])
-        briefing._caught_up()
     return briefing.question(1)
 
 
@@ -279,15 +260,3 @@ def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float
     assert found is not None, "a violation has a robustness"
     error = f"{shown(again) - shown(found):.2g}"
     return f"{text}. Find one that is clearer: below 0 by more than {error}, the error of the simulation"
-
-
-def _thinned(evaluations: list[Evaluation]) -> list[Evaluation]:
-    """Return the same evaluations without the trajectories that no prompt will show."""
-    if len(evaluations) <= _KEPT_RECENT:
-        return evaluations
-    judged = sorted((e.robustness, i) for i, e in enumerate(evaluations) if e.robustness is not None)
-    kept = {i for _, i in judged[:_KEPT_BEST]} | set(range(len(evaluations) - _KEPT_RECENT, len(evaluations)))
-    return [
-        e if i in kept or e.trajectory is None else replace(e, trajectory=None)
-        for i, e in enumerate(evaluations)
-    ]

@@ -40,6 +40,9 @@ _GROWTH = 4
 # An answer helps if it lowers the best robustness by at least this share; else an LLM that creeps downwards
 # would keep its turns for ever.
 _NOTABLE = 0.1
+# Share of the best robustness by which an answer must be predicted to lower it to be simulated, unless it is
+# predicted to be better than what the surrogate would do next.
+_PROMISING = 0.1
 # A candidate is the same experiment as a sample if it is within this share of each range of it at all times.
 _SAME = 0.1
 # Number of candidates requested after the first answer, which has one.
@@ -96,8 +99,6 @@ class Hybrid:
         problem: the problem to search.
         seed: of the surrogate.
         adviser: asks the LLM.
-        promising: share of the best robustness by which an answer must be predicted to lower it to be
-            simulated, unless it is predicted to be better than what the surrogate would do next.
         surrogate_settings: settings of the surrogate.
     """
 
@@ -109,13 +110,11 @@ class Hybrid:
         *,
         seed: int,
         adviser: LLMEngine,
-        promising: float = 0.1,
         surrogate_settings: SurrogateSettings = ADVISED,
     ) -> None:
         self.adviser = adviser
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
         self.turns = Turns()
-        self._promising = promising
         self._best: tuple[float, Candidate] | None = None
         self._since_best = 0
         self._points: list[Array] = []
@@ -154,7 +153,22 @@ class Hybrid:
         self.surrogate.tell(evaluations)
         self.adviser.tell(evaluations)
         for evaluation in evaluations:
-            self._note(evaluation)
+            self._points.append(self.surrogate.layout.point(evaluation.candidate))
+            self._since_best += 1
+            key, robustness = evaluation.candidate.key, evaluation.robustness
+            helped = False
+            if robustness is not None and (self._best is None or robustness < self._best[0]):
+                # Against the best just before it: the surrogate may have improved that while it waited.
+                helped = self._best is not None and helps(robustness, self._best[0])
+                self._best, self._since_best = (robustness, evaluation.candidate), 0
+            if key in self._own:
+                self._own.discard(key)
+                self.turns.waited += 1
+                self._reasons.append(f"Sample {len(self._points)}: {evaluation.candidate.rationale}")
+                del self._reasons[:-_MOST_REASONS]
+            if key == self._awaited:
+                self._awaited = None
+                self.turns.answered(helped=helped)
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return how many questions had no valid answer, and why."""
@@ -165,24 +179,6 @@ class Hybrid:
         return (
             f"{len(self._unanswered)} of {questions} had no valid answer, and the surrogate continued: {why}",
         )
-
-    def _note(self, evaluation: Evaluation) -> None:
-        self._points.append(self.surrogate.layout.point(evaluation.candidate))
-        self._since_best += 1
-        key, robustness = evaluation.candidate.key, evaluation.robustness
-        helped = False
-        if robustness is not None and (self._best is None or robustness < self._best[0]):
-            # Against the best just before it: the surrogate may have improved that while the answer waited.
-            helped = self._best is not None and helps(robustness, self._best[0])
-            self._best, self._since_best = (robustness, evaluation.candidate), 0
-        if key in self._own:
-            self._own.discard(key)
-            self.turns.waited += 1
-            self._reasons.append(f"Sample {len(self._points)}: {evaluation.candidate.rationale}")
-            del self._reasons[:-_MOST_REASONS]
-        if key == self._awaited:
-            self._awaited = None
-            self.turns.answered(helped=helped)
 
     def _ask_one(self) -> Candidate:
         if self._awaited is None and self.turns.is_llm_next:
@@ -222,8 +218,11 @@ class Hybrid:
         predictions = self.surrogate.foresee(candidates) if self._is_trusted else []
         if not predictions:
             return sorted(candidates, key=lambda c: self._repeated(c) is not None)
-        order = sorted(range(len(candidates)), key=lambda i: predictions[i].robustness)
-        return [_ranked(candidates[i], predictions[i].robustness) for i in order]
+        ranked = sorted(zip(predictions, candidates, strict=True), key=lambda pair: pair[0].robustness)
+        return [
+            replace(c, rationale=f"{c.rationale} [predicted robustness {p.robustness:.4g}]".strip())
+            for p, c in ranked
+        ]
 
     def _is_worth_simulating(self, candidate: Candidate) -> bool:
         """Whether a candidate of a later answer is simulated; of one that repeats a sample, the LLM is told.
@@ -264,7 +263,7 @@ class Hybrid:
         rivals = [] if self._next is None else [self._next]
         # Against the prediction of the best sample, not its robustness: early predictions are off as a whole.
         new, best, *other = (v.robustness for v in self.surrogate.foresee([candidate, sample, *rivals]))
-        return best - new >= self._promising * abs(robustness) or any(new < r for r in other)
+        return best - new >= _PROMISING * abs(robustness) or any(new < r for r in other)
 
     @property
     def _is_trusted(self) -> bool:
@@ -323,8 +322,3 @@ class Hybrid:
 def helps(robustness: float, best: float) -> bool:
     """Whether a robustness is below the best one so far by a notable share of that."""
     return best - robustness >= _NOTABLE * abs(best)
-
-
-def _ranked(candidate: Candidate, prediction: float) -> Candidate:
-    text = f"{candidate.rationale} [predicted robustness {prediction:.4g}]"
-    return replace(candidate, rationale=text.strip())

@@ -124,11 +124,12 @@ def test_the_model_opens_and_both_hear_everything() -> None:
     assert len(engine.surrogate.history.samples) == 5
 
 
-def test_a_later_answer_is_ranked_before_one_is_simulated() -> None:
+def test_a_later_answer_is_ranked_before_one_is_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.engines.hybrid._PROMISING", -1.0)
     problem = wide_problem()
     # Higher inputs give a higher x: the surrogate, once trained, must put 1.5 first.
     script = Script([[-1.5, 0.0, 1.5, -0.5, 0.5]], problem)
-    engine = Hybrid(problem, seed=0, adviser=script, promising=-1.0, surrogate_settings=SETTINGS)
+    engine = Hybrid(problem, seed=0, adviser=script, surrogate_settings=SETTINGS)
     asked = drive(engine, partial(evaluate, problem), rounds=25)
     later = [c for c in asked if c.origin == "scripted" and "predicted robustness" in c.rationale]
     assert later, "no answer was ranked"
