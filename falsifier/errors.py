@@ -156,6 +156,10 @@ class ChatSetupError(ChatError):
     exit_code = 2
 
 
+class ContextExceededError(ChatError):
+    """The prompt has more tokens than the LLM, or its server as it was started, takes."""
+
+
 class JournalError(FalsifierError):
     """A run directory cannot be read, belongs to another problem or is in use."""
 

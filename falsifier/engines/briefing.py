@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import replace
 from functools import cached_property
 
 from falsifier.context.values import NOTHING

@@ -1,13 +1,22 @@
 """An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures."""
 
+import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from time import perf_counter
+from itertools import count
+from random import uniform
+from time import perf_counter, sleep
 from typing import Any
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
+from falsifier.core.words import counted
 from falsifier.errors import ChatError
-from falsifier.llm.failures import FormatUnsupportedError, UnreadableReplyError, classify
+from falsifier.llm.failures import (
+    FormatUnsupportedError,
+    TransientChatError,
+    UnreadableReplyError,
+    classify,
+)
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
     completed,
@@ -26,10 +35,15 @@ from falsifier.llm.messages import (
     cleaned,
 )
 from falsifier.llm.providers import find_key, known
-from falsifier.llm.retry import DEFAULT_ATTEMPTS, FIRST_DELAY, retried
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
 
+_LOG = logging.getLogger(__name__)
+
+# With doubling delays the last request is sent about a minute after the first: enough for a server restart.
+DEFAULT_ATTEMPTS = 7
+# In s; if the server asks for a longer wait, the request fails.
+_FIRST_DELAY, _LONGEST_DELAY = 1.0, 120.0
 # In s; reasoning models may think for minutes.
 DEFAULT_TIMEOUT = 600.0
 # Replies in a row that the server could not parse, before they are asked for in a plainer way: one is the
@@ -57,7 +71,6 @@ class LiteLLMChat:
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
         attempts: maximum number of requests per reply if failures are temporary.
-        first_delay: seconds before the second of them.
     """
 
     llm: str
@@ -69,7 +82,6 @@ class LiteLLMChat:
     mode: Mode = "json_schema"
     content: str = ""
     attempts: int = DEFAULT_ATTEMPTS
-    first_delay: float = FIRST_DELAY
     _unreadable: int = field(init=False, default=0)
 
     @property
@@ -86,12 +98,39 @@ class LiteLLMChat:
         Raises:
             ChatError: if no reply can be obtained.
         """
-        return retried(
-            lambda: self._asked(request),
-            attempts=self.attempts,
-            first_delay=self.first_delay,
-            seconds_left=lambda: request.seconds_left,
-        )
+        lost: list[Usage] = []
+        try:
+            for attempt in count(1):
+                try:
+                    reply = self._asked(request)
+                    return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
+                except TransientChatError as error:
+                    lost += [error.lost] if error.lost else []
+                    self._wait(error, attempt, request)
+        except ChatError as error:
+            error.lost = sum(lost[1:], lost[0]) if lost else error.lost
+            raise
+        raise AssertionError("the loop has no end of its own")
+
+    def _wait(self, error: TransientChatError, attempt: int, request: ChatRequest) -> None:
+        """Wait before the next request: as the server asks, else twice as long as before, with jitter.
+
+        Raises:
+            ChatError: if there is no next request, or if it is not worth waiting for.
+        """
+        limit = min(self.attempts, error.patience or self.attempts)
+        if attempt >= limit:
+            raise ChatError(f"{counted(attempt, 'attempt')} failed, the last one so: {error}") from None
+        delay = error.retry_after
+        if delay is None:
+            delay = min(_FIRST_DELAY * 2 ** (attempt - 1) * uniform(0.75, 1.25), _LONGEST_DELAY)
+        elif delay > _LONGEST_DELAY:
+            raise ChatError(f"the server asks to wait {delay:g} s; try again later. {error}") from None
+        left = request.seconds_left
+        if left is not None and delay >= left:
+            raise ChatError(f"no time is left to ask again. {error}") from None
+        _LOG.warning("%s. Retrying in %.0f s (attempt %d of %d).", error, delay, attempt + 1, limit)
+        sleep(delay)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Do nothing; storing replies is CachedChat's concern."""

@@ -15,12 +15,11 @@ from pydantic import ValidationError
 
 from falsifier.core.files import cache_directory
 from falsifier.errors import ChatSetupError
-from falsifier.llm.client import DEFAULT_TIMEOUT, LiteLLMChat
+from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.litellm_adapter import check_name, check_options
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode
-from falsifier.llm.retry import DEFAULT_ATTEMPTS
 from falsifier.llm.usage import Price
 
 

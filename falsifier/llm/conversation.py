@@ -5,8 +5,7 @@ from typing import Any, TypeVar
 
 from falsifier.core.literals import printable
 from falsifier.core.words import counted
-from falsifier.errors import ChatError, FalsifierError
-from falsifier.llm.failures import ContextExceededError
+from falsifier.errors import ChatError, ContextExceededError, FalsifierError
 from falsifier.llm.messages import (
     LONGEST_REPLY,
     UNREADABLE,

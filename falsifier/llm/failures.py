@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, ContextExceededError
 from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
@@ -72,10 +72,6 @@ class TransientChatError(ChatError):
 
 class FormatUnsupportedError(ChatError):
     """The server does not accept this way of asking for JSON."""
-
-
-class ContextExceededError(ChatError):
-    """The prompt has more tokens than the LLM, or its server as it was started, takes."""
 
 
 class UnreadableReplyError(ChatError):

@@ -16,15 +16,13 @@ import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
-from functools import partial
 from http.cookiejar import CookieJar, DefaultCookiePolicy
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar, cast
 from weakref import WeakSet
 
-if TYPE_CHECKING:
-    import httpx
+import httpx
 
 T = TypeVar("T")
 
@@ -144,44 +142,17 @@ class _Call:
         self.fault = ""
         self._lock = Lock()
         self._connections: list[socket.socket] = []
-        self._has_ended = False
+        self.has_ended = False
 
     def end(self) -> None:
         """Cut all connections; no others can be made."""
         with self._lock:
-            self._has_ended = True
+            self.has_ended = True
             for connection in self._connections:
                 with suppress(OSError):
                     connection.shutdown(socket.SHUT_RDWR)
                 connection.close()
             self._connections.clear()
-
-    def send(
-        self, handle: "Callable[[httpx.Request], httpx.Response]", request: "httpx.Request"
-    ) -> "httpx.Response":
-        """Send a request on a connection of its own, and check the response."""
-        import httpx
-
-        if self._has_ended:  # litellm looks up prices and the like in threads that outlive the call
-            raise httpx.TransportError("the call has ended")
-        # A connection kept from an earlier call would be unknown here and could not be cut.
-        request.headers["Connection"] = "close"
-        # Compressed, a small reply could fill the memory.
-        request.headers["Accept-Encoding"] = "identity"
-        request.extensions = {**request.extensions, "trace": self._note}
-        self.fault = ""
-        with self._noting_faults():
-            response = handle(request)
-        encoding = response.headers.get("content-encoding", "identity").lower()
-        length = response.headers.get("content-length", "")
-        if response.status_code in _REDIRECTS:
-            self.refuse(_redirection(request.url, response.headers.get("location")))
-        if encoding != "identity":
-            self.refuse(f"the reply is compressed ({encoding[:20]}), which was not asked for")
-        if length.isascii() and length.isdigit() and float(length) > _MOST_BYTES:
-            self.refuse(_TOO_LONG)
-        response.stream = self._read(response)
-        return response
 
     def refuse(self, reason: str) -> None:
         """End the request because of this.
@@ -189,12 +160,10 @@ class _Call:
         Raises:
             httpx.TransportError: always.
         """
-        import httpx
-
         self.refusal = self.refusal or reason
         raise httpx.TransportError(reason)
 
-    def _note(self, event: str, info: Mapping[str, Any]) -> None:
+    def note(self, event: str, info: Mapping[str, Any]) -> None:
         """Take note of a new connection; called by the transport."""
         if not event.endswith(("connect_tcp.complete", "connect_unix_socket.complete")):
             return
@@ -202,16 +171,14 @@ class _Call:
         # A duplicate stays valid when TLS takes over the original.
         connection = socket.socket(fileno=os.dup(original.fileno()))
         with self._lock:
-            if not self._has_ended:
+            if not self.has_ended:
                 self._connections.append(connection)
                 return
         connection.shutdown(socket.SHUT_RDWR)
         connection.close()
 
     @contextmanager
-    def _noting_faults(self) -> Iterator[None]:
-        import httpx
-
+    def noting_faults(self) -> Iterator[None]:
         try:
             yield
         except httpx.TimeoutException:
@@ -220,34 +187,69 @@ class _Call:
             self.fault = self.refusal or _fault_of(error)
             raise
 
-    def _read(self, response: "httpx.Response") -> "httpx.SyncByteStream":
-        """Return the response's stream, which ends at the limit and says if what came is no reply."""
-        import httpx
 
-        inner, call = response.stream, self
-
-        class Read(httpx.SyncByteStream):
-            def __iter__(self) -> Iterator[bytes]:
-                received = bytearray()
-                with call._noting_faults():
-                    for part in inner:  # type: ignore[union-attr]
-                        received += part
-                        if len(received) > _MOST_BYTES:
-                            call.refuse(_TOO_LONG)
-                        yield part
-                if response.is_success:
-                    call.fault = _unreadable(bytes(received))
-
-            def close(self) -> None:
-                inner.close()  # type: ignore[union-attr]
-
-        return Read()
+_CALL: ContextVar[_Call | None] = ContextVar("_CALL", default=None)
 
 
-def _redirection(asked: "httpx.URL", location: str | None) -> str:
+class _Guarded(httpx.BaseTransport):
+    """Sends each request of a call on a connection of its own, and checks the response."""
+
+    def __init__(self, plain: httpx.Client) -> None:
+        self._plain = plain
+
+    def handle_request(self, request: httpx.Request) -> httpx.Response:
+        call = _CALL.get()
+        if call is None:
+            return self._plain.send(request, stream=True)
+        if call.has_ended:  # litellm looks up prices and the like in threads that outlive the call
+            raise httpx.TransportError("the call has ended")
+        # A connection kept from an earlier call would be unknown here and could not be cut.
+        request.headers["Connection"] = "close"
+        # Compressed, a small reply could fill the memory.
+        request.headers["Accept-Encoding"] = "identity"
+        request.extensions = {**request.extensions, "trace": call.note}
+        call.fault = ""
+        with call.noting_faults():
+            response = self._plain.send(request, stream=True)
+        encoding = response.headers.get("content-encoding", "identity").lower()
+        length = response.headers.get("content-length", "")
+        if response.status_code in _REDIRECTS:
+            call.refuse(_redirection(request.url, response.headers.get("location")))
+        if encoding != "identity":
+            call.refuse(f"the reply is compressed ({encoding[:20]}), which was not asked for")
+        if length.isascii() and length.isdigit() and float(length) > _MOST_BYTES:
+            call.refuse(_TOO_LONG)
+        stream = cast(httpx.SyncByteStream, response.stream)
+        response.stream = _Limited(call, stream, is_success=response.is_success)
+        return response
+
+    def close(self) -> None:
+        self._plain.close()
+
+
+class _Limited(httpx.SyncByteStream):
+    """A response's stream, which ends at the limit, and says if what came is no reply."""
+
+    def __init__(self, call: _Call, inner: httpx.SyncByteStream, *, is_success: bool) -> None:
+        self._call, self._inner, self._is_success = call, inner, is_success
+
+    def __iter__(self) -> Iterator[bytes]:
+        received = bytearray()
+        with self._call.noting_faults():
+            for part in self._inner:
+                received += part
+                if len(received) > _MOST_BYTES:
+                    self._call.refuse(_TOO_LONG)
+                yield part
+        if self._is_success:
+            self._call.fault = _unreadable(bytes(received))
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+def _redirection(asked: httpx.URL, location: str | None) -> str:
     """Why a redirect is refused: a prompt goes only where the user sent it."""
-    import httpx
-
     try:
         target = asked.join(location or "").copy_with(query=None, fragment=None)
     except (httpx.InvalidURL, ValueError):
@@ -263,8 +265,6 @@ def _redirection(asked: "httpx.URL", location: str | None) -> str:
 
 def _fault_of(error: Exception) -> str:
     """What is wrong with a connection, and what to do."""
-    import httpx
-
     text = str(error).partition(": bytearray(")[0].rstrip(".") or type(error).__name__
     if isinstance(error, httpx.ProxyError):
         return f"the proxy does not pass the request on ({text}): check HTTP_PROXY, HTTPS_PROXY and NO_PROXY"
@@ -303,28 +303,14 @@ def _unreadable(body: bytes) -> str:
     )
 
 
-_CALL: ContextVar[_Call | None] = ContextVar("_CALL", default=None)
-
-
-def guarded_client(*, verify: Any = True) -> "httpx.Client":
+def guarded_client(*, verify: Any = True) -> httpx.Client:
     """Return an HTTP client whose requests are limited within ``within``; it follows no redirect.
 
     Args:
         verify: how certificates are checked, as httpx takes it.
     """
-    import httpx
-
     # A server's cookies would be sent to it with later requests, of other runs too.
     none = CookieJar(policy=DefaultCookiePolicy(allowed_domains=()))
     # It finds the proxies of the environment, which a client with a transport of its own does not look for.
     plain = httpx.Client(verify=verify, timeout=None, cookies=none)
-
-    class Guarded(httpx.BaseTransport):
-        def handle_request(self, request: httpx.Request) -> httpx.Response:
-            call, handle = _CALL.get(), partial(plain.send, stream=True)
-            return handle(request) if call is None else call.send(handle, request)
-
-        def close(self) -> None:
-            plain.close()
-
-    return httpx.Client(transport=Guarded(), cookies=none)
+    return httpx.Client(transport=_Guarded(plain), cookies=none)

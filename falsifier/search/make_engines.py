@@ -127,9 +127,8 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         SpecError: if the cost is limited although the price is unknown.
         ChatError: for an unknown provider or a missing key.
     """
-    from falsifier.llm.client import DEFAULT_TIMEOUT
+    from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT
     from falsifier.llm.connect import connect, default_cache_directory, preflight
-    from falsifier.llm.retry import DEFAULT_ATTEMPTS
     from falsifier.llm.usage import Price
 
     preflight(llm.name, api_base=llm.api_base)

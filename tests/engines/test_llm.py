@@ -30,8 +30,9 @@ def reply(values: Sequence[float], rationale: str = "because") -> str:
     return json.dumps({"rationale": rationale, "signals": [{"name": "u", "values": list(values)}]})
 
 
-def test_the_road_to_a_valid_reply() -> None:
+def test_the_road_to_a_valid_reply(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rate limit, lost connection, bad JSON, a point out of range, a repetition, then success."""
+    monkeypatch.setattr("falsifier.llm.client._FIRST_DELAY", 0.01)
     problem = lag_problem()
     script = (
         Step(reply([0.5, 0.5, 0.5, 0.5])),
@@ -44,7 +45,7 @@ def test_the_road_to_a_valid_reply() -> None:
     )
     exchanges: list[Exchange] = []
     with serving(*script) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url, first_delay=0.01)
+        chat = LiteLLMChat("openai/m", api_base=server.url)
         engine = LLMEngine(problem, chat, variant="MP4")
         engine.attach(exchanges.append, lambda inner: inner)
         engine.tell([evaluate(problem, *engine.ask())])

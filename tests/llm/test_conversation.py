@@ -2,9 +2,8 @@
 
 import pytest
 
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, ContextExceededError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.failures import ContextExceededError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.replay import ScriptedChat
 

@@ -3,9 +3,9 @@ import socket
 import pytest
 
 from falsifier.core.secrets import redact
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, ContextExceededError
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.failures import ContextExceededError, TransientChatError, classify
+from falsifier.llm.failures import TransientChatError, classify
 from tests.llm.server import Step, serving
 from tests.llm.test_client import REQUEST
 
@@ -84,7 +84,7 @@ def test_where_nothing_listens_on_this_machine_little_patience_helps(
 ) -> None:
     address = f"http://127.0.0.1:{free_port()}/v1"
     naps: list[float] = []
-    monkeypatch.setattr("falsifier.llm.retry.sleep", naps.append)
+    monkeypatch.setattr("falsifier.llm.client.sleep", naps.append)
     chat = LiteLLMChat(model, api_base=address)
     with pytest.raises(ChatError, match=f"nothing is listening at {address}: start the ") as caught:
         chat.complete(REQUEST)

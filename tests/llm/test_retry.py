@@ -1,12 +1,14 @@
 """Patience with passing failures."""
 
+from time import monotonic
+
 import pytest
 
 from falsifier.errors import ChatError
+from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.replay import ScriptedChat
-from falsifier.llm.retry import retried
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
@@ -15,12 +17,18 @@ QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 def naps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """How long it waited, in s; nobody waits here."""
     waited: list[float] = []
-    monkeypatch.setattr("falsifier.llm.retry.sleep", waited.append)
+    monkeypatch.setattr("falsifier.llm.client.sleep", waited.append)
     return waited
 
 
 def asked(chat: ScriptedChat, *, attempts: int = 7, within: float | None = None) -> ChatReply:
-    return retried(lambda: chat.complete(QUESTION), attempts=attempts, seconds_left=lambda: within)
+    class Scripted(LiteLLMChat):
+        def send(self, request: ChatRequest) -> ChatReply:
+            return chat.complete(request)
+
+    deadline = None if within is None else monotonic() + within
+    question = QUESTION.model_copy(update={"deadline": deadline})
+    return Scripted("openai/mine", attempts=attempts).complete(question)
 
 
 def test_waits_longer_each_time_and_counts_attempts(naps: list[float]) -> None:

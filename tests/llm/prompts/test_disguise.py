@@ -211,10 +211,11 @@ def test_integers_of_few_values_keep_their_steps(
 def test_doubts_and_start_values_are_scaled() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9)", parameters=[START])
     violation = evaluate(problem, problem.space.decode([1, 1, 1, 1, 0]))
-    chat = ScriptedChat(['{"point": [50, 50, 50, 50, 50]}'])
+    chat = ScriptedChat([f'{{"point": [50, 50, 50, 50, {n}]}}' for n in (50, 60)])
     engine = LLMEngine(problem, chat, anonymous=True)
-    engine.tell([violation])
+    engine.ask()
     engine.doubt(replace(doubtful(problem, violation), outcome="refuted", robustness=0.585, reference=None))
+    engine.tell([violation])
     engine.ask()
     sent = text_of(chat.requests)
     assert "a second simulation gave robustness +13.5. " in sent
