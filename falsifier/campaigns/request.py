@@ -18,7 +18,7 @@ from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget
-from falsifier.search.refine_levels import engine_parameterization
+from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10

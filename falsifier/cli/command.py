@@ -15,7 +15,7 @@ OPTION_GROUPS = {
         *("--stl", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
         *("--output-interval", "--time-limit", "--allow", "--deny"),
     ),
-    "Search": ("--engine", "--refine", "--inputs", "--seed", "--runs", "--jobs"),
+    "Search": ("--engine", "--inputs", "--seed", "--runs", "--jobs"),
     "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),
     "Language model": (
         *("--llm", "--variant", "--context", "--anonymous", "--api-base", "--llm-option"),

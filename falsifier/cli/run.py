@@ -67,12 +67,6 @@ class _OneTarget(Command):
 @seed_option()
 @jobs_option("simulations")
 @inputs_option("Known inputs to simulate first; the engine learns from them", multiple=True)
-@click.option(
-    "--refine",
-    is_flag=True,
-    help="Search the spec's own control points first, then faster inputs, in up to three levels, each with "
-    "the same share of the budget.",
-)
 @quiet_option
 @out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
@@ -88,7 +82,6 @@ def run(
     seed: int,
     jobs: int,
     places: tuple[Path, ...],
-    refine: bool,
     quiet: bool,
     out: Path | None,
     fmu_log: Path | None,
@@ -104,7 +97,6 @@ def run(
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
     from falsifier.problem.loading import load_source
-    from falsifier.problem.refinement import widened
     from falsifier.record.run import falsify
     from falsifier.views.progress import FmuLog, make_display
 
@@ -120,8 +112,7 @@ def run(
     start_from = []
     if places:
         searched = loaded = [load_source(each) for each in sources]
-        (fitting,) = widened(loaded[:1]) if refine else loaded[:1]
-        start_from = [_known(place, fitting) for place in places]
+        start_from = [_known(place, loaded[0]) for place in places]
     with make_display(quiet=quiet) as display:
         results = falsify(
             searched,
@@ -132,11 +123,8 @@ def run(
             jobs=jobs,
             directory=out or _new_directory(source.name),
             start_from=start_from,
-            refine=refine,
             listeners=[display, *logs],
         )
-    if refine and not any(result.problem.space.inputs for result in results):
-        warn("--refine: no input is searched, so there was nothing to refine")
     _finish(results, as_json=as_json)
 
 

@@ -16,13 +16,12 @@ from falsifier.context.values import Named
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
-from falsifier.core.space import Freedom
 from falsifier.errors import FalsifierError, SpecError, did_you_mean
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.sections import InputSection, ModelChanges, RequirementSection
+from falsifier.problem.sections import ModelChanges, RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import Parameterization, ProblemSource, Target
 from falsifier.problem.spec import Spec, read_spec
@@ -270,12 +269,10 @@ def _simulate_alike(spec: Spec) -> bool:
 
 
 def _python_problem(source: ProblemSource) -> Problem:
-    """Return a problem made in Python, with the limits of free control points of a search that refines."""
-    target, stated = source.target, source.changes.inputs
-    freed = {name: section.free for name, section in stated.items() if section.free}
-    allowed = ModelChanges(inputs={name: InputSection(free=free) for name, free in freed.items()})
+    """Return a problem made in Python."""
+    target = source.target
     plain = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
-    if plain != ProblemSource(target=target, changes=allowed):
+    if plain != ProblemSource(target=target):
         raise SpecError(f"{target}: options cannot change a problem made in Python; change it in its module")
     _, module, name = [*target.split(":"), "", ""][:3]
     try:
@@ -296,11 +293,7 @@ def _python_problem(source: ProblemSource) -> Problem:
         raise SpecError(_raised(f"{target}: {name}()", error)) from error
     if not isinstance(problem, Problem):
         raise SpecError(f"{target}: expected a Problem or a function that returns one")
-    inputs = (
-        replace(r, free=Freedom(**freed[r.name].model_dump())) if r.name in freed else r
-        for r in problem.space.inputs
-    )
-    return replace(problem, space=replace(problem.space, inputs=tuple(inputs)))
+    return problem
 
 
 def _raised(what: str, error: Exception) -> str:

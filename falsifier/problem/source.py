@@ -15,8 +15,6 @@ STL_NAME = "stl"
 MODEL_FILES = (".fmu", *PACKAGES)
 
 Parameterization = Literal["free", "fixed"]
-# What a search did with it; refined: the spec's own control points first, then freer ones.
-Searched = Literal["free", "fixed", "refined"]
 
 
 @dataclass(frozen=True, slots=True)

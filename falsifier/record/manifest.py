@@ -21,9 +21,9 @@ from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.source import Searched
+from falsifier.problem.source import Parameterization
 from falsifier.record.files import read_sealed, write_sealed
-from falsifier.search.refine_levels import levels_of, parameterization_of
+from falsifier.search.parameterization import parameterization_of, searched_space
 from falsifier.search.request import RunRequest
 
 MANIFEST = "manifest.json"
@@ -69,13 +69,6 @@ class RequirementRecord(_Strict):
         )
 
 
-class LevelRecord(_Strict):
-    """One level of a search that refines its inputs."""
-
-    first: int = Field(description="Number of simulations before it.")
-    searched: str = Field(description="How it searches the inputs, in words.")
-
-
 class Surroundings(_Strict):
     """With what and when a run or a campaign was started."""
 
@@ -97,12 +90,8 @@ class Manifest(Surroundings):
     )
     model: str = Field(description="Name of the model.")
     components: tuple[str, ...] = Field((), description="Names of the components, if the model is a system.")
-    parameterization: Searched = Field(
-        description="free: the engine could choose the control points of at least one input; refined: only "
-        "after a search with the spec's own."
-    )
-    levels: tuple[LevelRecord, ...] = Field(
-        (), description="If the inputs are refined step by step: the levels, coarse first."
+    parameterization: Parameterization = Field(
+        description="free: the engine could choose the control points of at least one input."
     )
     inputs: tuple[InputRecord, ...]
     parameters: tuple[InputRecord, ...]
@@ -182,8 +171,6 @@ def describe(
     """
     problem = problems[0]
     space = problem.space
-    levels = levels_of(request, space)
-    is_refined = len(levels) > 1
     return Manifest(
         **environment(),
         request=request,
@@ -192,11 +179,7 @@ def describe(
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
         components=problem.info.components,
-        parameterization="refined" if is_refined else parameterization_of(levels[0].space),
-        levels=tuple(
-            LevelRecord(first=level.first, searched=level.searched)
-            for level in (levels if is_refined else ())
-        ),
+        parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
         inputs=tuple(InputRecord.model_validate(r, from_attributes=True) for r in space.inputs),
         parameters=tuple(InputRecord.model_validate(p, from_attributes=True) for p in space.parameters),
         not_searched=problem.held,

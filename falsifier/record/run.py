@@ -19,7 +19,6 @@ from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
-from falsifier.problem.refinement import widened
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
@@ -30,7 +29,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
-from falsifier.search.refine_levels import level_starts, levels_of
+from falsifier.search.parameterization import searched_space
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Steps
@@ -54,7 +53,6 @@ def falsify(  # type: ignore[overload-overlap]
     directory: Path | str | None = ...,
     jobs: int = ...,
     start_from: Iterable[Candidate] = ...,
-    refine: bool = ...,
     listeners: Iterable[Listener] = ...,
 ) -> Result: ...
 
@@ -70,7 +68,6 @@ def falsify(
     directory: Path | str | None = ...,
     jobs: int = ...,
     start_from: Iterable[Candidate] = ...,
-    refine: bool = ...,
     listeners: Iterable[Listener] = ...,
 ) -> list[Result]: ...
 
@@ -85,7 +82,6 @@ def falsify(
     directory: Path | str | None = None,
     jobs: int = 1,
     start_from: Iterable[Candidate] = (),
-    refine: bool = False,
     listeners: Iterable[Listener] = (),
 ) -> Result | list[Result]:
     """Search for inputs that violate one requirement, or several.
@@ -105,8 +101,6 @@ def falsify(
         jobs: number of simulations at a time.
         start_from: known candidates, which are simulated first and count in the budget; they are fitted to
             the search space.
-        refine: search inputs with their own control points first, then faster ones, level by level; each
-            level gets the same share of the budget.
         listeners: called with every event.
 
     Returns:
@@ -132,26 +126,21 @@ def falsify(
     _check_engine(engine)
     seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
     limits = _budget(budget)
-    if refine and not isinstance(engine, str | None):
-        raise SpecError("refine: each level has an engine of its own: pass the name of an engine instead")
     groups, known = alike(problems), list(start_from)
     chat = None if isinstance(llm, LLMSettings | str | None) else llm
     made = None if isinstance(engine, str | None) else engine
     name = engine if isinstance(engine, str | None) else engine.name
     settings = _settings(llm)
     results: dict[str, Result] = {}
-    for same in groups:
-        group = widened(same) if refine else same
-        space = group[0].space
+    for group in groups:
         request = RunRequest(
             problems=_sources(group) if directory is not None else (),
             engine=name,
             llm=settings,
-            levels=level_starts(space, name, settings, limits) if refine else (),
             seed=seed,
             budget=limits,
             jobs=jobs,
-            start_from=tuple(fit(space, each).candidate.to_json() for each in known),
+            start_from=tuple(fit(group[0].space, each).candidate.to_json() for each in known),
         )
         place = None if directory is None else Path(directory)
         if place is not None and len(groups) > 1:
@@ -216,7 +205,6 @@ def resume(
             loaded = load_sources(request.problems)
         elif by_name.keys() >= set(described.names):
             loaded = [by_name[name] for name in described.names]
-            loaded = widened(loaded) if request.levels else loaded
         else:
             raise JournalError(
                 f"{place}: this run searched {', '.join(described.names)}: give all of them in problems=[...]"
@@ -289,10 +277,9 @@ def carry_out(
                 "choose another directory, or delete it"
             )
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
-        levels = levels_of(request, problems[0].space)
         recorded = manifest.read(directory) if begun and directory else None
         told = told_problems(request, problems, recorded.contexts if recorded else {})
-        engines = [engine] if engine is not None else make_engines(request, told, chat, levels)
+        engines = [engine] if engine is not None else make_engines(request, told, chat)
         known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         for problem in problems:
             stack.callback(problem.model.close)
@@ -320,8 +307,8 @@ def carry_out(
             known=known,
             steps=steps,
             jobs=request.jobs,
-            in_batches=bool(request.levels) or any(isinstance(each, AsksLLM) for each in engines),
-            levels=levels,
+            in_batches=any(isinstance(each, AsksLLM) for each in engines),
+            searched=searched_space(problems[0].space, request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,
             prepared=perf_counter() - started,

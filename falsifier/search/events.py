@@ -10,7 +10,6 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Budget, Spent
-from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result, ResultStatus
 
 
@@ -23,7 +22,6 @@ class RunStarted:
         engines: name of each problem's engine.
         budget: limits of the run.
         searched: the part of the search space that the engines use.
-        levels: if the inputs are refined step by step: all levels, coarse first.
         replayed: number of evaluations taken from the run's journal.
     """
 
@@ -31,7 +29,6 @@ class RunStarted:
     engines: tuple[str, ...]
     budget: Budget
     searched: SearchSpace
-    levels: tuple[RefineLevel, ...] = ()
     replayed: int = 0
 
 

@@ -8,10 +8,9 @@ from typing import Literal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.problem.grid import smallest_window
+from falsifier.problem.grid import default_freedom, smallest_window
 from falsifier.problem.problem import Problem
-from falsifier.problem.refinement import coarse_inputs, limits_of
-from falsifier.search.refine_levels import RefineLevel, reached
+from falsifier.problem.sections import FreeSection
 
 # A number that is not part of a name: two errors that differ only in such numbers have the same cause.
 _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)", re.IGNORECASE)
@@ -101,32 +100,23 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     return tuple(sorted(found.values(), key=lambda failure: -failure.count))
 
 
-# The option that tries faster inputs after the slow ones.
-_REFINE = "falsifier run ... --refine (slow inputs first, then faster ones)"
-
-
-def inexpressible(problem: Problem, levels: Sequence[RefineLevel], simulations: int) -> Finding | None:
+def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
     """Return what the fixed control points of a search could not express; None if they left nothing out.
 
     Args:
-        problem: what was searched.
-        levels: the levels of the search, coarse first.
-        simulations: number of simulations of the search.
+        problem: what was to be falsified.
+        searched: the part of its search space that the engine used.
     """
     formula = problem.requirement.formula
-    begun = reached(levels, simulations)
-    searched = begun[-1].space
-    coarse = coarse_inputs(searched, limits_of([problem]))
+    experiment = problem.experiment
+    limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)
+    coarse = [r for r in searched.inputs if r.free is None and r.control_points < limits.max_control_points]
     if not coarse:
         return None
     slow = "; ".join(_fastest(r, searched) for r in coarse)
     window = smallest_window([formula])
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
-    remedy = _remedy(problem, coarse)
-    if len(begun) < len(levels):
-        remedy = f"more simulations; the search ended on level {len(begun)} of {len(levels)}"
-    elif begun[-1].leaves_finer:
-        remedy = "a larger budget, which allows another level"
+    remedy = _remedy(problem, coarse, limits)
     return Finding(
         kind="parameterization",
         text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}.",
@@ -146,23 +136,18 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
     )
 
 
-def _remedy(problem: Problem, coarse: Sequence[InputRange]) -> str:
+def _remedy(problem: Problem, coarse: Sequence[InputRange], limits: FreeSection) -> str:
     """Say what allows faster inputs, depending on why there were none."""
     source, own = problem.source, {r.name: r for r in problem.space.inputs}
     if any(own[r.name].free for r in coarse):
         return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
     if source is not None and source.parameterization == "fixed":
         return "--parameterization free"
-    stated = source.changes.inputs if source is not None else {}
-    open_ = [r for r in coarse if r.name in stated]
-    if open_:
-        options = " ".join(f"--search {r.name}={r.low:g}:{r.high:g}" for r in open_)
-        return f"{_REFINE}, or {options} without a number of control points"
-    limits = limits_of([problem])
     count, shortest = limits.max_control_points, limits.min_interval
-    if source is None:
-        return f"falsify(..., refine=True), or InputRange(..., free=Freedom({count}, {shortest:g}))"
-    if source.parts.kind == "python":
-        return f"{_REFINE}, or InputRange(..., free=Freedom({count}, {shortest:g}))"
+    if source is None or source.parts.kind == "python":
+        return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
+    option = f"--parameterization free:{shortest:g}"
+    if source.parts.kind != "spec":
+        return option
     free = f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }}"
-    return f"{_REFINE}, or {free} in [inputs.{coarse[0].name}]"
+    return f"{option}, or {free} in [inputs.{coarse[0].name}]"

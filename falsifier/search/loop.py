@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -25,7 +26,6 @@ from falsifier.search.events import (
     RunEnded,
     RunStarted,
 )
-from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Steps
@@ -43,7 +43,7 @@ def search(
     steps: Steps | None = None,
     jobs: int = 1,
     in_batches: bool = False,
-    levels: Sequence[RefineLevel] = (),
+    searched: SearchSpace | None = None,
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
     prepared: float = 0.0,
@@ -63,8 +63,7 @@ def search(
         jobs: number of simulations at a time.
         in_batches: whether an engine is asked for that many candidates at once, because each question costs;
             otherwise it is asked for one whenever a simulation has ended.
-        levels: the parts of the search space that the engines use, and from which simulation on; default: all
-            of it.
+        searched: the part of the search space that the engines use; default: all of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
         prepared: seconds that the preparation of the run took, such as imports; they count.
@@ -87,11 +86,11 @@ def search(
                 "cannot share a search: falsify them one after the other"
             )
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
-    levels = tuple(levels) or (RefineLevel(0, problems[0].space),)
+    space = searched or problems[0].space
     steps = steps or Steps()
     began = perf_counter() - prepared - steps.seconds
     first = _Known(deque(known))
-    loop = _Loop(states, first, levels, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
+    loop = _Loop(states, first, space, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
     status: ResultStatus
     try:
         loop.attach()
@@ -134,7 +133,7 @@ class _Loop:
 
     states: list[RequirementState]
     known: _Known
-    levels: tuple[RefineLevel, ...]
+    searched: SearchSpace
     budget: Budget
     steps: Steps
     directory: Path | None
@@ -168,8 +167,7 @@ class _Loop:
                 problems=tuple(state.problem for state in self.states),
                 engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
-                searched=self.levels[-1].space,
-                levels=self.levels if len(self.levels) > 1 else (),
+                searched=self.searched,
                 replayed=self.steps.replayed,
             )
         )
@@ -358,7 +356,7 @@ class _Loop:
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
         results = [
-            state.result(status, reason, levels=self.levels, spent=self.clock(), directory=self.directory)
+            state.result(status, reason, searched=self.searched, spent=self.clock(), directory=self.directory)
             for state in self.states
         ]
         overall = "falsified" if all(r.falsified for r in results) else status

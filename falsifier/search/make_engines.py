@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 from falsifier.context.values import Context
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.engines.refining import Refining, Stage
 from falsifier.errors import SpecError
 from falsifier.llm.messages import Chat
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
-from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
@@ -25,16 +23,13 @@ _LLM_ENGINES = ("llm", "hybrid")
 _SEED_STRIDE = 1_000_003
 
 
-def make_engines(
-    request: RunRequest, problems: Sequence[Problem], chat: Chat | None, levels: Sequence[RefineLevel] = ()
-) -> list[Engine]:
+def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
     """Make the engines of a request, one per problem.
 
     Args:
         request: what was requested.
         problems: what is searched.
         chat: chat with the request's language model, if it was made in Python.
-        levels: levels of a request that refines its inputs; each has engines of its own.
 
     Raises:
         SpecError: for an unknown engine, an engine that does not fit the language model, or a cost limit
@@ -42,19 +37,6 @@ def make_engines(
         ChatError: for an unknown provider or a missing key.
     """
     check_names(request)
-    if not request.levels:
-        return _made(request, problems, chat)
-    made = [
-        (level, _made(request, [replace(p, space=level.space) for p in problems], chat)) for level in levels
-    ]
-    return [
-        Refining([Stage(engines[i], level.space, level.first) for level, engines in made])
-        for i in range(len(problems))
-    ]
-
-
-def _made(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
-    """Make engines that do not refine, one per problem."""
     seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
     llm = request.llm
     if llm is None:

@@ -87,10 +87,6 @@ class RunRequest(_Strict):
     budget: Budget = Budget()
     jobs: int = Field(default=1, ge=1)
     keep: Keep = "history"
-    levels: tuple[int, ...] = Field(
-        default=(),
-        description="If inputs are refined step by step: the number of simulations before each level.",
-    )
     start_from: tuple[dict[str, Any], ...] = Field(
         default=(), description="Known candidates, simulated before those of the engine."
     )

@@ -4,13 +4,13 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
+from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine, HasRemarks
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding, inexpressible
-from falsifier.search.refine_levels import RefineLevel, reached
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.vacuity import Vacuity
 
@@ -59,7 +59,7 @@ class RequirementState:
         status: ResultStatus,
         reason: str,
         *,
-        levels: tuple[RefineLevel, ...],
+        searched: SearchSpace,
         spent: Spent,
         directory: Path | None,
     ) -> Result:
@@ -68,13 +68,13 @@ class RequirementState:
         Args:
             status: how the search ended; if this requirement was falsified, that is its status.
             reason: why, in words.
-            levels: the levels of the search, coarse first.
+            searched: the part of the search space that the engine used.
             spent: what the whole search has spent.
             directory: where it is recorded.
         """
         found, findings = self.counterexample, list[Finding]()
         if self.best is not None and found is None:
-            limits = inexpressible(self.problem, levels, len(self.evaluations))
+            limits = inexpressible(self.problem, searched)
             findings = [*self.vacuity.findings(), *([limits] if limits else [])]
         return Result(
             problem=self.problem,
@@ -86,8 +86,7 @@ class RequirementState:
             refuted=tuple(c for c in self.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in self.doubtful if c.outcome == "fragile"),
             spent=self.spent or spent,
-            searched=reached(levels, len(self.evaluations))[-1].space,
-            levels=levels if len(levels) > 1 else (),
+            searched=searched,
             findings=tuple(findings),
             directory=directory,
             remarks=self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else (),

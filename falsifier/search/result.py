@@ -13,7 +13,6 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
-from falsifier.search.refine_levels import RefineLevel
 from falsifier.stl.margins import signed
 
 if TYPE_CHECKING:
@@ -40,7 +39,6 @@ class Result:
         fragile: violations that disappear at half the communication step.
         spent: what the run has spent; if falsified, until the counterexample was confirmed.
         searched: the part of the search space that the engine used; None: all of it.
-        levels: if the inputs are refined step by step: all levels, coarse first.
         findings: what the search could not show; empty if falsified.
         directory: the run directory, or None.
         remarks: what the engine says of how it worked, such as how many samples are not an LLM's.
@@ -57,7 +55,6 @@ class Result:
     fragile: tuple[Confirmation, ...] = ()
     spent: Spent = field(default_factory=Spent)
     searched: SearchSpace | None = None
-    levels: tuple[RefineLevel, ...] = ()
     findings: tuple[Finding, ...] = ()
     directory: Path | None = None
     unrecorded: str = ""

@@ -13,7 +13,6 @@ from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.events import (
-    Asked,
     Confirmed,
     Evaluated,
     Event,
@@ -23,7 +22,7 @@ from falsifier.search.events import (
     RunStarted,
 )
 from falsifier.search.findings import cause_of
-from falsifier.search.refine_levels import level_name, parameterization_note
+from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, moving, unbroken
@@ -180,7 +179,6 @@ class News:
 
     def __init__(self) -> None:
         self._started: RunStarted | None = None
-        self._levels_told = 0
         self._told: set[str] = set()
         self._least: dict[str, float] = {}
         self._said: dict[str, str] = {}
@@ -210,8 +208,6 @@ class News:
             case RunStarted():
                 self._started, self._since = event, Spent()
                 yield from _choices(event)
-            case Asked():
-                yield from self._levels(event)
             case Evaluated(spent=spent) if spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed:
                 yield from self._once(
                     "mostly failed",
@@ -238,17 +234,6 @@ class News:
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)
         return "; ".join(told)
-
-    def _levels(self, event: Asked) -> Iterator[str]:
-        """Tell of each level of a search that refines its inputs what it searches, when it begins."""
-        levels = self._started.levels if self._started else ()
-        for number, level in enumerate(levels[self._levels_told :], start=self._levels_told + 1):
-            if level.first > event.first:
-                return
-            self._levels_told = number
-            yield (
-                f"{level_name(number, len(levels))}, from simulation {level.first + 1} on: {level.searched}"
-            )
 
     def _failure(self, event: Evaluated) -> Iterator[str]:
         """Tell a cause of failures once."""
@@ -308,8 +293,6 @@ def _choices(event: RunStarted) -> list[str]:
     """Return the parameterization, and what was chosen or ignored when the problems were loaded, once."""
     chosen = dict.fromkeys(note for problem in event.problems for note in problem.notes)
     parameterization = parameterization_note(event.searched)
-    if event.levels:
-        parameterization = f"inputs are refined in {len(event.levels)} levels, from coarse to fine"
     held = held_text(event.problems[0].held_inputs)
     unsearched = f"not searched: {held}" if held else ""
     return [text for text in (parameterization, unsearched, *chosen) if text]

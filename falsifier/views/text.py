@@ -14,12 +14,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
 from falsifier.search.budget import Spent
-from falsifier.search.refine_levels import (
-    LevelResult,
-    level_results,
-    parameterization_note,
-    parameterization_of,
-)
+from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
 from falsifier.stl.margins import margin_words, signed
@@ -61,9 +56,7 @@ def result_facts(result: Result) -> list[Fact]:
         facts.append(("confirmed", found.reason))
     elif result.status != "failed":
         facts.append(("reason", result.reason))
-    if result.levels:
-        facts += level_facts(result)
-    elif found is None and result.searched is not None and result.searched.inputs:
+    if found is None and result.searched is not None and result.searched.inputs:
         facts.append(("inputs", parameterization_note(result.searched)))
     facts += [("note", finding.text) for finding in result.findings]
     if held := held_text(problem.held_inputs):
@@ -99,7 +92,6 @@ def results_text(results: Sequence[Result]) -> str:
             lines += [
                 f"{'':{width}}  {line}" for line in broken_lines(result.counterexample.evaluation.verdict)
             ]
-        lines += [f"{'':{width}}{line}" for line in fact_lines(level_facts(result))]
         lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
         lines += [f"{'':{width}}  failed: {failure.text}" for failure in result.failures]
         lines += [f"{'':{width}}  note: {remark}" for remark in result.remarks]
@@ -130,10 +122,7 @@ def result_json(result: Result) -> dict[str, Any]:
         "reason": result.reason,
         "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
         "best": result.best and evaluation_json(result.best),
-        "parameterization": "refined"
-        if result.levels
-        else parameterization_of(result.searched or result.problem.space),
-        "levels": [asdict(level) for level in _level_results(result)],
+        "parameterization": parameterization_of(result.searched or result.problem.space),
         "findings": [asdict(finding) for finding in result.findings],
         "failures": [asdict(failure) for failure in result.failures],
         "not_searched": [asdict(held) for held in result.problem.held],
@@ -143,19 +132,6 @@ def result_json(result: Result) -> dict[str, Any]:
         "spent": asdict(result.spent),
         "directory": result.directory and str(result.directory),
     }
-
-
-def level_facts(result: Result) -> list[Fact]:
-    """Say of each level of a search that refined its inputs what was searched, and what came of it."""
-    return [(level.name, level.text) for level in _level_results(result)]
-
-
-def _level_results(result: Result) -> list[LevelResult]:
-    # What was simulated at the same time as the counterexample comes after it and does not count.
-    end = result.spent.simulations if result.falsified else None
-    robustness = [e.robustness for e in result.evaluations[:end]]
-    levels = [(level.first, level.searched) for level in result.levels]
-    return level_results(levels, robustness, falsified=result.falsified) if levels else []
 
 
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:

@@ -128,13 +128,6 @@ def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
         assert "applies to campaigns only" in refused.err
 
 
-def test_parameters_alone_cannot_be_refined(tmp_path: Path) -> None:
-    stl = ("--stl", "G[0,10] (y <= 11)", "--set", "u=3", "--search", "gain=0.5:1", "--budget", "1")
-    done = falsifier("run", str(fixture("CheapLag_2")), *stl, "--refine", cwd=tmp_path)
-    assert done.code == 0, done.err
-    assert "--refine: no input is searched" in done.err
-
-
 def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
     search = ("--search", "u=4.9:10:1", "--budget", "8", "--engine", "uniform")
     arguments = ("--stl", "G[0,10] (y <= 100)", *search)
@@ -147,19 +140,10 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
     assert "  error: the solver did not converge: the valve is open too far" in log
 
 
-def test_refined_inputs_are_told_level_by_level(tmp_path: Path) -> None:
-    """A bug that only fast inputs reach: a level with the command's own control points does not find it."""
+def test_the_option_that_is_advised_finds_what_slow_inputs_cannot_express(tmp_path: Path) -> None:
     stl = ("--stl", "G[0,10] (u - y <= 1.5)", "--search", "u=-1:1:3", "--stop-time", "10")
-    search = ("--engine", "cma", "--budget", "30", "--out", "run", "--refine")
-    done = falsifier("run", str(fixture("CheapLag_2")), *stl, *search, cwd=tmp_path)
-    assert done.code == 1, done.err
-    first, second, third = re.findall(r"^  (level \d of 3 .*)$", done.out, re.MULTILINE)
-    assert "10 simulations, smallest robustness +0.5" in first
-    assert "falsified after" in second
-    assert "not begun" in third
-    assert "level 2 of 3, from simulation 11 on: fixed parameterization: u (4 control points" in done.err
-    again = falsifier("resume", "run", "--json", cwd=tmp_path)
-    assert again.code == 1
-    assert [level["falsified"] for level in again.json["levels"]] == [False, True, False]
-    assert falsifier("report", "run", "--out", "page.html", cwd=tmp_path).code == 0
-    assert "--refine</code>" in (tmp_path / "page.html").read_text()
+    search = ("run", str(fixture("CheapLag_2")), *stl, "--budget", "30", "--json")
+    slow = falsifier(*search, "--out", "slow", cwd=tmp_path)
+    assert slow.code == 0, slow.err
+    (advised,) = re.findall(r"--parameterization free:[\d.]+\d", slow.json["findings"][-1]["text"])
+    assert falsifier(*search, "--out", "fast", *advised.split(), cwd=tmp_path).code == 1

@@ -10,8 +10,7 @@ from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify
 from falsifier.search.events import Event, RunStarted
 from falsifier.search.findings import failures, inexpressible
-from falsifier.search.refine_levels import (
-    RefineLevel,
+from falsifier.search.parameterization import (
     engine_parameterization,
     parameterization_note,
     parameterization_of,
@@ -36,7 +35,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
 
 
 def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, [RefineLevel(0, searched_space(problem.space, engine, None))], 20)
+    finding = inexpressible(problem, searched_space(problem.space, engine, None))
     return finding.text if finding else ""
 
 
@@ -45,12 +44,9 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     stated = Problem.from_fmu(fmu_path("Lag_2"), formula, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
     assert told(stated) == (
         "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
-        "formula's smallest window is 1 s. To try them: falsifier run ... --refine (slow inputs first, then "
-        "faster ones), or --search u=-1:1 without a number of control points."
+        "formula's smallest window is 1 s. To try them: --parameterization free:0.05."
     )
-    assert told(replace(stated, source=None)).endswith(
-        "falsify(..., refine=True), or InputRange(..., free=Freedom(200, 0.05))."
-    )
+    assert told(replace(stated, source=None)).endswith(" InputRange(..., free=Freedom(200, 0.05)).")
 
 
 def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:

@@ -10,7 +10,6 @@ from falsifier.llm.replay import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
-from falsifier.search.refine_levels import RefineLevel
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.text import result_json, result_text, results_text
@@ -135,15 +134,6 @@ def test_random_changes_in_place_of_answers_are_told_with_the_reason(tmp_path: P
     again = LLMEngine(impossible(), chat)
     (resumed,) = resume(run, problems=[impossible()], engine=again, budget=2)
     assert resumed.remarks[0].startswith(remark.replace("1 of 1 sample", "2 of 2 samples"))
-
-
-def test_a_level_counts_no_simulation_after_the_counterexample(found: Result) -> None:
-    """With several at a time, some end after the counterexample."""
-    levels = (RefineLevel(0, found.problem.space),)
-    count = found.spent.simulations
-    longer = replace(found, evaluations=(*found.evaluations[:count], *found.evaluations[:1]), levels=levels)
-    assert result_json(longer)["levels"][0]["simulations"] == count
-    assert f"level 1 of 1   falsified after {count} simulation" in result_text(longer)
 
 
 def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:

@@ -22,7 +22,6 @@ from falsifier.views.report.wording import (
     advice,
     differences,
     input_table,
-    level_facts,
     limit_facts,
     margin_beside,
     parameter_facts,
@@ -280,7 +279,7 @@ def _seconds(run: Run) -> str:
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     run, rationale = shown.run, shown.candidate.rationale
-    facts = [*margin_beside(shown.verdict, shown.units), *level_facts(run)]
+    facts = [*margin_beside(shown.verdict, shown.units)]
     facts += [("rationale", rationale)] if rationale else []
     commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
     if run.falsified:

@@ -13,11 +13,9 @@ from falsifier.core.signals import Signal
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.store import shrunk_file
 from falsifier.problem.problem import held_text
-from falsifier.problem.refinement import without_limits
 from falsifier.problem.shorthand import options_from
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import read_journal, recorded_candidates
-from falsifier.search.refine_levels import level_results
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
@@ -171,13 +169,6 @@ def run_name(run: Run) -> str:
     return f"{run.method.label}, seed {run.seed}"
 
 
-def level_facts(run: Run) -> list[Fact]:
-    """Return what came of each level of a run that refined its inputs, and what the level searched."""
-    levels = [(level.first, level.searched) for level in run.manifest.levels]
-    found = level_results(levels, list(run.robustness), falsified=run.falsified) if levels else []
-    return [(level.name, level.text) for level in found]
-
-
 def advice(shown: Shown) -> str:
     """Return the command that would simplify or explain a counterexample; empty if both are done."""
     run = shown.run
@@ -210,7 +201,7 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     options: list[tuple[str, object]] = [
         ("--stl", problem.stl),
         ("--parameterization", _parameterization(problem)),
-        *options_from(without_limits(problem.changes) if request.levels else problem.changes),
+        *options_from(problem.changes),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
@@ -219,7 +210,6 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--max-cost", budget.cost),
         ("--seed", request.seed),
         ("--jobs", request.jobs if request.jobs > 1 else None),
-        ("--refine", True if request.levels else None),
     ]
     words = ["falsifier", "run", target]
     for name, value in options:
