@@ -36,8 +36,8 @@ _SLOW = (
 )
 # Packages of which commands import many modules one by one.
 _LARGE = ("falsifier", "openai.resources")
-# What runs when it is imported, and engines whose libraries are not installed.
-_NEVER = ("falsifier.__main__", "falsifier.engines.optimisers.botorch_gp")
+# What runs when it is imported.
+_NEVER = ("falsifier.__main__",)
 _ONE_AT_A_TIME = threading.Lock()
 
 

@@ -77,9 +77,6 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             "optuna's tree-structured Parzen estimator",
             extra="optuna",
         ),
-        "botorch": Registered(
-            "falsifier.engines.optimisers.botorch_gp:BoTorch", "botorch's Gaussian process", extra="botorch"
-        ),
         "hybrid": Registered(
             "falsifier.engines.hybrid:Hybrid", "a language model with the surrogate", is_free=True
         ),

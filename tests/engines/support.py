@@ -4,7 +4,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines import make_engine
@@ -18,12 +17,6 @@ from falsifier.testing import FREE, START, drive, lag_problem
 # Neither the contract nor who proposes when depends on how thorough a plan is.
 HASTY = Settings(cells=20, pool=40, children=20, generations=1, bound_steps=1, trial=2)
 TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
-
-
-def skip_if_absent(name: str) -> None:
-    """Skip the tests of botorch where it is not installed."""
-    if name == "botorch":
-        pytest.importorskip("botorch", reason="it brings torch, several hundred MB")
 
 
 def box_problem() -> Problem:

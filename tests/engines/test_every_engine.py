@@ -18,9 +18,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import FREE, START, Array, EngineContract, Response, drive, lag, lag_problem
-from tests.engines.support import HASTY, skip_if_absent
+from tests.engines.support import HASTY
 
-NAMES = [name for name in ENGINES if name not in ("hybrid", "botorch")]
+NAMES = [name for name in ENGINES if name != "hybrid"]
 FORMULAS = (
     "G[0,10] (x <= 3 or v >= 1)",
     "F[0,10] (brake > 10 or x <= 100)",
@@ -38,32 +38,26 @@ def make(name: str, problem: Problem, seed: int = 2) -> Engine:
 
 
 class TestContract(EngineContract):
-    @pytest.fixture(autouse=True, params=[*NAMES, "botorch"])
+    @pytest.fixture(autouse=True, params=NAMES)
     def _named(self, request: pytest.FixtureRequest) -> None:
         self.engine = str(request.param)
-        skip_if_absent(self.engine)
-        if self.engine == "botorch":
-            # Enough to get beyond the Sobol points, which are twice the coordinates and two.
-            self.rounds = 15
 
     def make(self, problem: Problem, seed: int) -> Engine:
         return make(self.engine, problem, seed)
 
 
-@pytest.mark.parametrize("name", [*NAMES, "botorch"])
+@pytest.mark.parametrize("name", NAMES)
 def test_every_engine_loads_and_bears_its_name(name: str) -> None:
-    skip_if_absent(name)
     assert make_engine(name, lag_problem(), seed=0).name == name
 
 
-@pytest.mark.parametrize(("engine", "module"), [("optuna", "optuna_tpe"), ("botorch", "botorch_gp")])
 def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
-    engine: str, module: str, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(sys.modules, engine, None)
-    monkeypatch.delitem(sys.modules, f"falsifier.engines.optimisers.{module}", raising=False)
-    with pytest.raises(SpecError, match=rf"'{engine}' needs a package.*pip install 'falsifier\[{engine}\]'"):
-        make_engine(engine, lag_problem(), seed=0)
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    monkeypatch.delitem(sys.modules, "falsifier.engines.optimisers.optuna_tpe", raising=False)
+    with pytest.raises(SpecError, match=r"'optuna' needs a package.*pip install 'falsifier\[optuna\]'"):
+        make_engine("optuna", lag_problem(), seed=0)
 
 
 def test_a_wrong_name_and_nothing_to_vary_are_errors() -> None:

@@ -76,7 +76,7 @@ def test_as_many_control_points_as_make_sense_leave_nothing_out() -> None:
 FAST = "G[0,10] (u - x <= 1.5)"
 
 
-@pytest.mark.parametrize("name", sorted(set(ENGINES) - {"hybrid", "optuna", "botorch"}))
+@pytest.mark.parametrize("name", sorted(set(ENGINES) - {"hybrid", "optuna"}))
 def test_engines_on_the_box_are_known_to_be_fixed(name: str) -> None:
     engine = make_engine(name, lag_problem(), seed=0)
     assert (engine_parameterization(name, None) == "fixed") == isinstance(engine, BoxEngine)

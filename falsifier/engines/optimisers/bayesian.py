@@ -1,7 +1,5 @@
 """Bayesian optimisation: a Gaussian process of the robustness, maximising the expected improvement."""
 
-from abc import abstractmethod
-
 import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_ndtr, ndtr
@@ -21,14 +19,18 @@ _STARTS = 3
 _SAMPLES = 512
 
 
-class GaussianProcessEngine(Sobol):
-    """Sobol points first, then the most promising point of a Gaussian process of the costs so far."""
+class Bayesian(Sobol):
+    """Sobol points first, then the maximum of the log expected improvement of a Gaussian process."""
+
+    name = "bayesian"
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
         self._start = min(20, 2 * self.box.dimension + 2)
         self._points: list[Array] = []
         self._costs: list[float] = []
+        # Distances in the unit box grow with the square root of its dimension, and so must length scales.
+        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._asked < self._start or len(self._costs) < 2:
@@ -36,10 +38,6 @@ class GaussianProcessEngine(Sobol):
             return Proposal(super()._propose(rng).point, few)
         points, costs = self._kept()
         return self._most_promising(points, standardised(costs), rng)
-
-    @abstractmethod
-    def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
-        """Return the next point, given standardised costs, shape (n,), at points, shape (n, d)."""
 
     def _learn(self, point: Array, cost: float | None) -> None:
         if cost is not None:
@@ -54,17 +52,6 @@ class GaussianProcessEngine(Sobol):
         latest = np.arange(len(costs) - _MAX_POINTS // 2, len(costs))
         keep = np.unique(np.concatenate([order, latest]))
         return points[keep], costs[keep]
-
-
-class Bayesian(GaussianProcessEngine):
-    """Proposes the maximum of the logarithm of a Gaussian process's expected improvement."""
-
-    name = "bayesian"
-
-    def __init__(self, problem: Problem, *, seed: int) -> None:
-        super().__init__(problem, seed=seed)
-        # Distances in the unit box grow with the square root of its dimension, and so must length scales.
-        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
 
     def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
         process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
