@@ -1,14 +1,13 @@
 """``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import shlex
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from falsifier.analyses.lint import LintFinding, lint
-from falsifier.cli.command import command, refuse
+from falsifier.cli.command import command
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.options import (
     Parameterized,
@@ -114,16 +113,18 @@ def formalize(
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, restated in words, distinguished from the others by an example and judged on one simulation.
-    Without --llm, the template that fits a simple English sentence is shown, and nothing is written.
+    Without one, templates serve: --stl 'NAME argument=value ...' of run and other commands.
     """
+    from falsifier.problem.templates import TEMPLATES
     from falsifier.problem.writing import subject_of
     from falsifier.views.analyses_text import formalized_json, formalized_text
 
     settings = llm_settings(options)
     if settings is None:
-        refuse("requires --llm NAME, which proposes the readings", choose=choose)
-        _advise(target, sentence, as_json=as_json)
-        return
+        raise SpecError(
+            "formalize needs --llm NAME, which proposes the readings; without a language model, choose a "
+            f"template for --stl ({', '.join(TEMPLATES)}): docs/requirements.md"
+        )
     if choose is not None or out is not None:  # before anything is paid for
         _file(subject_of(target), out)
     from falsifier.analyses.formalize import formalize as ask
@@ -139,28 +140,6 @@ def formalize(
     else:
         file, given = _write(found, choose, out)
         say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
-
-
-def _advise(target: str, sentence: str, *, as_json: bool) -> None:
-    """Print the template that fits a sentence.
-
-    Raises:
-        SpecError: if none does.
-    """
-    from falsifier.problem.template_advice import advised_template
-    from falsifier.problem.unit_check import defined_units
-    from falsifier.problem.writing import subject_of
-
-    problem = subject_of(target).problem
-    advice = advised_template(sentence, problem.info, defined_units(problem.model))
-    if advice is None:
-        raise SpecError(
-            "no template fits all words and numbers of this sentence; without --llm NAME only simple English "
-            "sentences are understood: docs/requirements.md lists them, and all templates"
-        )
-    lines = [f"{advice.template}: {advice.summary}", *(f"  {line}" for line in advice.section.splitlines())]
-    lines.append("Fill in what is in capital letters. With --llm NAME, a language model proposes formulas.")
-    say(as_shown("\n".join(lines), asdict(advice), as_json=as_json))
 
 
 def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str]:
