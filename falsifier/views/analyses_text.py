@@ -5,7 +5,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverage, PairCoverage, RangeCoverage
 from falsifier.analyses.formalize import Difference, Formalized, Reading
@@ -33,7 +32,12 @@ def coverage_text(found: Coverage, name: str) -> str:
     if found.ranges:
         header = ("searched", "range", "tried", "parts tried", "changes")
         lines += _indented([header, *map(_range_row, found.ranges)])
-        lines += _legend(found)
+        lines.append("  A part is a tenth of the range, or one of a few whole numbers.")
+        if any(r.paces for r in found.ranges):
+            lines.append(
+                "  Changes of an input in a simulation, by its fastest; slow: the range takes "
+                f"{SLOW * found.stop_time:.4g} s or more; fast: {FAST * found.stop_time:.4g} s or less."
+            )
     gaps = [*_gap_rows(found), *_pair_rows(found.pairs)]
     if gaps and found.simulations:
         lines += ["never tried", *_indented(gaps)]
@@ -112,15 +116,6 @@ def _range_row(r: RangeCoverage) -> tuple[str, ...]:
     )
 
 
-def _legend(found: Coverage) -> Iterator[str]:
-    yield "  A part is a tenth of the range, or one of a few whole numbers."
-    if any(r.paces for r in found.ranges):
-        yield (
-            "  Changes of an input in a simulation, by its fastest; slow: the range takes "
-            f"{SLOW * found.stop_time:.4g} s or more; fast: {FAST * found.stop_time:.4g} s or less."
-        )
-
-
 def _gap_rows(found: Coverage) -> Iterator[tuple[str, str]]:
     for r in found.ranges:
         if r.gaps:
@@ -136,8 +131,8 @@ def _gap_rows(found: Coverage) -> Iterator[tuple[str, str]]:
 def _pair_rows(pairs: Iterable[PairCoverage]) -> Iterator[tuple[str, str]]:
     partly = [p for p in pairs if p.count < p.tried.size]
     for p in partly[:_SHOWN]:
-        missing = p.tried.size - p.count
-        yield f"{p.first} with {p.second}", f"{missing} of {p.tried.size} combinations at the same time"
+        missing = f"{p.tried.size - p.count} of {p.tried.size}"
+        yield f"{p.first} with {p.second}", f"{missing} combinations at the same time"
     if len(partly) > _SHOWN:
         yield "", f"and some combinations of {counted(len(partly) - _SHOWN, 'more pair')}; --json has all"
 
@@ -162,11 +157,8 @@ def _named(name: str, unit: str) -> str:
 
 def formalized_text(found: Formalized) -> str:
     """Return all readings, how they differ, and what the language model has cost."""
-    lines: list[str] = []
-    for number, reading in enumerate(found.readings, start=1):
-        lines += _reading_lines(number, reading)
-    for difference in found.differences:
-        lines += _difference_lines(difference)
+    lines = [line for k, reading in enumerate(found.readings, start=1) for line in _reading_lines(k, reading)]
+    lines += [line for difference in found.differences for line in _difference_lines(difference)]
     for reason in dict.fromkeys(found.rejected):
         # In one line, without the formula with a caret below it that errors of its syntax have.
         said = "; ".join(line for line in reason.splitlines() if not line.startswith("  "))
@@ -207,12 +199,11 @@ def _reading_lines(number: int, reading: Reading) -> Iterator[str]:
     yield f"   in words   {reading.words}"
     if reading.meaning:
         yield f"   meant      {one_line(reading.meaning)}"
-    if (nominal := reading.nominal) is None:
-        return
-    if nominal.robustness is None:
-        yield f"   nominal    the simulation failed: {one_line(nominal.reason)}"
-    else:
-        yield f"   nominal    robustness {signed(nominal.robustness)} ({margin_words(nominal.robustness)})"
+    if (nominal := reading.nominal) is not None:
+        least = nominal.robustness
+        failed = f"the simulation failed: {one_line(nominal.reason)}"
+        told = failed if least is None else f"robustness {signed(least)} ({margin_words(least)})"
+        yield f"   nominal    {told}"
 
 
 def _difference_lines(difference: Difference) -> Iterator[str]:
@@ -242,34 +233,22 @@ def _points(trajectory: Trajectory | None) -> dict[str, list[list[float]]] | Non
     }
 
 
-Array = NDArray[np.float64]
-
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 48
 
 
 def trace_lines(trajectory: Trajectory, *, width: int = _WIDTH) -> list[str]:
-    """Return one line per signal: its name, its course over time, and its smallest and largest value."""
-    longest = max(map(len, trajectory.columns), default=0)
-    return [
-        f"{name:<{longest}}  {sparkline(column, width=width)}  {_span(column)}"
-        for name, column in trajectory.columns.items()
-    ]
+    """Return one line per signal: its name, its course over time, and its smallest and largest value.
 
-
-def sparkline(values: Array, *, width: int = _WIDTH) -> str:
-    """Return a column as a line of bars, each the value in the middle of its part of the time.
-
-    >>> sparkline(np.array([0.0, 0.0, 1.0, 1.0]), width=4)
-    '▁▁██'
+    The course is a line of bars, each the value in the middle of its part of the time.
     """
-    at = ((np.arange(width) + 0.5) * len(values) / width).astype(int)
-    shown = values[at]
-    low, high = float(np.min(values)), float(np.max(values))
-    heights = np.zeros(width) if low == high else (shown - low) / (high - low)
-    return "".join(_BARS[round(h * (len(_BARS) - 1))] for h in heights)
-
-
-def _span(column: Array) -> str:
-    low, high = float(np.min(column)), float(np.max(column))
-    return f"constant {low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
+    longest = max(map(len, trajectory.columns), default=0)
+    at = ((np.arange(width) + 0.5) * len(trajectory) / width).astype(int)
+    lines = []
+    for name, column in trajectory.columns.items():
+        low, high = float(np.min(column)), float(np.max(column))
+        heights = np.zeros(width) if low == high else (column[at] - low) / (high - low)
+        bars = "".join(_BARS[round(h * (len(_BARS) - 1))] for h in heights)
+        span = f"constant {low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
+        lines.append(f"{name:<{longest}}  {bars}  {span}")
+    return lines

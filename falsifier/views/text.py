@@ -210,7 +210,7 @@ def outcome_text(evaluation: Evaluation) -> str:
 
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """Convert an evaluation to a value that can be dumped as JSON."""
-    verdict, signals = evaluation.verdict, evaluation.candidate.signals
+    verdict = evaluation.verdict
     breach = verdict.breach if verdict else None
     return {
         **evaluation.candidate.to_json(),
@@ -219,8 +219,6 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
         "predicate": verdict and verdict.predicate,
         "values": dict(verdict.values) if verdict else None,
         "breach": breach and asdict(breach) | {"text": breach.text},
-        "switches": {name: signal.switches for name, signal in signals.items()},
-        "shortest_dwell": {name: signal.shortest_dwell for name, signal in signals.items()},
     }
 
 

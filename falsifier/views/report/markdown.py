@@ -7,14 +7,13 @@ from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.views.report.content import Section, Shown, Side, gather
 from falsifier.views.report.wording import (
     advice,
+    commands,
     differences,
     input_table,
     limit_facts,
     margin_beside,
     parameter_facts,
-    replay_command,
     result_text,
-    run_command,
     tried,
     trouble_lines,
     unshown_lines,
@@ -64,10 +63,7 @@ def _verdict(section: Section, where: str) -> list[str]:
     parts += _listed("Incomplete runs and unconfirmed violations", trouble_lines(section))
     parts.append(markdown_code(section.formula))
     if section.shown:
-        run, shrunk = section.shown[0].run, section.shown[0].is_shrunk
-        commands = [replay_command(run, shrunk=shrunk)] if run.falsified else []
-        commands.append(run_command(run.manifest.request, shared=run.shared))
-        listing = "\n".join(map(one_line, commands))
+        listing = "\n".join(one_line(command) for _, command in commands(section.shown[0]))
         parts.append(f"```sh\n{listing}\n```")
     return parts
 

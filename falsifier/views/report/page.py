@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from falsifier.campaigns.analysis import Run, Table
+from falsifier.campaigns.analysis import Run
 from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import counted
@@ -20,6 +20,7 @@ from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report.content import Content, Section, Shown, Side, Status, gather, searches
 from falsifier.views.report.wording import (
     advice,
+    commands,
     differences,
     input_table,
     limit_facts,
@@ -27,7 +28,6 @@ from falsifier.views.report.wording import (
     parameter_facts,
     replay_command,
     result_text,
-    run_command,
     run_name,
     tried,
     trouble_lines,
@@ -50,9 +50,6 @@ _BADGES: dict[Status, str] = {
     "not finished": "not finished",
     "failed": "failed",
 }
-# Columns of the table of statistics that name a row, and those that are folded away so that the others fit.
-_KEYS = ("requirement", "method")
-_FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(*directories: Path) -> str:
@@ -124,14 +121,11 @@ def overview(side: Side) -> str:
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
         total(run.spent for run in searches(runs)).simulations_text,
-        *([f"started {_minute(min(run.manifest.started for run in runs))}"] if runs else []),
     ]
+    if runs:
+        started = min(run.manifest.started for run in runs)  # such as 2026-03-01T10:20:30+00:00
+        parts.append(f"started {started[:16].replace('T', ' ')} UTC")
     return ", ".join(parts) + "."
-
-
-def _minute(started: str) -> str:
-    """To the minute: of 2026-03-01T10:20:30+00:00, as manifests have it, 2026-03-01 10:20 UTC."""
-    return f"{started[:16].replace('T', ' ')} UTC"
 
 
 def drawn(make: "Callable[[], Figure]", description: str) -> Html:
@@ -242,7 +236,15 @@ def _details(section: Section, most: int) -> Html:
         facts_html([("not searched", held)]) if held else "",
         _runs(runs),
         *histories,
-        *map(_other, section.shown[1:_MOST_DRAWN]),
+        *(
+            el(
+                "details",
+                el("summary", f"{run_name(other.run)}: after {other.run.spent.simulations_text}"),
+                *_found(other),
+                _shown_details(other),
+            )
+            for other in section.shown[1:_MOST_DRAWN]
+        ),
         _questions(section, most),
         class_="more",
     )
@@ -281,21 +283,8 @@ def _shown_details(shown: Shown) -> Html:
     run, rationale = shown.run, shown.candidate.rationale
     facts = [*margin_beside(shown.verdict, shown.units)]
     facts += [("rationale", rationale)] if rationale else []
-    commands = [("repeat the run", run_command(run.manifest.request, shared=run.shared))]
-    if run.falsified:
-        commands.insert(0, ("replay it", replay_command(run, shrunk=shown.is_shrunk)))
-    coded = el("dl", *(join(el("dt", name), el("dd", el("code", text))) for name, text in commands))
-    return join(facts_html(facts), coded)
-
-
-def _other(shown: Shown) -> Html:
-    """A counterexample of another run."""
-    return el(
-        "details",
-        el("summary", f"{run_name(shown.run)}: after {shown.run.spent.simulations_text}"),
-        *_found(shown),
-        _shown_details(shown),
-    )
+    facts += [(name, el("code", command)) for name, command in commands(shown)]
+    return facts_html(facts)
 
 
 def _questions(section: Section, most: int) -> str:
@@ -321,21 +310,14 @@ def _differences(content: Content) -> Html:
 def _statistics(side: Side) -> str:
     if side.table is None:
         return ""
-    main = side.table.only(*(name for name in side.table.header if name not in _FOLDED))
-    folded = side.table.only(*(name for name in side.table.header if name in (*_KEYS, *_FOLDED)))
+    rows = [(el("a", first, href=f"#{_anchor(first)}"), *rest) for first, *rest in side.table.rows]
     return el(
         "section",
         el("h2", f"Statistics: {side.title}"),
-        _table(main),
-        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded)),
+        table(side.table.header, rows, label=side.table.title, numbers=True),
         *(el("p", note, class_="note") for note in side.table.notes),
         class_="statistics",
     )
-
-
-def _table(shown: Table) -> Html:
-    rows = [(el("a", first, href=f"#{_anchor(first)}"), *rest) for first, *rest in shown.rows]
-    return table(shown.header, rows, label=shown.title, numbers=True)
 
 
 def _environment(side: Side) -> Html:

@@ -186,6 +186,13 @@ def replay_command(run: Run, *, shrunk: bool = False) -> str:
     return shlex.join(["falsifier", "replay", str(place)])
 
 
+def commands(shown: Shown) -> list[Fact]:
+    """Return the commands that replay a counterexample, and repeat the run that is shown."""
+    run = shown.run
+    replayed = [("replay it", replay_command(run, shrunk=shown.is_shrunk))] if run.falsified else []
+    return [*replayed, ("repeat the run", run_command(run.manifest.request, shared=run.shared))]
+
+
 def run_command(request: RunRequest, *, shared: bool = False) -> str:
     """Shell command that repeats a run; shared: for all requirements of its spec.
 

@@ -147,6 +147,4 @@ def test_junit_has_a_case_for_each_run(campaign: Path) -> None:
 def test_what_a_search_did_not_show_is_told(tmp_path: Path) -> None:
     result = falsify(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), "sobol", budget=3, directory=tmp_path)
     case = ElementTree.fromstring(junit_report(tmp_path))[0][0]
-    told = {p.get("name"): p.get("value") for p in case.iter("property")}
-    assert told["falsifier.condition"] == result.findings[0].text
     assert f"what this does not show: {result.findings[0].text}" in (case.findtext("system-out") or "")
