@@ -280,9 +280,8 @@ def _seconds(run: Run) -> str:
 
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
-    run, rationale = shown.run, shown.candidate.rationale
-    facts = [*margin_beside(shown.verdict, shown.units)]
-    facts += [("rationale", rationale)] if rationale else []
+    rationale = shown.candidate.rationale
+    facts = [*margin_beside(shown.verdict, shown.units), *([("rationale", rationale)] if rationale else [])]
     facts += [(name, el("code", command)) for name, command in commands(shown)]
     return facts_html(facts)
 
