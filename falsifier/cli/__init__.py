@@ -57,7 +57,7 @@ _TOOLS: _Table = {
 _COMMANDS: _Table = {
     "run": ("falsifier.cli.run", "Search for inputs that violate a requirement."),
     "resume": ("falsifier.cli.run", "Continue an interrupted run or campaign."),
-    "report": ("falsifier.cli.report", "Report on a run or campaign: HTML, Markdown, JUnit XML."),
+    "report": ("falsifier.cli.report", "Report on a run or campaign: HTML or Markdown."),
     "watch": ("falsifier.cli.campaign", "Follow a running search from another terminal."),
     "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
     "explain": (

@@ -16,7 +16,7 @@ from falsifier.core.literals import csv_text
 from falsifier.record import manifest
 from falsifier.search.result import Columns
 from falsifier.views.analyses_text import coverage_json, coverage_text
-from falsifier.views.report import html_report, junit_report, markdown_report
+from falsifier.views.report import html_report, markdown_report
 from falsifier.views.terminal import warn
 
 
@@ -24,7 +24,6 @@ from falsifier.views.terminal import warn
 @click.argument("directories", metavar="DIRECTORY...", nargs=-1, required=True, type=PATH)
 @out_option("Report to write; default: report.html in the first DIRECTORY.")
 @click.option("--markdown", is_flag=True, help="Markdown instead of HTML; printed on stdout without --out.")
-@click.option("--junit", type=PATH, metavar="FILE", help="Also write JUnit XML.")
 @click.option(
     "--csv",
     "csv_file",
@@ -43,7 +42,6 @@ def report(
     directories: tuple[Path, ...],
     out: Path | None,
     markdown: bool,
-    junit: Path | None,
     csv_file: Path | None,
     arch_comp: Path | None,
 ) -> None:
@@ -53,14 +51,12 @@ def report(
     """
     first, *others = directories
     if others:
-        refuse("takes one DIRECTORY", junit=junit, arch_comp=arch_comp)
-    if junit is not None:
-        junit.write_text(junit_report(first), encoding="utf-8")
+        refuse("takes one DIRECTORY", arch_comp=arch_comp)
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
     if csv_file is not None:
         csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
-    for written in filter(None, (junit, arch_comp, csv_file)):
+    for written in filter(None, (arch_comp, csv_file)):
         warn(f"{written} written")
     if markdown and out is None:
         say(markdown_report(*directories), nl=False)

@@ -1,12 +1,11 @@
-"""Reports on runs and campaigns: a self-contained HTML page, Markdown and JUnit XML.
+"""Reports on runs and campaigns: a self-contained HTML page, or Markdown.
 
 ::
 
     Path("report.html").write_text(html_report(Path("runs/nightly")), encoding="utf-8")
 """
 
-from falsifier.views.report.junit import junit_report
 from falsifier.views.report.markdown import markdown_report
 from falsifier.views.report.page import html_report
 
-__all__ = ["html_report", "junit_report", "markdown_report"]
+__all__ = ["html_report", "markdown_report"]

@@ -2,7 +2,6 @@ import os
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
-from xml.etree import ElementTree
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -16,7 +15,7 @@ from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
-from falsifier.views.report import junit_report, markdown_report
+from falsifier.views.report import markdown_report
 from falsifier.views.report.content import gather
 from falsifier.views.report.page import html_report
 from falsifier.views.report.wording import run_command
@@ -78,7 +77,7 @@ def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_pa
     problem = lag_problem("G[0,10] (x <= 3)", response=mostly_broken, inputs=2)
     problem = replace(problem, space=replace(problem.space, inputs=problem.space.inputs[:1]))
     result = falsify(problem, "uniform", budget=12, seed=1, directory=tmp_path)
-    for report in (html_report(tmp_path), markdown_report(tmp_path), junit_report(tmp_path)):
+    for report in (html_report(tmp_path), markdown_report(tmp_path)):
         plain = unescape(report).replace("\\", "")
         assert result.failures[0].text in plain
         assert "not searched: v = 0 (not named beside what is searched" in plain
@@ -125,26 +124,3 @@ def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(cam
     assert places == sorted(places)
     assert "`G[0,10] (x <= 0.6)`" in text
     assert "Robustness" not in text.partition("what broke")[0]
-
-
-def test_junit_has_a_case_for_each_run(campaign: Path) -> None:
-    root = ElementTree.fromstring(junit_report(campaign))
-    suites = {suite.get("name"): suite for suite in root}
-    assert set(suites) == {"uniform", "corners"}
-    for suite in suites.values():
-        assert [suite.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["4", "2", "0", "0"]
-        cases = list(suite)
-        assert [case.get("name") for case in cases] == ["seed 0", "seed 1"] * 2
-        failures = [case.find("failure") for case in cases]
-        assert [f is not None for f in failures] == [True, True, False, False]
-        assert failures[0] is not None
-        message = failures[0].get("message") or ""
-        assert message.startswith("x <= 0.6 was violated from ")
-        assert "; robustness -" in message
-        assert "x <= 0.6" in (failures[0].text or "")
-
-
-def test_what_a_search_did_not_show_is_told(tmp_path: Path) -> None:
-    result = falsify(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), "sobol", budget=3, directory=tmp_path)
-    case = ElementTree.fromstring(junit_report(tmp_path))[0][0]
-    assert f"what this does not show: {result.findings[0].text}" in (case.findtext("system-out") or "")
