@@ -57,12 +57,7 @@ class LLMEngine:
         sample: int = 0,
         anonymous: bool = False,
     ) -> None:
-        self.briefing = Briefing(
-            problem,
-            variant=variant,
-            anonymous=anonymous,
-            llm=chat.llm,
-        )
+        self.briefing = Briefing(problem, variant=variant, anonymous=anonymous, llm=chat.llm)
         self._chat = chat
         self._on_exchange: OnExchange = lambda _: None
         self._sample = sample
@@ -145,15 +140,10 @@ class LLMEngine:
             raise
         except ChatError as error:
             if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
-                self._on_exchange(
-                    Exchange(
-                        llm=self._chat.llm,
-                        messages=messages,
-                        reply=None,
-                        lost=error.lost,
-                        problem=str(error),
-                    )
+                lost = Exchange(
+                    llm=self._chat.llm, messages=messages, reply=None, lost=error.lost, problem=str(error)
                 )
+                self._on_exchange(lost)
             raise
         briefing.rationales |= {c.key: c.rationale for c in found}
         briefing.pending += found

@@ -173,10 +173,10 @@ def written_candidate(found: dict[str, Any]) -> WrittenCandidate:
     try:
         return WrittenCandidate.model_validate(found)
     except ValidationError as error:
-        raise RejectedReplyError(_defect(error)) from None
+        raise RejectedReplyError(defect(error)) from None
 
 
-def _defect(error: ValidationError) -> str:
+def defect(error: ValidationError) -> str:
     """What is wrong first, with the keys that are not known there: one of them may be what is missing."""
     errors = error.errors(include_url=False, include_context=False, include_input=False)
     first, place = errors[0], errors[0]["loc"][:-1]

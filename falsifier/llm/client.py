@@ -237,13 +237,13 @@ class LiteLLMChat:
         # Some servers put the whole answer into a call of a tool that nobody offered.
         calls = (call.function.arguments for call in getattr(choice.message, "tool_calls", None) or ())
         places = (choice.message.content or refusal, *calls)
-        text = storable(next((place for place in places if (place or "").strip()), ""))
+        text = next((place for place in places if (place or "").strip()), "")
         cost = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         # Another server under a listed name has its own prices, and zero is true of local ones only.
         is_true = known(self.llm).local or (cost and self.api_base is None)
         return ChatReply(
             text=text,
-            reasoning=storable(getattr(choice.message, "reasoning_content", None) or ""),
+            reasoning=getattr(choice.message, "reasoning_content", None) or "",
             finish_reason="refusal" if refused else choice.finish_reason or "",
             usage=usage_of(
                 getattr(response, "usage", None),
@@ -260,8 +260,7 @@ class LiteLLMChat:
     def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
         dropped = dropped_parameters(self.llm, arguments)
-        own_names = {"reasoning_effort": "effort"}
-        omitted = {own_names.get(name, name) for name in dropped}
+        omitted = {"effort" if name == "reasoning_effort" else name for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
         effective["mode"] = self.mode if "response_format" in arguments else "prompt"
         if "max_tokens" in effective:
@@ -284,11 +283,6 @@ def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
             *([{"type": "text", "text": rest}] if rest else []),
         ]
     return sent
-
-
-def storable(text: str) -> str:
-    """Text without unpaired surrogates, which UTF-8 cannot encode: the journal could not store them."""
-    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def _refusal(message: Any) -> str:

@@ -14,6 +14,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
+from falsifier.llm.candidate_text import defect
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import objects_in, schema_of_list, schema_of_object
 from falsifier.llm.messages import Message
@@ -191,9 +192,7 @@ def read_readings(text: str) -> list[ReadingReply]:
     try:
         reply = ReadingsReply.model_validate(found)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False, include_input=False)[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise RejectedReplyError(f"{where}: {first['msg']}") from None
+        raise RejectedReplyError(defect(error)) from None
     if not reply.readings and reply.cannot.strip():
         said = one_line(reply.cannot.strip()[:_LONGEST_MEANING])
         raise SpecError(

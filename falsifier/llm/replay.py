@@ -14,45 +14,39 @@ Line = str | ChatReply | Exception
 Script = Iterable[Line] | Callable[[ChatRequest], Line]
 
 
+@dataclass(frozen=True, slots=True)
 class RecordedChat:
     """Answers with recorded replies in their order, then asks an inner chat.
 
-    Args:
-        exchanges: what was recorded, in order; chats that are given one iterator play each of them once.
-        inner: chat to ask after that; None: the end of the recording is an error.
-
     Attributes:
-        llm: name of the inner chat's LLM; without an inner chat, the recording's.
+        rest: what was recorded and not played yet, in order; chats that share it play each reply once.
+        inner: chat to ask after that.
     """
 
-    def __init__(self, exchanges: Iterable[Exchange], inner: Chat | None = None) -> None:
-        if inner is None:
-            exchanges = list(exchanges)
-            self.llm = f"recording of {exchanges[0].llm}" if exchanges else "empty recording"
-        else:
-            self.llm = inner.llm
-        self._rest = iter(exchanges)
-        self._inner = inner
+    rest: Iterator[Exchange]
+    inner: Chat
+
+    @property
+    def llm(self) -> str:
+        """Name of the inner chat's LLM."""
+        return self.inner.llm
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the next recorded reply.
+        """Return the next recorded reply, or the inner chat's.
 
         Raises:
-            ChatError: if a failure was recorded, or the recording has ended and there is no inner chat.
+            ChatError: if a failure was recorded, or there is no reply now.
         """
-        recorded = next(self._rest, None)
-        if recorded is not None:
-            if recorded.reply is None:
-                raise ChatError(recorded.problem or "there was no reply")
-            return recorded.reply.model_copy(update={"source": "recording"})
-        if self._inner is None:
-            raise ChatError(f"the {self.llm} has no further exchange")
-        return self._inner.complete(request)
+        recorded = next(self.rest, None)
+        if recorded is None:
+            return self.inner.complete(request)
+        if recorded.reply is None:
+            raise ChatError(recorded.problem or "there was no reply")
+        return recorded.reply.model_copy(update={"source": "recording"})
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Tell the inner chat."""
-        if self._inner is not None:
-            self._inner.accepted(request, reply)
+        self.inner.accepted(request, reply)
 
 
 @dataclass

@@ -10,7 +10,7 @@ from typing import Any
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import INTERPOLATIONS, Signal
-from falsifier.core.space import Dimension, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import Dimension, InputRange, Range, SearchSpace
 from falsifier.core.words import counted
 from falsifier.errors import CandidateError, did_you_mean
 from falsifier.llm.candidate_text import (
@@ -184,7 +184,7 @@ class ReplyForm:
             raise RejectedReplyError(what) from None
 
 
-def _clamped(value: float, ranged: InputRange | ParameterRange | Dimension) -> float:
+def _clamped(value: float, ranged: Range | Dimension) -> float:
     """The value, or the limit that it exceeds by a rounding."""
     slack = _ROUNDING * (ranged.high - ranged.low)
     if ranged.low - slack <= value <= ranged.high + slack:
@@ -192,7 +192,7 @@ def _clamped(value: float, ranged: InputRange | ParameterRange | Dimension) -> f
     return value
 
 
-def _range(ranges: Sequence[InputRange | ParameterRange]) -> dict[str, float]:
+def _range(ranges: Sequence[Range]) -> dict[str, float]:
     """The range that holds for all of them, and a rounding more."""
     low, high = min(r.low for r in ranges), max(r.high for r in ranges)
     slack = _ROUNDING * (high - low)

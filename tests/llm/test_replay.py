@@ -9,21 +9,15 @@ from falsifier.llm.replay import RecordedChat, ScriptedChat
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
 
-def exchange(text: str | None) -> Exchange:
-    return Exchange(
-        llm="openai/m",
-        messages=QUESTION.messages,
-        reply=None if text is None else ChatReply(text=text),
-        problem="nobody there" if text is None else None,
-    )
-
-
-def test_a_recording_alone_ends() -> None:
-    chat = RecordedChat([exchange("one")])
-    assert chat.llm == "recording of openai/m"
-    chat.complete(QUESTION)
-    with pytest.raises(ChatError, match="recording of openai/m has no further exchange"):
-        chat.complete(QUESTION)
+def test_what_was_recorded_is_played_once_before_the_inner_chat_is_asked() -> None:
+    said = Exchange(llm="openai/m", messages=QUESTION.messages, reply=ChatReply(text="one"))
+    failed = Exchange(llm="openai/m", messages=QUESTION.messages, reply=None, problem="nobody there")
+    rest, inner = iter([said, failed]), ScriptedChat(["new"])
+    first, second = RecordedChat(rest, inner), RecordedChat(rest, inner)
+    assert first.complete(QUESTION).source == "recording"
+    with pytest.raises(ChatError, match="nobody there"):
+        second.complete(QUESTION)
+    assert second.complete(QUESTION).text == "new"
 
 
 def test_script_of_a_function_and_its_end() -> None:

@@ -6,7 +6,7 @@ A prompt variant is a set of parts; nothing else differs between variants.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -42,13 +42,7 @@ class View:
     @classmethod
     def of(cls, problem: Problem) -> "View":
         """Make the view of a problem."""
-        return cls(
-            problem.info,
-            problem.requirement,
-            problem.space,
-            problem.experiment,
-            context=problem.context,
-        )
+        return cls(problem.info, problem.requirement, problem.space, problem.experiment, problem.context)
 
     def unit(self, name: str) -> str:
         """Unit of a signal; empty if unknown or dimensionless."""
@@ -148,22 +142,8 @@ def _variants() -> Mapping[str, Variant]:
     mp2: frozenset[Part] = mp1 | {"names", "requirement", "outputs"}
     mp3: frozenset[Part] = mp2 | {"values"}
     mp4: frozenset[Part] = mp3 | {"critical"}
-    more: frozenset[Part] = frozenset(
-        (
-            "advice",
-            "system",
-            "reading",
-            "freedom",
-            "observations",
-            "history",
-            "lessons",
-            "circumstances",
-            "failures",
-        )
-    )
-    mp5 = (mp4 - {"values", "guidance"}) | more
-    context: frozenset[Part] = frozenset({"context"})
-    parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp5, "MP6": mp5 | context}
+    mp6: frozenset[Part] = frozenset(get_args(Part)) - {"values", "guidance"}
+    parts = {"MP1": mp1, "MP2": mp2, "MP3": mp3, "MP4": mp4, "MP5": mp6 - {"context"}, "MP6": mp6}
     return MappingProxyType({name: Variant(name, found) for name, found in parts.items()})
 
 
