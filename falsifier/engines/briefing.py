@@ -144,18 +144,9 @@ class Briefing:
         self.pending = [c for c in self.pending if c.key not in self.numbers]
 
     def question(self, count: int, notes: Sequence[str] = ()) -> tuple[Message, ...]:
-        """Return the messages of the next question.
-
-        Args:
-            count: maximum number of candidates.
-            notes: lines to add to the question, after problem and history.
-        """
+        """Return the messages of the next question for up to ``count`` candidates, with the notes in it."""
         return self._questions.ask(
-            count,
-            simulations=self.simulations,
-            pending=self.pending,
-            notes=notes,
-            lessons=self.lessons,
+            count, simulations=self.simulations, pending=self.pending, notes=notes, lessons=self.lessons
         )
 
     @cached_property
@@ -236,9 +227,7 @@ def preview(
 def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float) -> str:
     """Why a violation does not count, without any name, and what would count.
 
-    Args:
-        confirmation: how the violation was repeated.
-        shown: turns a robustness into the number that is told.
+    ``shown`` turns a robustness into the number that is told.
     """
     found, robustness = confirmation.evaluation.robustness, confirmation.robustness
     halved, reference = confirmation.halved, confirmation.reference

@@ -62,13 +62,7 @@ _WHAT_CANNOT_BE_SAID = (
 
 
 def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment) -> tuple[Message, ...]:
-    """Return the messages that ask for formulas of a requirement in words.
-
-    Args:
-        sentence: the requirement.
-        info: the model's signals.
-        experiment: stop time and output interval.
-    """
+    """Return the messages that ask for formulas of a requirement in words."""
     system = (
         "You translate requirements on simulated systems from plain words, in any language, into formulas. "
         "Be exact about what the sentence says and do not add conditions that it does not contain."

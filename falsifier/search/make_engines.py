@@ -110,26 +110,25 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         ChatError: for an unknown provider or a missing key.
     """
     from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT
-    from falsifier.llm.connect import connect, default_cache_directory, preflight
+    from falsifier.llm.connect import connect, default_cache_directory
     from falsifier.llm.usage import Price
 
-    preflight(llm.name, api_base=llm.api_base)
-    price = Price(*llm.price) if llm.price else None
+    chat = connect(
+        llm.name,
+        effort=llm.effort,
+        api_base=llm.api_base,
+        options=llm.options,
+        price=Price(*llm.price) if llm.price else None,
+        timeout=llm.timeout or DEFAULT_TIMEOUT,
+        attempts=attempts or DEFAULT_ATTEMPTS,
+        cache=default_cache_directory() if llm.cache else None,
+    )
     if max_cost is not None and price_of(llm) is None:
         raise SpecError(
             f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
             "--llm-option price=SENT:RECEIVED, or use --max-tokens instead"
         )
-    return connect(
-        llm.name,
-        effort=llm.effort,
-        api_base=llm.api_base,
-        options=llm.options,
-        price=price,
-        timeout=llm.timeout or DEFAULT_TIMEOUT,
-        attempts=attempts or DEFAULT_ATTEMPTS,
-        cache=default_cache_directory() if llm.cache else None,
-    )
+    return chat
 
 
 def price_of(llm: LLMSettings) -> "Price | None":

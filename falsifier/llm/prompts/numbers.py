@@ -119,10 +119,7 @@ def runs(values: Sequence[float]) -> str:
 def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
     """Each input with its own control points and interpolation, and parameters.
 
-    Args:
-        view: the problem.
-        candidate: what was or will be simulated.
-        in_brief: whether signals of many pieces are only described.
+    In brief, signals of many pieces are only described.
     """
     lines = []
     for r in view.space.inputs:

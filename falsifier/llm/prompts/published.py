@@ -49,13 +49,7 @@ _GUIDANCE_ON_OUTPUTS = (
 
 
 def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
-    """Return the constant part of a question.
-
-    Args:
-        view: the problem.
-        variant: which parts it contains.
-        count: number of candidates wanted.
-    """
+    """Return the constant part of a question for so many candidates."""
     named, what = variant.has("names"), view.chosen
     sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
     if variant.has("requirement"):

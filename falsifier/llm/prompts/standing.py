@@ -91,13 +91,9 @@ def standing(
     count: int = 1,
     start: Mapping[str, tuple[float, float]] | None = None,
 ) -> str:
-    """Return the constant part of a question.
+    """Return the constant part of a question for so many candidates.
 
-    Args:
-        view: the problem.
-        variant: which parts it contains.
-        count: number of candidates wanted.
-        start: smallest and largest value of each output at time 0, by name, as far as known.
+    ``start`` has the smallest and largest value of each output at time 0, by name, as far as known.
     """
     if not variant.has("context"):
         view = replace(view, context=Context())
