@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from falsifier import Result, falsify
 from falsifier.context.gather import gather
 from falsifier.engines.briefing import preview
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource

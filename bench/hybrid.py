@@ -38,7 +38,7 @@ from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import ChatRequest
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 
 REQUIREMENTS = ("AT1", "SC", "F16", "AT6c", "NNx", "AT6a")
 # Changes of an input from which on it counts as stepping.

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.replies import ReplyForm
 
 SPACE = SearchSpace(

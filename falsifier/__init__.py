@@ -87,7 +87,7 @@ if TYPE_CHECKING:
     from falsifier.llm.connect import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
-    from falsifier.llm.replay import ScriptedChat
+    from falsifier.llm.scripted import ScriptedChat
     from falsifier.problem.loading import load_problem, load_problems
     from falsifier.problem.problem import Problem
     from falsifier.problem.requirement import Requirement
@@ -132,7 +132,7 @@ _NAMES = {
     "falsifier.llm.connect": "connect",
     "falsifier.llm.messages": "Chat Exchange",
     "falsifier.llm.prompts": "VARIANTS",
-    "falsifier.llm.replay": "ScriptedChat",
+    "falsifier.llm.scripted": "ScriptedChat",
     "falsifier.problem.loading": "load_problem load_problems",
     "falsifier.problem.problem": "Problem",
     "falsifier.problem.requirement": "Requirement",

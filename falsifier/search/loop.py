@@ -13,7 +13,7 @@ from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, Fo
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
-from falsifier.llm.replay import RecordedChat
+from falsifier.llm.scripted import RecordedChat
 from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 from falsifier.search.events import (

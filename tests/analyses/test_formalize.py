@@ -12,7 +12,7 @@ from falsifier.analyses.formalize import Formalized, formalize
 from falsifier.analyses.lint import ranges_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError, SpecError
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.writing import subject_of
 from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, Monitor, parse

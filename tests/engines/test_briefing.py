@@ -10,7 +10,7 @@ from falsifier.engines.briefing import preview, told_context
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import lag_problem
 

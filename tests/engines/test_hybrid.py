@@ -18,7 +18,7 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.conversation import OnExchange
 from falsifier.llm.messages import Chat
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem
 from tests.engines.support import HASTY, level, wide_problem

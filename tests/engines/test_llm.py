@@ -15,7 +15,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.conversation import NoValidReplyError
 from falsifier.llm.messages import Chat, Exchange
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import holds_run, read_journal
 from falsifier.record.records import ExchangeRecord

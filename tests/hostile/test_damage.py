@@ -19,7 +19,7 @@ from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.journal import repair
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result

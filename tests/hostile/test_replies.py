@@ -9,7 +9,7 @@ import pytest
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import RejectedReplyError, converse
 from falsifier.llm.messages import LONGEST_REPLY, ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.replies import ReplyForm
 
 FREE = Freedom(max_control_points=50, min_interval=0.1)

@@ -8,7 +8,7 @@ from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.connect import CachedChat, connect, preflight
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 
 
 @pytest.fixture(autouse=True)

@@ -5,7 +5,7 @@ import pytest
 from falsifier.errors import ChatError, ContextExceededError
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="a number, please"),))
 

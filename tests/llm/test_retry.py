@@ -8,7 +8,7 @@ from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 

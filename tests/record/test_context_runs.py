@@ -7,7 +7,7 @@ import pytest
 from falsifier import falsify, resume
 from falsifier.engines.briefing import preview
 from falsifier.errors import JournalError, SpecError
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest

@@ -10,7 +10,7 @@ from numpy import int64
 from falsifier.core.files import bundled
 from falsifier.engines import make_engine
 from falsifier.errors import JournalError, SpecError
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource

@@ -2,7 +2,7 @@ import pytest
 
 from falsifier.errors import ChatError, SpecError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
 
 

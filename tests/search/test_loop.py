@@ -13,7 +13,7 @@ from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.record.journal import read_journal

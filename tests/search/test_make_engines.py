@@ -9,7 +9,7 @@ from falsifier.context.values import Context, Crossing, Named
 from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import SpecError
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import check_names, make_engines, told_problems
 from falsifier.search.request import LLMSettings, RunRequest

@@ -6,7 +6,7 @@ from falsifier import Candidate, Signal
 from falsifier.analyses.coverage import coverage_of
 from falsifier.analyses.formalize import formalize
 from falsifier.core.trajectory import Trajectory
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.manifest import InputRecord
 from falsifier.views.analyses_text import (
     coverage_json,

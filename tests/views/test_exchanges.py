@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.llm.messages import ChatReply, ChatRequest, Usage
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.notebook import result_html

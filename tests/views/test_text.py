@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.engines.llm import LLMEngine
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding

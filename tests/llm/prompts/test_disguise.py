@@ -17,7 +17,7 @@ from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.standing import standing
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem

@@ -12,7 +12,7 @@ from threading import Thread
 import pytest
 
 from falsifier.errors import JournalError
-from falsifier.llm.replay import ScriptedChat
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
 from falsifier.views.html import Html

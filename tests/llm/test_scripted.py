@@ -4,7 +4,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.replay import RecordedChat, ScriptedChat
+from falsifier.llm.scripted import RecordedChat, ScriptedChat
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
