@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.replies import ReplyForm
+from falsifier.llm.scripted import ScriptedChat
 
 SPACE = SearchSpace(
     (InputRange("throttle", 0.0, 100.0, control_points=3), InputRange("brake", 0.0, 325.0, control_points=2)),

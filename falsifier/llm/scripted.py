@@ -1,52 +1,14 @@
-"""Stand-ins for a language model: playback of recorded conversations, and scripts.
-
-Resumed runs pay for nothing twice; tests, tutorials and dry runs need no key.
-"""
+"""A script in place of a language model: tests, tutorials and dry runs need no key."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from falsifier.core.words import counted
 from falsifier.errors import ChatError
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
+from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 
 Line = str | ChatReply | Exception
 Script = Iterable[Line] | Callable[[ChatRequest], Line]
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedChat:
-    """Answers with recorded replies in their order, then asks an inner chat.
-
-    Attributes:
-        rest: what was recorded and not played yet, in order; chats that share it play each reply once.
-        inner: chat to ask after that.
-    """
-
-    rest: Iterator[Exchange]
-    inner: Chat
-
-    @property
-    def llm(self) -> str:
-        """Name of the inner chat's LLM."""
-        return self.inner.llm
-
-    def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the next recorded reply, or the inner chat's.
-
-        Raises:
-            ChatError: if a failure was recorded, or there is no reply now.
-        """
-        recorded = next(self.rest, None)
-        if recorded is None:
-            return self.inner.complete(request)
-        if recorded.reply is None:
-            raise ChatError(recorded.problem or "there was no reply")
-        return recorded.reply.model_copy(update={"source": "recording"})
-
-    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Tell the inner chat."""
-        self.inner.accepted(request, reply)
 
 
 @dataclass

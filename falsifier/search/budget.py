@@ -1,13 +1,13 @@
-"""What a run may spend, what it has spent, and a chat that keeps to it."""
+"""What a run may spend, what it has spent, and a chat that keeps to it and pays for nothing twice."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from time import monotonic
 
 from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, FalsifierError, SpecError
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
+from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
 from falsifier.search import DEFAULT_SIMULATIONS
 
 
@@ -132,18 +132,20 @@ _CLOCK_TOLERANCE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class BoundedChat:
-    """Checks the budget before every request, whether it opens a turn or asks again.
+class RunChat:
+    """Answers with recorded replies in their order; then asks, and checks the budget before every request.
 
     Attributes:
         inner: chat to ask.
         budget: limits of the run.
         spent: returns what the run has spent so far.
+        recorded: what was recorded and not played yet; chats that share it play each reply once.
     """
 
     inner: Chat
     budget: Budget
     spent: Callable[[], Spent]
+    recorded: Iterator[Exchange]
 
     @property
     def llm(self) -> str:
@@ -151,12 +153,16 @@ class BoundedChat:
         return self.inner.llm
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Ask, with the seconds that are left as a deadline.
+        """Return the next recorded reply, or ask, with the seconds that are left as a deadline.
 
         Raises:
             LimitReached: if a limit is reached, before the request or while waiting for the reply.
-            ChatError: if no reply can be obtained.
+            ChatError: if no reply can be obtained, or a failure was recorded.
         """
+        if (played := next(self.recorded, None)) is not None:
+            if played.reply is None:
+                raise ChatError(played.problem or "there was no reply")
+            return played.reply.model_copy(update={"source": "recording"})
         self._check()
         left = self.budget.seconds_left(self.spent())
         if left is not None:

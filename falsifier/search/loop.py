@@ -13,9 +13,8 @@ from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, Fo
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
-from falsifier.llm.scripted import RecordedChat
 from falsifier.problem.problem import Problem, check_limits, check_names
-from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
+from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
 from falsifier.search.events import (
     Asked,
     Confirmed,
@@ -152,7 +151,7 @@ class _Loop:
         """Connect to the engines that ask a language model, to count and record every exchange."""
 
         def wrap(chat: Chat) -> Chat:
-            return RecordedChat(self.steps.exchanges, BoundedChat(chat, self.budget, self.clock))
+            return RunChat(chat, self.budget, self.clock, self.steps.exchanges)
 
         for state in self.states:
             if isinstance(state.engine, AsksLLM):

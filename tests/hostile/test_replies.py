@@ -9,8 +9,8 @@ import pytest
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import RejectedReplyError, converse
 from falsifier.llm.messages import LONGEST_REPLY, ChatReply, ChatRequest, Exchange, Message
-from falsifier.llm.scripted import ScriptedChat
 from falsifier.llm.replies import ReplyForm
+from falsifier.llm.scripted import ScriptedChat
 
 FREE = Freedom(max_control_points=50, min_interval=0.1)
 SPACE = SearchSpace(

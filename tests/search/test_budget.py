@@ -1,9 +1,9 @@
 import pytest
 
 from falsifier.errors import ChatError, SpecError
-from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message, Usage
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.search.budget import BoundedChat, Budget, LimitReached, Spent
+from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ class Asked(ScriptedChat):
 
 def test_a_request_gets_the_seconds_that_are_left() -> None:
     inner = Asked("a", "b")
-    chat = BoundedChat(inner, Budget(simulations=9, seconds=100.0), lambda: Spent(seconds=40.0))
+    chat = RunChat(inner, Budget(simulations=9, seconds=100.0), lambda: Spent(seconds=40.0), iter(()))
     assert chat.complete(QUESTION).text == "a"
     assert inner.left[0] is not None and 0 < inner.left[0] <= 60.0
 
@@ -69,12 +69,26 @@ def test_a_request_gets_the_seconds_that_are_left() -> None:
 def test_nothing_is_asked_beyond_a_limit() -> None:
     inner, spent = Asked("a"), Spent(prompt_tokens=90, completion_tokens=10)
     with pytest.raises(LimitReached, match="tokens is used up"):
-        BoundedChat(inner, Budget(tokens=100), lambda: spent).complete(QUESTION)
+        RunChat(inner, Budget(tokens=100), lambda: spent, iter(())).complete(QUESTION)
     assert not inner.left
 
 
 def test_a_failure_at_the_end_of_the_time_is_the_end_of_the_time() -> None:
     spent = iter([Spent(seconds=1.0), Spent(seconds=1.0), Spent(seconds=9.99)])
-    chat = BoundedChat(Asked(error=ChatError("too late")), Budget(seconds=10.0), lambda: next(spent))
+    asked = Asked(error=ChatError("too late"))
+    chat = RunChat(asked, Budget(seconds=10.0), lambda: next(spent), iter(()))
     with pytest.raises(LimitReached, match="10 s"):
         chat.complete(QUESTION)
+
+
+def test_what_was_recorded_is_played_once_and_costs_nothing_before_the_model_is_asked() -> None:
+    said = Exchange(llm="openai/m", messages=QUESTION.messages, reply=ChatReply(text="one"))
+    failed = Exchange(llm="openai/m", messages=QUESTION.messages, reply=None, problem="nobody there")
+    spent, recorded = iter([Spent(), Spent()]), iter([said, failed])
+    first, second = (
+        RunChat(ScriptedChat(["new"]), Budget(tokens=9), lambda: next(spent), recorded) for _ in range(2)
+    )
+    assert first.complete(QUESTION).source == "recording"
+    with pytest.raises(ChatError, match="nobody there"):
+        second.complete(QUESTION)
+    assert second.complete(QUESTION).text == "new"
