@@ -1,12 +1,22 @@
-"""An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures."""
+"""An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures.
 
+Valid replies are kept on disk, keyed by the content of the request.
+"""
+
+import json
 import logging
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
+from hashlib import sha256
 from itertools import count
+from pathlib import Path
 from random import uniform
 from time import perf_counter, sleep
 from typing import Any
+from uuid import uuid4
+
+from pydantic import ValidationError
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
@@ -71,6 +81,7 @@ class LiteLLMChat:
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
         attempts: maximum number of requests per reply if failures are temporary.
+        cache: directory of valid replies, one file each, created with the first one; None: none are kept.
     """
 
     llm: str
@@ -82,6 +93,7 @@ class LiteLLMChat:
     mode: Mode = "json_schema"
     content: str = ""
     attempts: int = DEFAULT_ATTEMPTS
+    cache: Path | None = None
     _unreadable: int = field(init=False, default=0)
 
     @property
@@ -93,11 +105,18 @@ class LiteLLMChat:
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Ask in the strictest way that the server accepts, and again after temporary failures.
+        """Return the kept reply, at no cost; else ask in the strictest way that the server accepts.
+
+        After temporary failures it is asked again.
 
         Raises:
             ChatError: if no reply can be obtained.
         """
+        if self.cache is not None:
+            with suppress(OSError, ValidationError):  # missing or damaged: ask again and overwrite it
+                kept = ChatReply.model_validate_json(self._place(self.cache, request).read_bytes())
+                free = {"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"}
+                return kept.model_copy(update=free)
         lost: list[Usage] = []
         try:
             for attempt in count(1):
@@ -133,7 +152,24 @@ class LiteLLMChat:
         sleep(delay)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Do nothing; storing replies is CachedChat's concern."""
+        """Keep a valid reply."""
+        if self.cache is None or reply.source == "cache":
+            return
+        path = self._place(self.cache, request)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Under a unique name first: several runs may store the same reply at the same time.
+        partial = path.with_name(f"{path.name}.{uuid4().hex}")
+        partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
+        partial.replace(path)
+
+    def _place(self, cache: Path, request: ChatRequest) -> Path:
+        asked = {
+            "llm": self.llm,
+            "parameters": dict(self.parameters),
+            "request": request.model_dump(mode="json"),
+        }
+        digest = sha256(json.dumps(asked, sort_keys=True, default=str).encode()).hexdigest()
+        return cache / digest[:2] / f"{digest}.json"
 
     def _asked(self, request: ChatRequest) -> ChatReply:
         while True:

@@ -1,23 +1,14 @@
-"""From an LLM's name to a chat that retries, adapts to the server and never pays twice for one question.
+"""From an LLM's name to a chat that retries, adapts to the server and never pays twice for one question."""
 
-Valid replies are kept on disk, keyed by the content of the request.
-"""
-
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
-
-from pydantic import ValidationError
 
 from falsifier.core.files import cache_directory
 from falsifier.errors import ChatSetupError
 from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, LiteLLMChat
 from falsifier.llm.litellm_adapter import check_name, check_options
-from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Usage
+from falsifier.llm.messages import Chat
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode
 from falsifier.llm.usage import Price
@@ -71,7 +62,7 @@ def connect(
     own = served(llm) if is_model_file(llm) else None
     if own is not None:
         llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
-    chat = LiteLLMChat(
+    return LiteLLMChat(
         llm=llm,
         effort=effort,
         api_base=api_base,
@@ -81,57 +72,8 @@ def connect(
         mode=first_mode(llm),
         content="" if own is None else own.content,
         attempts=attempts,
+        cache=cache,
     )
-    return chat if cache is None else CachedChat(chat, cache, chat.parameters)
-
-
-@dataclass(frozen=True)
-class CachedChat:
-    """Answers from a directory if possible, and stores there every reply that proved valid.
-
-    Attributes:
-        inner: chat to ask if there is no stored reply.
-        directory: one file per reply; created with the first one.
-        parameters: what the inner chat sends in addition to the messages.
-    """
-
-    inner: Chat
-    directory: Path
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def llm(self) -> str:
-        """Name of the inner chat's LLM."""
-        return self.inner.llm
-
-    def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the stored reply, at no cost, or ask."""
-        try:
-            stored = ChatReply.model_validate_json(self._path(request).read_bytes())
-        except (OSError, ValidationError):  # missing or damaged: ask again and overwrite it
-            return self.inner.complete(request)
-        return stored.model_copy(update={"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"})
-
-    def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Store a valid reply."""
-        if reply.source == "cache":
-            return
-        path = self._path(request)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Under a unique name first: several runs may store the same reply at the same time.
-        partial = path.with_name(f"{path.name}.{uuid4().hex}")
-        partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
-        partial.replace(path)
-        self.inner.accepted(request, reply)
-
-    def _path(self, request: ChatRequest) -> Path:
-        asked = {
-            "llm": self.llm,
-            "parameters": dict(self.parameters),
-            "request": request.model_dump(mode="json"),
-        }
-        digest = sha256(json.dumps(asked, sort_keys=True, default=str).encode()).hexdigest()
-        return self.directory / digest[:2] / f"{digest}.json"
 
 
 def default_cache_directory() -> Path:

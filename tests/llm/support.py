@@ -1,6 +1,10 @@
-"""A question whose reply follows a schema."""
+"""A question whose reply follows a schema, and a chat whose server is a script."""
 
-from falsifier.llm.messages import ChatRequest, Message
+from dataclasses import dataclass, field
+
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.messages import ChatReply, ChatRequest, Message
+from falsifier.llm.scripted import ScriptedChat
 
 SCHEMA = {
     "type": "object",
@@ -9,3 +13,14 @@ SCHEMA = {
     "additionalProperties": False,
 }
 QUESTION = ChatRequest(messages=(Message(role="user", content="what is 1 + 2?"),), reply_schema=SCHEMA)
+
+
+@dataclass
+class Served(LiteLLMChat):
+    """Each request that it sends is answered by a script."""
+
+    llm: str = "openai/mine"
+    server: ScriptedChat = field(default_factory=lambda: ScriptedChat(()))
+
+    def send(self, request: ChatRequest) -> ChatReply:
+        return self.server.complete(request)

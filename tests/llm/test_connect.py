@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
-from falsifier.llm.connect import CachedChat, connect, preflight
+from falsifier.llm.connect import connect, preflight
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
+from tests.llm.support import Served
 
 
 @pytest.fixture(autouse=True)
@@ -119,7 +120,7 @@ PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=
 class TestCache:
     def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
         inner = ScriptedChat([PAID, "never"])
-        chat = CachedChat(inner, tmp_path / "new" / "folder")
+        chat = Served(server=inner, cache=tmp_path / "new" / "folder")
         reply = chat.complete(QUESTION)
         for _ in range(2):
             chat.accepted(QUESTION, reply)
@@ -129,7 +130,7 @@ class TestCache:
         assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]
 
     def test_rejected_replies_are_not_kept_and_damaged_ones_asked_for_again(self, tmp_path: Path) -> None:
-        chat = CachedChat(ScriptedChat(["bad", PAID, "anew"]), tmp_path)
+        chat = Served(server=ScriptedChat(["bad", PAID, "anew"]), cache=tmp_path)
         assert chat.complete(QUESTION).text == "bad"
         chat.accepted(QUESTION, chat.complete(QUESTION))
         (file,) = tmp_path.rglob("*.json")
@@ -137,13 +138,16 @@ class TestCache:
         assert chat.complete(QUESTION).text == "anew"
 
     def test_everything_that_is_sent_is_part_of_the_question(self, tmp_path: Path) -> None:
-        kept = CachedChat(ScriptedChat(["one"], llm="a"), tmp_path)
+        kept = Served("a", server=ScriptedChat(["one"]), cache=tmp_path)
         kept.accepted(QUESTION, kept.complete(QUESTION))
         others = [
-            ("a", QUESTION.model_copy(update={"sample": 1})),
-            ("a", QUESTION.model_copy(update={"reply_schema": {"type": "object"}})),
-            ("a", QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)})),
-            ("b", QUESTION),
+            (Served("a"), QUESTION.model_copy(update={"sample": 1})),
+            (Served("a"), QUESTION.model_copy(update={"reply_schema": {"type": "object"}})),
+            (Served("a"), QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)})),
+            (Served("a", effort="low"), QUESTION),
+            (Served("a", options={"temperature": 0}), QUESTION),
+            (Served("b"), QUESTION),
         ]
-        for llm, other in others:
-            assert CachedChat(ScriptedChat(["two"], llm=llm), tmp_path).complete(other).text == "two"
+        for chat, other in others:
+            chat.cache, chat.server = tmp_path, ScriptedChat(["two"])
+            assert chat.complete(other).text == "two"

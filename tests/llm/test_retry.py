@@ -5,10 +5,10 @@ from time import monotonic
 import pytest
 
 from falsifier.errors import ChatError
-from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.scripted import ScriptedChat
+from tests.llm.support import Served
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 
@@ -22,13 +22,9 @@ def naps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def asked(chat: ScriptedChat, *, attempts: int = 7, within: float | None = None) -> ChatReply:
-    class Scripted(LiteLLMChat):
-        def send(self, request: ChatRequest) -> ChatReply:
-            return chat.complete(request)
-
     deadline = None if within is None else monotonic() + within
     question = QUESTION.model_copy(update={"deadline": deadline})
-    return Scripted("openai/mine", attempts=attempts).complete(question)
+    return Served(attempts=attempts, server=chat).complete(question)
 
 
 def test_waits_longer_each_time_and_counts_attempts(naps: list[float]) -> None:
