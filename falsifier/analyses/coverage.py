@@ -126,16 +126,6 @@ class OutputCoverage:
     lows: Array
     highs: Array
 
-    @property
-    def low(self) -> float:
-        """Smallest value of all."""
-        return float(self.lows.min())
-
-    @property
-    def high(self) -> float:
-        """Largest value of all."""
-        return float(self.highs.max())
-
 
 @dataclass(frozen=True, slots=True)
 class ModeCoverage:
@@ -241,7 +231,11 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
         ranges.append(_of_range(r, [s.sample(times) for s in signals], {p: paces[p] for p in PACES}))
     for p in described.parameters:
         ranges.append(_of_range(p, [[c.parameters[p.name]] for c in candidates], {}))
-    pairs = [_together(*one, *other) for one, other in combinations(ranges, 2)]
+    pairs = []
+    for (one, cells), (other, others) in combinations(ranges, 2):
+        together = np.zeros((len(one.parts), len(other.parts)), np.bool_)
+        together[cells, others] = True
+        pairs.append(PairCoverage(one.searched.name, other.searched.name, together))
     return Coverage(
         simulations=len(candidates),
         failures=failures,
@@ -279,12 +273,6 @@ def _had(cells: Cells, count: int) -> Counts:
     return np.array([(cells == part).any(axis=1).sum() for part in range(count)], np.intp)
 
 
-def _together(one: RangeCoverage, cells: Cells, other: RangeCoverage, others: Cells) -> PairCoverage:
-    tried = np.zeros((len(one.parts), len(other.parts)), np.bool_)
-    tried[cells, others] = True
-    return PairCoverage(one.searched.name, other.searched.name, tried)
-
-
 class _Seen:
     """What the system did, simulation by simulation: outputs, modes and their changes."""
 
@@ -293,7 +281,9 @@ class _Seen:
         self.outputs: dict[str, OutputCoverage] = {}
         self.inputs = {r.name for r in described.inputs}
         discrete = [r for r in (*described.inputs, *described.parameters) if r.kind != "real"]
-        self.labels = {r.name: labels_of(r.kind, r.items) or allowed_labels(r) for r in discrete}
+        self.labels = {
+            r.name: labels_of(r.kind, r.items) or {n: str(n) for n in _allowed(r)} for r in discrete
+        }
         self.labels |= {m.name: labels_of(m.kind, m.items) for m in described.modes}
         self.values: dict[str, set[int]] = {name: set() for name in self.labels}
         self.changes: dict[str, set[tuple[int, int]]] = {name: set() for name in self.labels}
@@ -312,14 +302,10 @@ class _Seen:
             if name in self.labels:
                 self._add(name, values[np.flatnonzero(np.diff(values, prepend=np.nan))])
             elif name not in self.inputs:
-                known = self.outputs.get(name)
-                self.outputs[name] = OutputCoverage(
-                    name,
-                    trajectory.units.get(name, ""),
-                    trajectory.times,
-                    values if known is None else np.minimum(known.lows, values),
-                    values if known is None else np.maximum(known.highs, values),
-                )
+                unit = trajectory.units.get(name, "")
+                known = self.outputs.get(name) or OutputCoverage(name, unit, trajectory.times, values, values)
+                lows, highs = np.minimum(known.lows, values), np.maximum(known.highs, values)
+                self.outputs[name] = replace(known, lows=lows, highs=highs)
 
     def _add(self, name: str, values: Iterable[float]) -> None:
         if name in self.labels:
@@ -367,11 +353,6 @@ def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
     if kind == "boolean":
         return {0: "false", 1: "true"}
     return {number: label for label, number in items}
-
-
-def allowed_labels(r: InputRecord) -> dict[int, str]:
-    """Return the numbers that a discrete input may have as names; empty if there are many."""
-    return {n: str(n) for n in _allowed(r)}
 
 
 def pace_of(signal: Signal, r: InputRecord, stop_time: float) -> str:

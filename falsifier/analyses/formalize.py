@@ -122,59 +122,47 @@ def formalize(
     subject = subject_of(target)
     settings = LLMSettings(name=llm) if isinstance(llm, str) else llm
     chat = open_chat(settings) if isinstance(settings, LLMSettings) else settings
-    asked = _Asked(subject)
-    info, experiment = subject.problem.info, subject.problem.experiment
-    request = ChatRequest(
-        messages=formalizing_messages(sentence, info, experiment), reply_schema=readings_schema()
-    )
+    exchanges: list[Exchange] = []
+    readings: list[Reading] = []
+    rejected: list[str] = []
+
+    def read(text: str) -> None:
+        """Keep the readings of a reply if they are as many as those of an earlier one.
+
+        Raises:
+            RejectedReplyError: stating what is wrong with each invalid one.
+        """
+        nonlocal readings
+        valid: list[Reading] = []
+        problems: list[str] = []
+        for number, reply in enumerate(read_readings(text), start=1):
+            try:
+                valid.append(_checked_reading(reply, subject, valid))
+            except RejectedReplyError as rejection:
+                problems.append(f"reading {number} ({reply.formula[:200]}): {rejection}")
+        if len(valid) >= len(readings) or not problems:
+            readings = valid
+        if problems:
+            rejected.extend(problems)
+            raise RejectedReplyError("; ".join(problems))
+
+    messages = formalizing_messages(sentence, subject.problem.info, subject.problem.experiment)
+    request = ChatRequest(messages=messages, reply_schema=readings_schema())
     try:
-        readings = converse(chat, request, asked.read, asked.count, reasks=reasks)
+        converse(chat, request, read, exchanges.append, reasks=reasks)
     except NoValidReplyError:
-        if not asked.valid:
+        if not readings:
             raise
-        readings = asked.valid
+    spent = Spent()
+    for exchange in exchanges:
+        spent = spent.plus_requests(exchange.requests, exchange.usage)
     if nominal:
         readings = _judged(subject, readings)
     differences = tuple(
         _difference(i, j, readings[i - 1], readings[j - 1])
         for i, j in combinations(range(1, len(readings) + 1), 2)
     )
-    return Formalized(
-        sentence.strip(), subject, tuple(readings), differences, tuple(asked.rejected), asked.spent
-    )
-
-
-class _Asked:
-    """Reads replies, and keeps what is worth keeping of those that are rejected."""
-
-    def __init__(self, subject: Subject) -> None:
-        self.valid: list[Reading] = []
-        self.rejected: list[str] = []
-        self.spent = Spent()
-        self._subject = subject
-
-    def count(self, exchange: Exchange) -> None:
-        self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
-
-    def read(self, text: str) -> list[Reading]:
-        """Return the readings of a reply.
-
-        Raises:
-            RejectedReplyError: stating what is wrong with each invalid one.
-        """
-        valid: list[Reading] = []
-        problems: list[str] = []
-        for number, reply in enumerate(read_readings(text), start=1):
-            try:
-                valid.append(_checked_reading(reply, self._subject, valid))
-            except RejectedReplyError as rejection:
-                problems.append(f"reading {number} ({reply.formula[:200]}): {rejection}")
-        if len(valid) >= len(self.valid):
-            self.valid = valid
-        if problems:
-            self.rejected += problems
-            raise RejectedReplyError("; ".join(problems))
-        return valid
+    return Formalized(sentence.strip(), subject, tuple(readings), differences, tuple(rejected), spent)
 
 
 def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Reading]) -> Reading:
@@ -268,15 +256,14 @@ def _judged(subject: Subject, readings: Sequence[Reading]) -> list[Reading]:
 
 
 def _difference(first: int, second: int, one: Reading, other: Reading) -> Difference:
-    experiments = [reading.problem.experiment for reading in (one, other)]
-    stop, finest = experiments[0].stop_time, min(e.output_interval for e in experiments)
+    stop = one.problem.experiment.stop_time
+    finest = min(reading.problem.experiment.output_interval for reading in (one, other))
     step = fitting_interval(And(one.formula, other.formula), stop, finest)
     if step is None:  # no grid of a reasonable size fits the windows of both
         return Difference(first, second, None, None)
-    samples, ranges = round(stop / step) + 1, [ranges_of(reading.problem) for reading in (one, other)]
-    return Difference(
-        first,
-        second,
-        tell_apart(one.formula, other.formula, step=step, samples=samples, ranges=ranges[0]),
-        tell_apart(other.formula, one.formula, step=step, samples=samples, ranges=ranges[1]),
-    )
+
+    def only(a: Reading, b: Reading) -> Trajectory | None:
+        samples, ranges = round(stop / step) + 1, ranges_of(a.problem)
+        return tell_apart(a.formula, b.formula, step=step, samples=samples, ranges=ranges)
+
+    return Difference(first, second, only(one, other), only(other, one))

@@ -1,13 +1,12 @@
 """What is wrong with requirements before anything is searched: nothing moves them, or they cannot fail."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import permutations
 from typing import Literal
 
 import numpy as np
 
-from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed
 from falsifier.errors import SpecError
@@ -51,10 +50,6 @@ class LintFinding:
     place: str
     text: str
     advice: str
-
-    def as_json(self) -> dict[str, str]:
-        """Return the finding as a JSON object."""
-        return asdict(self)
 
 
 def lint(
@@ -117,8 +112,8 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
         low, high = v.limits
         found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
-    searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
-    return found | {r.name: Interval(r.low, r.high) for r in searched}
+    space = problem.space
+    return found | {r.name: Interval(r.low, r.high) for r in (*space.inputs, *space.parameters)}
 
 
 def _constants(problem: Problem) -> dict[str, float]:
@@ -163,8 +158,7 @@ def _windows(problem: Problem) -> Iterator[LintFinding]:
 
 def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
     """Yield the side of a conjunction or disjunction that does not matter, because the other implies it."""
-    sides = (part.left, part.right)
-    for one, other in (sides, sides[::-1]):
+    for one, other in permutations((part.left, part.right)):
         if not implies(one, other):
             continue
         spare, kept = (other, one) if isinstance(part, And) else (one, other)
@@ -182,8 +176,7 @@ def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
 
 def _repeated(group: Sequence[Problem]) -> Iterator[LintFinding]:
     """Yield requirements that say the same as another one of the same search, or less."""
-    seen: set[frozenset[str]] = set()
-    for one, other in permutations(group, 2):
+    for (i, one), (j, other) in permutations(enumerate(group), 2):
         a, b = one.requirement.formula, other.requirement.formula
         if not implies(a, b):
             continue
@@ -195,8 +188,7 @@ def _repeated(group: Sequence[Problem]) -> Iterator[LintFinding]:
                 f"{one.name} implies it: {a}",
                 f"leave one of them out, or keep {other.name} to learn which part fails",
             )
-        elif frozenset((one.name, other.name)) not in seen:
-            seen.add(frozenset((one.name, other.name)))
+        elif i < j:
             text = f"it requires the same as {one.name}: {a}"
             yield LintFinding(other.name, "duplicate", "", text, "leave one of them out")
 
@@ -246,9 +238,8 @@ def _is_declared_independent(problem: Problem) -> bool:
 
 def _is_continuous(problem: Problem) -> bool:
     """Whether every effect on its signals shows: a discrete one may keep its value in all simulations."""
-    variables = [problem.info[n] for n in problem.requirement.formula.signals if n in problem.info]
-    every = len(variables) == len(problem.requirement.formula.signals)
-    return every and all((v.kind, v.variability) == ("real", "continuous") for v in variables)
+    known = {v.name for v in problem.info.variables if (v.kind, v.variability) == ("real", "continuous")}
+    return known >= set(problem.requirement.formula.signals)
 
 
 def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:

@@ -1,6 +1,7 @@
 """``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
 import shlex
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +65,7 @@ def check(
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0
     if as_json:
-        conclude(as_shown("", [finding.as_json() for finding in findings], as_json=True), code)
+        conclude(as_shown("", [asdict(finding) for finding in findings], as_json=True), code)
     sources = [source] if source.stl is not None else sources_of(source)
     problems = [load_source(each) for each in sources if each.name not in invalid]
     for finding in findings:

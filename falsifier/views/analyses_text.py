@@ -43,8 +43,10 @@ def coverage_text(found: Coverage, name: str) -> str:
         lines += ["never tried", *_indented(gaps)]
     if found.outputs:
         lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
-        outputs = sorted(found.outputs, key=lambda o: o.name)
-        lines += _indented([(_named(o.name, o.unit), f"{o.low:.6g} to {o.high:.6g}") for o in outputs])
+        lines += _indented(
+            (_named(o.name, o.unit), f"{o.lows.min():.6g} to {o.highs.max():.6g}")
+            for o in sorted(found.outputs, key=lambda o: o.name)
+        )
     if found.modes:
         lines += ["modes", *_indented([_mode_row(m) for m in found.modes])]
     for requirement, climb in found.climbs.items():
@@ -90,7 +92,10 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
             {"names": [p.first, p.second], "combinations": p.tried.size, "tried": p.count}
             for p in found.pairs
         ],
-        "outputs": [{"name": o.name, "unit": o.unit, "reached": [o.low, o.high]} for o in found.outputs],
+        "outputs": [
+            {"name": o.name, "unit": o.unit, "reached": [float(o.lows.min()), float(o.highs.max())]}
+            for o in found.outputs
+        ],
         "modes": [asdict(mode) for mode in found.modes],
         "levels": [
             {"requirement": name, "levels": [asdict(x) for x in climb.levels.found], "missing": climb.lines}

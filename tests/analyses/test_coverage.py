@@ -90,7 +90,7 @@ def test_outputs_and_modes_are_read_from_trajectories() -> None:
     found = coverage_of(described(u), [(candidate, first), (candidate, second), (candidate, None)])
     assert (found.simulations, found.trajectories) == (3, 2)
     (x,) = found.outputs
-    assert (x.name, x.unit, x.low, x.high) == ("x", "m", -10.0, 10.0)
+    assert (x.name, x.unit, x.lows.min(), x.highs.max()) == ("x", "m", -10.0, 10.0)
     assert x.highs[3] == 3.0 and x.lows[3] == -3.0
     (gear,) = found.modes
     assert (gear.seen, gear.never, gear.changes) == (("N", "D"), ("R",), (("N", "D"),))
