@@ -117,41 +117,24 @@ class Side:
     sections: list[Section]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Content:
-    """A complete report.
-
-    Attributes:
-        sides: one per directory.
-    """
-
-    sides: list[Side]
-
-    @property
-    def title(self) -> str:
-        """Names of the directories."""
-        return " and ".join(side.title for side in self.sides)
-
-    @property
-    def requirements(self) -> dict[str, list[Section | None]]:
-        """Of each requirement, by name, what each side says; None if a side did not search it."""
-        by_side = [{section.name: section for section in side.sections} for side in self.sides]
-        names = dict.fromkeys(name for sections in by_side for name in sections)
-        return {name: [sections.get(name) for sections in by_side] for name in names}
-
-
-def gather(*directories: Path) -> Content:
+def gather(*directories: Path) -> list[Side]:
     """Read runs or campaigns; several are compared.
 
     Raises:
         JournalError: if a directory is neither, or is damaged.
     """
     names = [directory.resolve().name for directory in directories]
-    titles = (
-        str(directory) if names.count(name) > 1 else name
+    return [
+        _side(directory, str(directory) if names.count(name) > 1 else name)
         for directory, name in zip(directories, names, strict=True)
-    )
-    return Content(list(map(_side, directories, titles)))
+    ]
+
+
+def by_requirement(sides: Iterable[Side]) -> dict[str, list[Section | None]]:
+    """Return of each requirement, by name, what each side says; None if a side did not search it."""
+    by_side = [{section.name: section for section in side.sections} for side in sides]
+    names = dict.fromkeys(name for sections in by_side for name in sections)
+    return {name: [sections.get(name) for sections in by_side] for name in names}
 
 
 def _side(directory: Path, title: str) -> Side:
@@ -212,10 +195,8 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
 
 
 def _shown(run: Run) -> Shown:
-    if (shrunk := _shrunk(run)) is not None:
-        return _drawn(run, *shrunk, is_shrunk=True)
     assert run.shown is not None
-    return shown_of(run, recorded_candidates(read_journal(run.directory))[run.shown])
+    return _shrunk(run) or shown_of(run, recorded_candidates(read_journal(run.directory))[run.shown])
 
 
 def shown_of(run: Run, candidate: Candidate) -> Shown:
@@ -226,7 +207,7 @@ def shown_of(run: Run, candidate: Candidate) -> Shown:
     return _drawn(run, candidate, trajectory, run.verdict, run.reason, is_lost=is_lost)
 
 
-def _shrunk(run: Run) -> tuple[Candidate, Trajectory, Verdict, str] | None:
+def _shrunk(run: Run) -> Shown | None:
     """Return a run's shrunk counterexample, which ``falsifier explain`` leaves in the run directory."""
     file = shrunk_file(run.counterexample_file)
     samples = file.with_suffix(".npz")
@@ -239,7 +220,7 @@ def _shrunk(run: Run) -> tuple[Candidate, Trajectory, Verdict, str] | None:
         return None  # the original is shown instead
     formula = parse(run.manifest.requirement.formula)
     verdict = Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
-    return candidate, trajectory, verdict, stored.reason
+    return _drawn(run, candidate, trajectory, verdict, stored.reason, is_shrunk=True)
 
 
 def _drawn(
@@ -254,14 +235,12 @@ def _drawn(
 ) -> Shown:
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
-    formula, components = parse(run.manifest.requirement.formula), run.manifest.components
-    labels = {mode.name: labels_of(mode.kind, mode.items) for mode in run.manifest.modes}
-    labels |= {r.name: labels_of(r.kind, r.items) for r in run.manifest.inputs if r.kind != "real"}
-    drawn = (
-        []
-        if trajectory is None
-        else panels(formula, trajectory, candidate, run.manifest.inputs, verdict, labels, components)
-    )
+    described, drawn = run.manifest, list[Panel]()
+    if trajectory is not None:
+        labels = {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
+        labels |= {r.name: labels_of(r.kind, r.items) for r in described.inputs if r.kind != "real"}
+        formula, components = parse(described.requirement.formula), described.components
+        drawn = panels(formula, trajectory, candidate, described.inputs, verdict, labels, components)
     return Shown(
         run=run,
         candidate=candidate,

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
-from falsifier.views.report.content import Section, Shown, Side, gather
+from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather
 from falsifier.views.report.wording import (
     advice,
     commands,
@@ -27,22 +27,22 @@ def markdown_report(*directories: Path) -> str:
     Raises:
         JournalError: if a directory is neither, or is damaged.
     """
-    content = gather(*directories)
-    parts = [f"# Falsification report: {markdown_text(content.title)}"]
-    for name, sections in content.requirements.items():
-        for side, section in zip(content.sides, sections, strict=True):
+    sides = gather(*directories)
+    parts = [f"# Falsification report: {markdown_text(' and '.join(side.title for side in sides))}"]
+    for name, sections in by_requirement(sides).items():
+        for side, section in zip(sides, sections, strict=True):
             where = f" in {markdown_text(side.title)}" if len(sections) > 1 else ""
             if section is None:
                 parts.append(f"## {markdown_text(name)}{where}: not searched")
             else:
                 parts += _verdict(section, where)
-    if len(content.sides) > 1:
-        parts.append(differences(content).markdown().rstrip())
-    for side in content.sides:
+    if len(sides) > 1:
+        parts.append(differences(sides).markdown().rstrip())
+    for side in sides:
         if side.table is not None:
             parts += [f"## Statistics: {markdown_text(side.title)}", side.table.markdown().rstrip()]
-    for side in content.sides:
-        whose = f"{markdown_text(side.title)}: " if len(content.sides) > 1 else ""
+    for side in sides:
+        whose = f"{markdown_text(side.title)}: " if len(sides) > 1 else ""
         parts.append(f"{whose}{_environment(side)}")
     return "\n\n".join(parts) + "\n"
 

@@ -17,7 +17,7 @@ from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join, picture, table
 from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
-from falsifier.views.report.content import Content, Section, Shown, Side, Status, gather, searches
+from falsifier.views.report.content import Section, Shown, Side, Status, by_requirement, gather, searches
 from falsifier.views.report.wording import (
     advice,
     commands,
@@ -58,28 +58,26 @@ def html_report(*directories: Path) -> str:
     Raises:
         JournalError: if a directory is neither, or is damaged.
     """
-    return page(gather(*directories))
-
-
-def page(content: Content) -> str:
-    """Lay out a report: verdicts first, then what they rest on."""
-    sections = [section for side in content.sides for section in side.sections]
-    talks = sum(min(_MOST_TALKS, sum(s.run.spent.calls > 0 for s in c.shown)) for c in sections)
-    most = max(1, _MOST_QUESTIONS // max(1, talks))
-    requirements = content.requirements
+    sides = gather(*directories)
+    title = " and ".join(side.title for side in sides)
+    requirements = by_requirement(sides)
+    asking = [sum(s.run.spent.calls > 0 for s in c.shown) for side in sides for c in side.sections]
+    most = max(1, _MOST_QUESTIONS // max(1, sum(min(_MOST_TALKS, count) for count in asking)))
     links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in requirements]
-    cards = [_verdicts(content, name, found, most) for name, found in requirements.items()]
+    found = differences(sides)
+    differing = table(found.header, found.rows, label=found.title) if found.rows else el("p", "Nothing.")
+    cards = [_verdicts(sides, name, told, most) for name, told in requirements.items()]
     return document(
-        f"Falsification report: {content.title}",
+        f"Falsification report: {title}",
         el("a", "Skip to the results", href="#verdicts", class_="skip"),
-        el("header", el("h1", content.title), *(el("p", overview(side)) for side in content.sides)),
+        el("header", el("h1", title), *(el("p", overview(side)) for side in sides)),
         el("nav", el("ul", *links), aria_label="Requirements") if len(links) > 1 else "",
         el(
             "main",
             el("div", *cards, id="verdicts"),
-            _differences(content) if len(content.sides) > 1 else "",
-            *map(_statistics, content.sides),
-            *map(_environment, content.sides),
+            el("section", el("h2", found.title), differing) if len(sides) > 1 else "",
+            *map(_statistics, sides),
+            *map(_environment, sides),
         ),
     )
 
@@ -172,10 +170,10 @@ def _anchor(name: str) -> str:
     return f"requirement-{file_name(name)}"
 
 
-def _verdicts(content: Content, name: str, sections: Sequence[Section | None], most: int) -> Html:
+def _verdicts(sides: Sequence[Side], name: str, sections: Sequence[Section | None], most: int) -> Html:
     """The cards of one requirement, side by side if several directories are compared."""
     cards = []
-    for side, section in zip(content.sides, sections, strict=True):
+    for side, section in zip(sides, sections, strict=True):
         title = f"{section.heading if section else name}: {side.title}" if len(sections) > 1 else ""
         if section is None:
             cards.append(
@@ -251,31 +249,17 @@ def _details(section: Section, most: int) -> Html:
 
 
 def _runs(runs: Sequence[Run]) -> Html:
-    rows = [
-        (
-            run_name(run),
-            run.status,
-            run.spent.simulations_text,
-            signed(run.verdict.robustness) if run.verdict else "–",
-            _seconds(run),
-            replay_command(run) if run.falsified else run.reason,
-        )
-        for run in runs
-    ]
+    rows = []
+    for run in runs:
+        robustness = signed(run.verdict.robustness) if run.verdict else "–"
+        simulation = run.spent.simulation_seconds / max(1, run.simulations)
+        proposal = run.spent.engine_seconds / max(1, run.simulations)
+        asked = ", questions included" if run.spent.calls else ""
+        seconds = f"simulation {simulation:.3g}, proposal {proposal:.3g}{asked}" if run.simulations else "–"
+        ended = replay_command(run) if run.falsified else run.reason
+        rows.append((run_name(run), run.status, run.spent.simulations_text, robustness, seconds, ended))
     header = ("run", "ended", "simulations", "robustness", "seconds on average", "replay, or why it ended")
     return table(header, rows, label="Runs")
-
-
-def _seconds(run: Run) -> str:
-    """Mean times of a run."""
-    if not run.simulations:
-        return "–"
-    spent, count = run.spent, run.simulations
-    asked = ", questions included" if spent.calls else ""
-    return (
-        f"simulation {spent.simulation_seconds / count:.3g}, "
-        f"proposal {spent.engine_seconds / count:.3g}{asked}"
-    )
 
 
 def _shown_details(shown: Shown) -> Html:
@@ -298,12 +282,6 @@ def _questions(section: Section, most: int) -> str:
     rest = "".join(f" {run_name(run)}: falsifier report {run.directory}." for run in asked[_MOST_TALKS:])
     note = el("p", f"Not shown here:{rest}", class_="note") if rest else ""
     return join(el("h3", "What was asked, and what came of it"), *parts, note)
-
-
-def _differences(content: Content) -> Html:
-    found = differences(content)
-    shown = table(found.header, found.rows, label=found.title) if found.rows else el("p", "Nothing.")
-    return el("section", el("h2", found.title), shown)
 
 
 def _statistics(side: Side) -> str:

@@ -34,7 +34,7 @@ from falsifier.views.exchanges import exchange_html
 from falsifier.views.html import Html, el, join, table
 from falsifier.views.report.content import section_of, shown_of
 from falsifier.views.report.page import card_html, document, drawn, facts_html
-from falsifier.views.text import Fact, llm_use, seconds_text
+from falsifier.views.text import llm_use, seconds_text
 
 if TYPE_CHECKING:
     from aiohttp.web import Application, Request, Response, StreamResponse
@@ -173,18 +173,15 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     ]
     history = drawn(partial(plot_history, run), "Robustness over simulations")
     covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
-    facts: list[Fact] = [("time", seconds_text(run.spent))]
+    facts = [("time", seconds_text(run.spent))]
     facts += [("language model", llm_use(run.spent))] if run.spent.calls else []
     of = "" if len(tried) == count else f" ({len(tried)} of {count} simulations)"
-    asked = watched.exchange
-    more = [
-        join(el("h3", "Robustness over simulations"), history),
-        join(el("h3", f"What was tried{of}"), covered) if tried else Html(""),
-        join(el("h3", "What it costs"), facts_html(facts)),
-        join(el("h3", "The last question to the language model, and its answer"), exchange_html(asked))
-        if asked
-        else Html(""),
-    ]
+    more = [el("h3", "Robustness over simulations"), history]
+    more += [el("h3", f"What was tried{of}"), covered] if tried else []
+    more += [el("h3", "What it costs"), facts_html(facts)]
+    if watched.exchange:
+        title = "The last question to the language model, and its answer"
+        more += [el("h3", title), exchange_html(watched.exchange)]
     return card_html(section_of(run.requirement, {run.method.label: [run]}, shown), more=more)
 
 

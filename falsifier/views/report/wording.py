@@ -1,7 +1,7 @@
 """What a report says of its content: phrases, facts, tables, and commands that repeat what it shows."""
 
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
-from falsifier.views.report.content import Content, Section, Shown, searches
+from falsifier.views.report.content import Section, Shown, Side, searches
 from falsifier.views.text import Fact, broken_facts, margin_facts
 
 _BETWEEN = {
@@ -31,10 +31,10 @@ _BETWEEN = {
 _MOST_COUNTED = 5000
 
 
-def differences(content: Content) -> Table:
+def differences(sides: Sequence[Side]) -> Table:
     """Return what the directories of a comparison differ in: files, formulas, engines, seeds and versions."""
     columns: list[dict[str, list[str]]] = []
-    for side in content.sides:
+    for side in sides:
         told: dict[str, list[str]] = {}
         for run in side.runs:
             manifest = run.manifest
@@ -52,7 +52,7 @@ def differences(content: Content) -> Table:
     names = dict.fromkeys(name for told in columns for name in told)
     texts = {name: [", ".join(told.get(name, [])) for told in columns] for name in names}
     differing = tuple((name, *cells) for name, cells in texts.items() if len(set(cells)) > 1)
-    return Table("What differs", ("", *(side.title for side in content.sides)), differing)
+    return Table("What differs", ("", *(side.title for side in sides)), differing)
 
 
 def result_text(section: Section) -> str:

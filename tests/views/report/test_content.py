@@ -26,7 +26,7 @@ from tests.stepped import euler_problem
 
 def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) -> None:
     record_ad_hoc(tmp_path, {"a": "G (y <= 5)", "b": "G (y <= 6)"})
-    headings = [[s.heading for s in gather(place).sides[0].sections] for place in (tmp_path, tmp_path / "a")]
+    headings = [[s.heading for s in gather(place)[0].sections] for place in (tmp_path, tmp_path / "a")]
     assert headings == [["stl-1: G (y <= 5)", "stl-2: G (y <= 6)"], ["G (y <= 5)"]]
     assert "<h2>stl-2: G (y &lt;= 6) " in html_report(tmp_path)
 
@@ -86,7 +86,7 @@ def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_pa
 
 def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_any(tmp_path: Path) -> None:
     assert falsify(hard(), "uniform", budget=20, directory=tmp_path).falsified
-    before = gather(tmp_path).sides[0].sections[0].shown[0]
+    before = gather(tmp_path)[0].sections[0].shown[0]
     assert not before.is_shrunk and not before.explanation
     assert f"falsifier explain {tmp_path} --shrink" in markdown_report(tmp_path)
     simpler = evaluate(hard(), Candidate({"u": Signal((0.0,), (1.0,))}))
@@ -94,7 +94,7 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     save(to_store(confirm(hard(), simpler)), tmp_path / "shrunk.json")
     simpler.trajectory.save(tmp_path / "shrunk.npz")
     (tmp_path / "explanation.txt").write_text("Because of u.\n")
-    shown = gather(tmp_path).sides[0].sections[0].shown[0]
+    shown = gather(tmp_path)[0].sections[0].shown[0]
     assert shown.is_shrunk and shown.verdict == simpler.verdict and shown.candidate == simpler.candidate
     page = html_report(tmp_path)
     assert "The shrunk counterexample" in page and "Because of u." in page
@@ -103,9 +103,9 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     assert "The shrunk counterexample:" in text
     assert all(f"falsifier replay {tmp_path / 'shrunk.json'}" in report for report in (page, text))
     os.utime(tmp_path / "explanation.txt", (0, 0))
-    assert not gather(tmp_path).sides[0].sections[0].shown[0].explanation, "the run went on since"
+    assert not gather(tmp_path)[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
-    assert not gather(tmp_path).sides[0].sections[0].shown[0].is_shrunk
+    assert not gather(tmp_path)[0].sections[0].shown[0].is_shrunk
 
 
 def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(campaign: Path) -> None:
