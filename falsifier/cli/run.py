@@ -98,12 +98,12 @@ def run(
     """
     from falsifier.problem.loading import load_source
     from falsifier.record.run import falsify
-    from falsifier.views.progress import FmuLog, make_display
+    from falsifier.views.progress import log_fmu, make_display
 
     source, llm = problem_source(options), llm_settings(options)
     check_context(source.context, [engine] if llm is None else [])
     budget = read_budget(options, asks=llm is not None)
-    logs = [FmuLog(fmu_log)] if fmu_log else []
+    logs = [log_fmu(fmu_log)] if fmu_log else []
     if fmu_log:
         changes = source.changes.model_copy(update={"logging": True})
         source = source.model_copy(update={"changes": changes})

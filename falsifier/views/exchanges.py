@@ -9,7 +9,7 @@ from pathlib import Path
 from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
 from falsifier.record.journal import read_journal
-from falsifier.record.questions import Iteration, Sample, iterations
+from falsifier.record.questions import Iteration, iterations
 from falsifier.views.html import Html, el, join
 
 _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
@@ -46,15 +46,13 @@ def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
     for exchange in one.exchanges:
         shown.append(exchange_html(exchange, before))
         before = exchange.messages
-    proposals = [el("li", el("b", f"Sample {o.index + 1}: "), _proposal(o)) for o in one.samples]
+    proposals = []
+    for sample in one.samples:
+        candidate, number = sample.candidate, el("b", f"Sample {sample.index + 1}: ")
+        why = el("blockquote", candidate.rationale) if candidate.rationale else ""
+        what = f"{candidate.origin}: {in_one_line(candidate)}. "
+        proposals.append(el("li", number, what, el("b", sample.text or "not simulated"), why))
     return el("details", el("summary", heading), el("ul", *proposals), *shown, class_="exchange")
-
-
-def _proposal(sample: Sample) -> Html:
-    candidate = sample.candidate
-    why = el("blockquote", candidate.rationale) if candidate.rationale else Html("")
-    came = sample.text or "not simulated"
-    return join(f"{candidate.origin}: {in_one_line(candidate)}. ", el("b", came), why)
 
 
 def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:

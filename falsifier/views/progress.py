@@ -121,7 +121,6 @@ class News:
         self._started: RunStarted | None = None
         self._told: set[str] = set()
         self._least: dict[str, float] = {}
-        self._said: dict[str, str] = {}
         self._since = Spent()
 
     def lines(self, event: Event) -> Iterator[str]:
@@ -134,7 +133,10 @@ class News:
                 yield f"engine {event.engines[0]}{replayed}"
                 yield from self.kept(event)
             case Evaluated():
-                told = [*self._failure(event), *self.kept(event)]
+                ended, told = event.evaluation, list[str]()
+                if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
+                    told.append(f"simulation {event.index + 1} {outcome_text(ended)}")
+                told += self.kept(event)
                 if better := self.better(event):
                     told.append(f"simulation {event.index + 1}: {better}")
                 yield from told
@@ -149,11 +151,11 @@ class News:
                 self._started, self._since = event, Spent()
                 yield from _choices(event)
             case Evaluated(spent=spent) if spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed:
-                yield from self._once(
-                    "mostly failed",
-                    f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run "
-                    "counts as failed if more than half do",
-                )
+                if self._is_new("mostly failed"):
+                    yield (
+                        f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run "
+                        "counts as failed if more than half do"
+                    )
             case Confirmed(confirmation=found):
                 # Several requirements may share the search, so it is named.
                 yield f"{found.problem.name}: violation {found.outcome}: {found.reason}"
@@ -169,23 +171,15 @@ class News:
                 continue
             self._least[name] = verdict.robustness
             text = f"best robustness {signed(verdict.robustness, 5)} at t = {verdict.critical_time:.5g} s"
-            if self._said.get(name) != text:
-                self._said[name] = text
+            if self._is_new(f"{name}: {text}"):
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)
         return "; ".join(told)
 
-    def _failure(self, event: Evaluated) -> Iterator[str]:
-        """Tell a cause of failures once."""
-        evaluation = event.evaluation
-        if evaluation.status != "ok":
-            text = f"simulation {event.index + 1} {outcome_text(evaluation)}"
-            yield from self._once(f"failed: {cause_of(evaluation.reason)}", text)
-
-    def _once(self, key: str, text: str) -> Iterator[str]:
-        if key not in self._told:
-            self._told.add(key)
-            yield text
+    def _is_new(self, key: str) -> bool:
+        is_new = key not in self._told
+        self._told.add(key)
+        return is_new
 
     def _pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
         """Tell how fast the search is and what is left of it, if nothing else was told for a while."""
@@ -205,28 +199,21 @@ class News:
         yield f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
 
 
-class FmuLog:
-    """Listener that writes the FMU's messages of each simulation; the file is replaced when the run starts.
+def log_fmu(path: Path) -> Listener:
+    """Make a listener that writes the FMU's messages of each simulation to a file, which it replaces."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("", encoding="utf-8")
 
-    Args:
-        path: file to write.
-    """
+    def append(event: Event) -> None:
+        if isinstance(event, Evaluated):
+            evaluation = event.evaluation
+            why = "" if evaluation.status == "ok" else f": {evaluation.reason}"
+            lines = [f"simulation {event.index + 1}: {evaluation.status}{why}"]
+            lines += [f"  {line}" for line in evaluation.log]
+            with path.open("a", encoding="utf-8") as file:
+                file.write("\n".join(lines) + "\n")
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text("", encoding="utf-8")
-
-    def __call__(self, event: Event) -> None:
-        """Append the messages of a simulation."""
-        if not isinstance(event, Evaluated):
-            return
-        evaluation = event.evaluation
-        why = "" if evaluation.status == "ok" else f": {evaluation.reason}"
-        lines = [f"simulation {event.index + 1}: {evaluation.status}{why}"]
-        lines += [f"  {line}" for line in evaluation.log]
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write("\n".join(lines) + "\n")
+    return append
 
 
 def _choices(event: RunStarted) -> list[str]:

@@ -81,20 +81,18 @@ def results_text(results: Sequence[Result]) -> str:
     width = max(len(result.problem.name) for result in results)
     lines = []
     for result in results:
-        shown = result.counterexample.evaluation if result.counterexample else result.best
+        shown, found = result.shown, result.counterexample
         robustness = "" if shown is None else f", robustness {signed(shown.robustness)}"
-        where = "" if result.counterexample is None else f", {_picture(result)}"
+        where = "" if found is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{_untested(result)}{robustness}{where}"
         )
-        if result.counterexample is not None:
-            lines += [
-                f"{'':{width}}  {line}" for line in broken_lines(result.counterexample.evaluation.verdict)
-            ]
-        lines += [f"{'':{width}}  note: {finding.text}" for finding in result.findings]
-        lines += [f"{'':{width}}  failed: {failure.text}" for failure in result.failures]
-        lines += [f"{'':{width}}  note: {remark}" for remark in result.remarks]
+        below = [] if found is None else list(broken_lines(found.evaluation.verdict))
+        below += [f"note: {finding.text}" for finding in result.findings]
+        below += [f"failed: {failure.text}" for failure in result.failures]
+        below += [f"note: {remark}" for remark in result.remarks]
+        lines += [f"{'':{width}}  {line}" for line in below]
     held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
     lines += [f"not searched: {text}" for text in held if text]
     falsified = sum(result.counterexample is not None for result in results)
