@@ -19,7 +19,7 @@ from falsifier.llm.prompts.observations import compared_columns
 from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, formula_text, reply_form
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
-from falsifier.stl.formula import Always, Eventually, Formula, Until
+from falsifier.stl.formula import Formula
 
 # They tell so many of the latest samples.
 MOST_SAMPLES = 10
@@ -169,7 +169,7 @@ def _clock(view: View, time: float) -> str:
 
 
 def _clock_decimals(formula: Formula) -> int:
-    windows = [f.window for f in formula.walk() if isinstance(f, Always | Eventually | Until) and f.window]
+    windows = [f.window for f in formula.walk() if f.window]
     bounds = (number_text(bound) for window in windows for bound in (window.start, window.end))
     found = max((len(bound.partition(".")[2]) for bound in bounds), default=0)
     return min(found, _MOST_CLOCK_DECIMALS) or 1

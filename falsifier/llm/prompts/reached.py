@@ -57,12 +57,11 @@ class Reached:
         self._view = view
         self._stages: set[Stage] = set()
         self._ranges: dict[str, tuple[float, float]] = {}
-        self._is_begun = False
 
     def news(self, progress: Progress) -> tuple[str, ...]:
         """Add a sample; return what no earlier one did, in words; of the first one nothing."""
-        found = [*self._new_stages(progress), *self._further(progress)] if self._is_begun else []
-        self._is_begun |= bool(progress.stages or progress.ranges)
+        is_begun = self._stages or self._ranges
+        found = [*self._new_stages(progress), *self._further(progress)] if is_begun else []
         self._stages |= progress.stages
         for name, (low, high) in progress.ranges.items():
             least, most = self._ranges.get(name, (low, high))

@@ -120,17 +120,14 @@ def formula_text(formula: Formula) -> str:
     '(G[0,4] (a <= 1)) -> (b >= 2 and c >= 3)'
     """
     match formula:
-        case Always() | Eventually():
-            letter = "G" if isinstance(formula, Always) else "F"
-            return f"{letter}{formula.window or ''} {_prefixed(formula.operand)}"
-        case Not() | Next():
-            return f"{'not' if isinstance(formula, Not) else 'X'} {_prefixed(formula.operand)}"
-        case Until():
-            left, right = (_operand(side, formula) for side in formula.children)
-            return f"{left} U{formula.window or ''} {right}"
-        case And() | Or() | Implies() | Iff():
-            word = {And: "and", Or: "or", Implies: "->", Iff: "<->"}[type(formula)]
-            return f" {word} ".join(_operand(side, formula) for side in formula.children)
+        case Always() | Eventually() | Not() | Next():
+            text = formula_text(formula.operand)
+            # Two prefix operators in a row need no parentheses between them.
+            is_prefixed = isinstance(formula.operand, Always | Eventually | Not | Next)
+            return f"{formula.sign}{formula.window or ''} {text if is_prefixed else f'({text})'}"
+        case Until() | And() | Or() | Implies() | Iff():
+            sign = f"U{formula.window or ''}" if isinstance(formula, Until) else formula.sign
+            return f" {sign} ".join(_operand(side, formula) for side in formula.children)
     return str(formula)
 
 
@@ -138,12 +135,6 @@ def _operand(formula: Formula, above: Formula) -> str:
     is_link = type(formula) is type(above) and isinstance(formula, And | Or)
     text = formula_text(formula)
     return text if isinstance(formula, Predicate) or is_link else f"({text})"
-
-
-def _prefixed(formula: Formula) -> str:
-    """Operand of a prefix operator; two of these in a row need no parentheses between them."""
-    text = formula_text(formula)
-    return text if isinstance(formula, Always | Eventually | Not | Next) else f"({text})"
 
 
 def _system(view: View) -> str:

@@ -18,7 +18,7 @@ from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.stl.formula import Always, Eventually, Until
+from falsifier.stl.formula import Temporal
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +76,7 @@ class View:
     def looked_at(self) -> float:
         """Time in s up to which the requirement looks; the stop time if it is about as late."""
         formula, stop_time = self.requirement.formula, self.space.stop_time
-        timed = [f for f in formula.walk() if isinstance(f, Always | Eventually | Until)]
-        if any(f.window is None for f in timed):
+        if any(isinstance(f, Temporal) and f.window is None for f in formula.walk()):
             return stop_time
         horizon = formula.horizon(self.experiment.output_interval)
         return horizon if horizon < stop_time - self.experiment.output_interval else stop_time
