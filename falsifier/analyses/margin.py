@@ -48,7 +48,7 @@ class Margin:
     @property
     def text(self) -> str:
         """The result in one sentence."""
-        searches = f"{len(self.searches)} {'search' if len(self.searches) == 1 else 'searches'}"
+        searches = "1 search" if len(self.searches) == 1 else f"{len(self.searches)} searches"
         effort = f"({counted(self.simulations, 'simulation')}, {searches})"
         ends = [] if self.falsified is None else [f"falsified at {self.falsified:.6g}"]
         ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.6g}"]
@@ -109,13 +109,6 @@ def margin(
         interrupted = True
     searches, count = tuple(state.searches), len(state.history)
     return Margin(state.falsified, state.unfalsified, count, searches, complete, interrupted)
-
-
-def at_threshold(problem: Problem, vary: str, threshold: float) -> Problem:
-    """Return the problem with a formula in which the threshold has this value."""
-    text = vary.replace(LIMIT, f"{threshold:.12g}")
-    formula = parse_requirement(text, problem.info, problem.experiment)
-    return replace(problem, requirement=Requirement(problem.name, formula), source=None)
 
 
 @dataclass(slots=True)
@@ -179,7 +172,7 @@ class _Bisection:
         return found
 
     def _search(self, threshold: float, budget: int) -> bool:
-        problem = at_threshold(self.problem, self.vary, threshold)
+        problem = self._at(threshold)
         engine = make_engine(self.engine, problem, seed=self.seed + len(self.searches))
         if self.history:
             engine.tell(self._judged(threshold))
@@ -196,8 +189,14 @@ class _Bisection:
         self.searches.append((threshold, result.falsified))
         return result.falsified
 
+    def _at(self, threshold: float) -> Problem:
+        """Return the problem with the formula in which the threshold has this value."""
+        problem, text = self.problem, self.vary.replace(LIMIT, f"{threshold:.12g}")
+        formula = parse_requirement(text, problem.info, problem.experiment)
+        return replace(problem, requirement=Requirement(problem.name, formula), source=None)
+
     def _judged(self, threshold: float) -> list[Evaluation]:
-        problem = at_threshold(self.problem, self.vary, threshold)
+        problem = self._at(threshold)
         return [judge(problem, evaluation) for evaluation in self.history]
 
     def _reached(self, easy: float, hard: float) -> float | None:
@@ -213,5 +212,5 @@ class _Bisection:
                 hard = threshold
             threshold = (easy + hard) / 2
         assert found is not None, "there is at least one step"
-        confirmation = confirm(at_threshold(self.problem, self.vary, easy), found)
+        confirmation = confirm(self._at(easy), found)
         return easy if confirmation.outcome == "confirmed" else None

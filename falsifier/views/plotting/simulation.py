@@ -244,14 +244,11 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
 def _covered(ax: "Axes", panel: Panel, corner: tuple[float, float, float, float]) -> int:
     """Return how many samples of a panel, and of its bounds, an inset in a corner would cover."""
     left, bottom, width, height = corner
-    (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
-    x = (panel.times - first) / (last - first)
+    drawn = (panel.values, *(bound.values for bound in panel.bounds))
+    points = np.concatenate([np.column_stack([panel.times, values]) for values in drawn])
+    x, y = ax.transLimits.transform(points).T  # as shares of the panel
     beside = (x >= left - 0.05) & (x <= left + width + 0.02)
-    count = 0
-    for values in (panel.values, *(bound.values for bound in panel.bounds)):
-        y = (values - low) / (high - low)
-        count += int((beside & (y >= bottom - 0.1) & (y <= bottom + height + 0.05)).sum())
-    return count
+    return int((beside & (y >= bottom - 0.1) & (y <= bottom + height + 0.05)).sum())
 
 
 def plot_panel(ax: "Axes", panel: Panel, critical: str = VIOLATED) -> None:

@@ -8,6 +8,7 @@ from typing import Literal
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.analysis import Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
@@ -15,11 +16,12 @@ from falsifier.counterexamples.store import load as load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
+from falsifier.search.budget import Spent
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.panels import Panel, panels
 
-Status = Literal["violated", "not violated", "not finished", "failed"]
+Status = Literal["violated", "no violation found", "not finished", "failed"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -97,7 +99,7 @@ class Section:
             return "violated"
         if all(run.status == "failed" for run in runs):
             return "failed"
-        return "not violated" if any(run.finished for run in runs) else "not finished"
+        return "no violation found" if any(run.finished for run in runs) else "not finished"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,14 +154,13 @@ def _side(directory: Path, title: str) -> Side:
     )
 
 
-def searches(runs: Iterable[Run]) -> list[Run]:
-    """One run per directory: of those that share a search, the longest, which shows what the search spent."""
-    longest: dict[Path, Run] = {}
+def spent_on(runs: Iterable[Run]) -> Spent:
+    """What runs have spent together; of those that share a search, the longest shows what that spent."""
+    longest: dict[Path, Spent] = {}
     for run in runs:
-        known = longest.get(run.directory)
-        if known is None or run.simulations > known.simulations:
-            longest[run.directory] = run
-    return list(longest.values())
+        known = longest.get(run.directory, run.spent)
+        longest[run.directory] = max(known, run.spent, key=lambda spent: spent.simulations)
+    return total(longest.values())
 
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from falsifier.campaigns.analysis import Run
-from falsifier.campaigns.progress import total
 from falsifier.core.files import file_name
 from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
@@ -17,7 +16,7 @@ from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join, picture, table
 from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
-from falsifier.views.report.content import Section, Shown, Side, Status, by_requirement, gather, searches
+from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
 from falsifier.views.report.wording import (
     advice,
     commands,
@@ -43,13 +42,6 @@ if TYPE_CHECKING:
 _MOST_DRAWN, _MOST_TALKS, _MOST_QUESTIONS = 3, 3, 30
 # Longer tables of inputs are folded.
 _MOST_ROWS = 12
-
-_BADGES: dict[Status, str] = {
-    "violated": "violated",
-    "not violated": "no violation found",
-    "not finished": "not finished",
-    "failed": "failed",
-}
 
 
 def html_report(*directories: Path) -> str:
@@ -118,7 +110,7 @@ def overview(side: Side) -> str:
         counted(len(runs), "run"),
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
-        total(run.spent for run in searches(runs)).simulations_text,
+        spent_on(runs).simulations_text,
     ]
     if runs:
         started = min(run.manifest.started for run in runs)  # such as 2026-03-01T10:20:30+00:00
@@ -156,7 +148,7 @@ def card_html(section: Section, *, title: str = "", more: Sequence[str] = ()) ->
         found.append(_lines("What this does not show", unshown_lines(section)))
     return el(
         "article",
-        el("h2", title or section.heading, " ", el("span", _BADGES[status], class_="badge")),
+        el("h2", title or section.heading, " ", el("span", status, class_="badge")),
         el("p", section.sentence, class_="sentence"),
         el("p", result_text(section), class_="result"),
         *found,

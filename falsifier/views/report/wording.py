@@ -8,7 +8,6 @@ import numpy as np
 
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
-from falsifier.campaigns.progress import total
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.store import shrunk_file
@@ -19,7 +18,7 @@ from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
-from falsifier.views.report.content import Section, Shown, Side, searches
+from falsifier.views.report.content import Section, Shown, Side, spent_on
 from falsifier.views.text import Fact, broken_facts, margin_facts
 
 _BETWEEN = {
@@ -67,7 +66,7 @@ def result_text(section: Section) -> str:
     failed = [run for run in runs if run.status == "failed"]
     if len(failed) == len(runs):
         return f"failed: {failed[0].reason}"
-    count = counted(total(run.spent for run in searches(runs)).simulations, "simulation")
+    count = counted(spent_on(runs).simulations, "simulation")
     if not any(run.finished for run in runs):
         return f"not finished: no violation in {count} so far"
     tested = ""
@@ -134,18 +133,14 @@ def tried(section: Section) -> list[Fact]:
     return tried_facts(coverage_of(run.manifest, [(candidates[index], None) for index in judged]))
 
 
-def unshown(run: Run) -> list[str]:
-    """Return what a search could not show, one line each."""
-    texts = [*(finding.text for finding in run.findings), *(failure.text for failure in run.failures)]
-    held = held_text(h for h in run.manifest.not_searched if h.causality == "input")
-    return [*texts, *([f"not searched: {held}"] if held else [])]
-
-
 def unshown_lines(section: Section) -> list[str]:
     """Return what the searches of a requirement could not show, one line each, with the runs that say so."""
     told: dict[str, list[Run]] = {}
     for run in section.runs:
-        for text in unshown(run):
+        texts = [*(finding.text for finding in run.findings), *(failure.text for failure in run.failures)]
+        if held := held_text(h for h in run.manifest.not_searched if h.causality == "input"):
+            texts.append(f"not searched: {held}")
+        for text in texts:
             told.setdefault(text, []).append(run)
     return [
         text if len(runs) == len(section.runs) else f"{listed(list(map(run_name, runs)))}: {text}"

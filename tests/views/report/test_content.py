@@ -115,7 +115,7 @@ def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(cam
         "## HARD: violated",
         "what broke x \\<= 0.6 was violated from ",
         "falsifier replay",
-        "## NEVER: not violated",
+        "## NEVER: no violation found",
         "What was tried:",
         "What this does not show:",
         "| HARD | uniform | 2/2 |",
