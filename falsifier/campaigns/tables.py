@@ -30,6 +30,15 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
 
+    def only(self, *names: str) -> "Table":
+        """Return the table with only these columns, in this order.
+
+        Raises:
+            ValueError: for an unknown column.
+        """
+        picked = [self.header.index(name) for name in names]
+        return replace(self, header=names, rows=tuple(tuple(row[i] for i in picked) for row in self.rows))
+
     def markdown(self) -> str:
         """Format as a Markdown table with its title and notes."""
         lines = [self.header, tuple("---" for _ in self.header), *self.rows]
