@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from falsifier.campaigns.analysis import Run
+from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.files import file_name
 from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
 _MOST_DRAWN, _MOST_TALKS, _MOST_QUESTIONS = 3, 3, 30
 # Longer tables of inputs are folded.
 _MOST_ROWS = 12
+# Columns of the table of statistics that name a row, and those that are folded away so that the others fit on
+# paper.
+_KEYS = ("requirement", "method")
+_FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(*directories: Path) -> str:
@@ -279,14 +283,21 @@ def _questions(section: Section, most: int) -> str:
 def _statistics(side: Side) -> str:
     if side.table is None:
         return ""
-    rows = [(el("a", first, href=f"#{_anchor(first)}"), *rest) for first, *rest in side.table.rows]
+    main = side.table.only(*(name for name in side.table.header if name not in _FOLDED))
+    folded = side.table.only(*(name for name in side.table.header if name in (*_KEYS, *_FOLDED)))
     return el(
         "section",
         el("h2", f"Statistics: {side.title}"),
-        table(side.table.header, rows, label=side.table.title, numbers=True),
+        _table(main),
+        el("details", el("summary", "Spread, times, tokens and cost"), _table(folded)),
         *(el("p", note, class_="note") for note in side.table.notes),
         class_="statistics",
     )
+
+
+def _table(shown: Table) -> Html:
+    rows = [(el("a", first, href=f"#{_anchor(first)}"), *rest) for first, *rest in shown.rows]
+    return table(shown.header, rows, label=shown.title, numbers=True)
 
 
 def _environment(side: Side) -> Html:
