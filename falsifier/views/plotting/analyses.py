@@ -37,7 +37,15 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     """
     from matplotlib.figure import Figure
 
-    drawn = _panels(found)
+    by_name = {r.searched.name: r for r in found.ranges}
+    inputs = [r for r in found.ranges if r.times is not None]
+    parameters = [r for r in found.ranges if r.times is None]
+    drawn: list[Callable[[Axes], None]] = [
+        *(partial(_plot_input, r=r, stop_time=found.stop_time) for r in inputs[:_PANELS]),
+        *(partial(_plot_parameter, r=r) for r in parameters[:_PANELS]),
+        *(partial(_plot_pair, p=p, by_name=by_name) for p in found.pairs[:_PANELS]),
+        *(partial(_plot_output, o=o) for o in found.outputs[:_PANELS]),
+    ]
     columns = min(_COLUMNS, max(1, len(drawn)))
     rows = max(1, -(-len(drawn) // columns))
     figure = Figure(figsize=(3.4 * columns + 0.6, 2.7 * rows + 0.5), layout="constrained")
@@ -49,18 +57,6 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     tried = counted(found.simulations, "simulation")
     figure.suptitle(f"{caption(title)}: what {tried} tried (red: never)".removeprefix(": "), fontsize=11)
     return figure
-
-
-def _panels(found: Coverage) -> "list[Callable[[Axes], None]]":
-    by_name = {r.searched.name: r for r in found.ranges}
-    inputs = [r for r in found.ranges if r.times is not None]
-    parameters = [r for r in found.ranges if r.times is None]
-    return [
-        *(partial(_plot_input, r=r, stop_time=found.stop_time) for r in inputs[:_PANELS]),
-        *(partial(_plot_parameter, r=r) for r in parameters[:_PANELS]),
-        *(partial(_plot_pair, p=p, by_name=by_name) for p in found.pairs[:_PANELS]),
-        *(partial(_plot_output, o=o) for o in found.outputs[:_PANELS]),
-    ]
 
 
 def _plot_input(ax: "Axes", r: RangeCoverage, stop_time: float) -> None:
@@ -139,21 +135,20 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
 
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2)
+    centre, colour = ("counterexample", VIOLATED) if found.original < 0 else ("nearest miss", OUTPUT)
     _plot_sizes(left, found)
+    left.plot(0.0, found.original, "o", color=colour, label=centre)
+    left.legend()
     if len(found.grid) > 1:
         _plot_map(right, found)
     else:
-        _plot_line(right, found)
-    figure.suptitle(f"{caption(title)}: robustness around the {_centre(found)}".removeprefix(": "))
+        coordinate = found.coordinates[found.axes[0]]
+        right.plot(found.grid[0], found.surface[0], color=OUTPUT, linewidth=1.2)
+        right.plot(coordinate.value, found.original, "o", color=colour)
+        right.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+        right.set(xlabel=caption(coordinate.label), ylabel="robustness")
+    figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure
-
-
-def _centre(found: RobustnessMap) -> str:
-    return "counterexample" if found.original < 0 else "nearest miss"
-
-
-def _colour(found: RobustnessMap) -> str:
-    return VIOLATED if found.original < 0 else OUTPUT
 
 
 def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
@@ -161,10 +156,8 @@ def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
     for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
         if mask.any():
             ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
-    ax.plot(0.0, found.original, "o", color=_colour(found), label=_centre(found))
     ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
     ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
-    ax.legend()
 
 
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
@@ -196,11 +189,3 @@ def _scale(found: RobustnessMap) -> dict[str, Any]:
         return {"cmap": ListedColormap(reds), "norm": Normalize(low, 0.0)}
     both = ListedColormap(np.vstack([reds, blues]))
     return {"cmap": both, "norm": TwoSlopeNorm(0.0, low, high or -low)}
-
-
-def _plot_line(ax: "Axes", found: RobustnessMap) -> None:
-    coordinate = found.coordinates[found.axes[0]]
-    ax.plot(found.grid[0], found.surface[0], color=OUTPUT, linewidth=1.2)
-    ax.plot(coordinate.value, found.original, "o", color=_colour(found))
-    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
-    ax.set(xlabel=caption(coordinate.label), ylabel="robustness")

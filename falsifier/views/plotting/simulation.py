@@ -76,19 +76,25 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    return plot_panels(drawn, verdict, _title(problem, evaluation, verdict))
+    parameters = ", ".join(f"{name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    first, *more = _decided(verdict)
+    lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
+    return plot_panels(drawn, verdict, "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line))
 
 
 def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verdict]:
     if evaluation.trajectory is None or evaluation.verdict is None:
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
+    variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
+    labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
+    labels |= {r.name: labels_of(r.kind, r.items) for r in problem.space.inputs if r.kind != "real"}
     drawn = panels(
         problem.requirement.formula,
         evaluation.trajectory,
         evaluation.candidate,
         problem.space.inputs,
         evaluation.verdict,
-        _labels(problem),
+        labels,
         problem.info.components,
     )
     return drawn, evaluation.verdict
@@ -150,14 +156,6 @@ def _keys(drawn: Sequence[Panel], verdict: Verdict | None) -> list[Any]:
     return keys
 
 
-def _title(problem: Problem, evaluation: Evaluation, verdict: Verdict) -> str:
-    """What broke, what decided, the formula and the values of parameters, all in full."""
-    parameters = ", ".join(f"{name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
-    first, *more = _decided(verdict)
-    lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
-    return "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line)
-
-
 def _decided(verdict: Verdict) -> list[str]:
     by, at = verdict.predicate, f"{verdict.critical_time:.5g} s"
     decided = f"robustness {signed(verdict.robustness, 5)}, decided by {by} at {at}"
@@ -168,14 +166,6 @@ def _decided(verdict: Verdict) -> list[str]:
 
 def _decided_colour(verdict: Verdict | None) -> str:
     return VIOLATED if verdict is None or verdict.violated else NEAREST
-
-
-def _labels(problem: Problem) -> dict[str, dict[int, str]]:
-    """Return the names of the numbers of each signal that is not real."""
-    ranges = problem.space.inputs
-    variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
-    found = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
-    return found | {r.name: labels_of(r.kind, r.items) for r in ranges if r.kind != "real"}
 
 
 def _mark_moment(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
