@@ -175,19 +175,17 @@ def bench(
 @command()
 @directory_argument
 @click.option("--page", is_flag=True, help="Serve a web page of it, on this machine only, until Ctrl-C.")
-def watch(*, directory: Path, page: bool) -> None:
+@click.option("--allow-stop", is_flag=True, help="With --page: add a button that stops the run, like Ctrl-C.")
+def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
-    This writes nothing to DIRECTORY. The page of --page can also be opened after the run has ended.
+    This writes nothing to DIRECTORY unless somebody presses the button of --allow-stop. The page of --page
+    can also be opened after the run has ended.
     """
     if page:
-        import asyncio
-
-        from falsifier.views.report.watch import serve
-
-        with suppress(KeyboardInterrupt):
-            asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}")))
+        _serve(directory, allow_stop=allow_stop)
         return
+    refuse("applies to --page only", allow_stop=allow_stop)
     follower = Follower(directory)
     with campaign_display() as show:
         while follower.is_worked_on:
@@ -200,6 +198,16 @@ def watch(*, directory: Path, page: bool) -> None:
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
+
+
+def _serve(directory: Path, *, allow_stop: bool) -> None:
+    """Serve the page until the user ends it."""
+    import asyncio
+
+    from falsifier.views.report.watch import serve
+
+    with suppress(KeyboardInterrupt):
+        asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop))
 
 
 def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:

@@ -1,10 +1,11 @@
-"""The display of a running search: live on a terminal, plain lines otherwise."""
+"""The display of a running search: live on a terminal or in a notebook, plain lines otherwise."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
@@ -17,12 +18,14 @@ from falsifier.search.events import (
     Event,
     Exchanged,
     Listener,
+    RunEnded,
     RunStarted,
 )
 from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
-from falsifier.views.terminal import error_console, moving, unbroken, warn
+from falsifier.views.html import el, join
+from falsifier.views.terminal import error_console, moving, unbroken
 from falsifier.views.text import outcome_text
 
 if TYPE_CHECKING:
@@ -36,11 +39,11 @@ _QUIET, _QUIET_SHARE = 10.0, 0.1
 
 @contextmanager
 def make_display(*, quiet: bool = False) -> Iterator[Listener]:
-    """Make a listener that shows progress: live on a terminal, otherwise lines on stderr."""
+    """Make a listener that shows progress: live on a terminal or in a notebook, otherwise lines on stderr."""
     console = error_console()
     if quiet:
         yield lambda event: None
-    elif console.is_terminal:
+    elif console.is_terminal and not console.is_jupyter:
         with _live_display(console) as display:
             yield display
     else:
@@ -48,17 +51,20 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
 
 
 def progress() -> Listener:
-    """Make a listener that shows the progress of a search in lines on stderr.
+    """Make a listener that shows the progress of a search: one live line in a notebook, else lines on stderr.
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
     """
+    console = error_console()
+    if console.is_jupyter:  # rich's own live display would need widgets there
+        return _NotebookDisplay()
     news = News()
 
     def show(event: Event) -> None:
         for line in news.lines(event):
-            warn(one_line(line))
+            console.print(one_line(line), highlight=False, markup=False, soft_wrap=True)
 
-    return show
+    return unbroken(show)
 
 
 @contextmanager
@@ -83,35 +89,89 @@ def _live_display(console: "Console") -> Iterator[Listener]:
         console=console,
         transient=True,
     )
-    news = News()
+    state, news = _State(), News()
     with moving(bar):
-        task, note = bar.add_task("starting", total=None, note=""), ""
+        task = bar.add_task("starting", total=None, note="")
 
         def show(event: Event) -> None:
-            nonlocal note
             for line in news.kept(event):
                 bar.console.print(one_line(line), highlight=False, markup=False)
-            match event:
-                case RunStarted():
-                    names = ", ".join(problem.name for problem in event.problems)
-                    title = one_line(f"{names}, {event.engines[0]}")
-                    bar.update(task, description=title, total=event.budget.simulations)
-                case Evaluated():
-                    bar.update(task, completed=event.spent.simulations)
-                    note = news.better(event) or note or "no successful simulation yet"
-                case Exchanged():
-                    note = f"LLM replied, {event.spent.tokens} tokens so far"
-                case Confirmed():
-                    note = f"violation {event.confirmation.outcome}"
-                case _:
-                    return
-            bar.update(task, note=note)
+            if state.follow(event, news):
+                bar.update(
+                    task, description=state.title, total=state.total, completed=state.done, note=state.note
+                )
 
         def tell(_name: str, reached: float, stop_time: float) -> None:
             bar.update(task, note=f"simulated {reached:.4g} of {stop_time:g} s")
 
         with watching(tell):
             yield unbroken(show)
+
+
+class _NotebookDisplay:
+    """Shows a run as one line below the cell and updates it in place.
+
+    It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
+    """
+
+    def __init__(self) -> None:
+        self._handle: Any = None
+        self._state, self._news = _State(), News()
+
+    def __call__(self, event: Event) -> None:
+        """Update the line."""
+        if isinstance(event, RunStarted):
+            self._handle, self._state, self._news = None, _State(), News()
+        tuple(self._news.kept(event))  # there is no place for it
+        if not self._state.follow(event, self._news):
+            return
+        from IPython.display import HTML, display
+
+        state = self._state
+        bar = el("progress", value=state.done, max=state.total) if state.total else ""
+        count = counted(state.total or state.done, "simulation")
+        of = f" {state.done} of {count}. " if state.total else f" {count}. "
+        line = HTML(join(el("code", state.title), " ", bar, of, state.note))  # type: ignore[no-untyped-call]
+        if self._handle is None:
+            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            self._handle.update(line)
+
+
+@dataclass(slots=True)
+class _State:
+    """What one line says of a run.
+
+    Attributes:
+        title: the requirements and the engine.
+        total: maximum number of simulations; None without a limit.
+        done: number of simulations so far.
+        note: the latest news.
+    """
+
+    title: str = ""
+    total: int | None = None
+    done: int = 0
+    note: str = ""
+
+    def follow(self, event: Event, news: "News") -> bool:
+        """Return whether an event has changed it."""
+        match event:
+            case RunStarted():
+                names = ", ".join(problem.name for problem in event.problems)
+                self.title, self.total = one_line(f"{names}, {event.engines[0]}"), event.budget.simulations
+            case Evaluated():
+                self.done = event.spent.simulations
+                self.note = news.better(event) or self.note or "no successful simulation yet"
+            case Exchanged():
+                self.note = f"LLM replied, {event.spent.tokens} tokens so far"
+            case Confirmed():
+                self.note = f"violation {event.confirmation.outcome}"
+            case RunEnded():
+                self.note = f"{event.status}; {self.note}"
+            case _:
+                return False
+        return True
 
 
 class News:

@@ -78,16 +78,6 @@ def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> Non
     assert again.progress.spent.simulations == stopped.progress.spent.simulations
 
 
-def test_the_file_stop_ends_all_runs_of_a_campaign(tmp_path: Path) -> None:
-    def touch(progress: Progress) -> None:
-        if progress.spent.simulations and not progress.finished:
-            (tmp_path / "c" / "stop").touch()
-
-    ended = run_campaign(request("impossible", budget=100_000), tmp_path / "c", listeners=[touch])
-    assert ended.reason == "stopped by the user"
-    assert not ended.progress.finished and not (tmp_path / "c" / "stop").exists()
-
-
 def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path: Path) -> None:
     wanted = request("impossible", seeds=2, budget=300)
     run_campaign(wanted, tmp_path / "whole")

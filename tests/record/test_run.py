@@ -18,7 +18,7 @@ from falsifier.record import manifest
 from falsifier.record.journal import holds_run
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.events import Evaluated, Event, RunStarted
+from falsifier.search.events import Event, RunStarted
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
 from tests.problems import easy, easy_again, hard, impossible
@@ -192,18 +192,3 @@ def test_a_run_is_resumed_with_the_problems_that_it_searched(tmp_path: Path) -> 
     assert [(r.problem.name, r.spent.simulations) for r in resumed] == [("loose", 3), ("wide", 3)]
     with pytest.raises(JournalError, match="searched wide: give all of them"):
         resume(tmp_path / "two", problems=apart[:1])
-
-
-def test_the_file_stop_ends_a_run_that_can_be_resumed(tmp_path: Path) -> None:
-    steps = []
-
-    def touch(event: Event) -> None:
-        if isinstance(event, Evaluated):
-            steps.append(event.index)
-            if event.index == 1:
-                (tmp_path / "stop").touch()
-
-    result = falsify(impossible(), "uniform", budget=100_000, directory=tmp_path, listeners=[touch])
-    assert (result.status, result.reason) == ("interrupted", "stopped by the user")
-    (again,) = resume(tmp_path, problems=[impossible()], budget=len(steps) + 1)
-    assert again.status == "not falsified"

@@ -24,4 +24,11 @@ async function look() {
   setTimeout(look, wait);
 }
 
+document.addEventListener("click", (event) => {
+  const button = event.target.closest("button[data-token]");
+  if (button) {
+    button.disabled = true;
+    fetch("stop", { method: "POST", headers: { "X-Token": button.dataset.token } });
+  }
+});
 look();

@@ -15,6 +15,7 @@ from functools import partial
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
+from secrets import compare_digest, token_urlsafe
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from falsifier.campaigns.runs import unread_runs
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.llm.messages import Exchange
+from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
 from falsifier.record.summary import RunFollower
 from falsifier.stl.margins import signed
@@ -90,13 +92,15 @@ class Watch:
 
     Args:
         directory: a run, a campaign, or a folder of runs.
+        token: what a stop must name; empty: the page has no button for it.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.
     """
 
-    def __init__(self, directory: Path) -> None:
+    def __init__(self, directory: Path, token: str = "") -> None:
         self.directory = directory
+        self.token = token
         self._watched: dict[Path, _Watched] = {}
         run_directories(directory)  # raises if there is nothing to watch
         self._follower = Follower(directory) if is_campaign(directory) else None
@@ -118,20 +122,31 @@ class Watch:
             chosen = next(iter([*running, *places]), "")
         if len(places) > 1 or rows:
             parts.append(_choice(places, rows, chosen))
-        if not chosen:
-            return join(*parts), False
-        place, seconds = places[chosen], _READING_ON
-        if place not in self._watched:
-            seconds = _READING
-            # one at a time is in memory
-            self._watched = {place: _Watched(RunFollower(place, unread_runs(place)))}
-        watched = self._watched[place]
-        watched.read(monotonic() + seconds)
-        working = is_worked_on(self.directory) or is_worked_on(place)
-        state = "reading the journal" if watched.is_behind else "running" if working else "not running"
-        parts.append(el("p", f"{place.name}: {state}.", class_="result"))
-        parts += [_run_html(run, watched) for run in watched.run.summaries]
-        return join(*parts), watched.is_behind
+        behind = False
+        if chosen:
+            place = places[chosen]
+            seconds = _READING_ON
+            if place not in self._watched:
+                seconds = _READING
+                run = RunFollower(place, unread_runs(place))
+                self._watched = {place: _Watched(run)}  # one at a time is in memory
+            watched = self._watched[place]
+            watched.read(monotonic() + seconds)
+            behind = watched.is_behind
+            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.run.summaries)]
+        return join(*parts), behind
+
+    def stop(self) -> None:
+        """Ask the process that works here to stop as after Ctrl-C: it looks for this file."""
+        (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
+
+    def _state(self, watched: _Watched) -> Html:
+        working = is_worked_on(self.directory) or is_worked_on(watched.run.directory)
+        text = "reading the journal" if watched.is_behind else "running" if working else "not running"
+        button = (
+            el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
+        )
+        return el("p", f"{watched.run.directory.name}: {text}. ", button, class_="result", id="state")
 
 
 def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
@@ -185,15 +200,19 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     return card_html(section_of(run.requirement, {run.method.label: [run]}, shown), more=more)
 
 
+def page(title: str) -> str:
+    """Return the page, whose script fetches its content."""
+    script = files("falsifier.views.report").joinpath("watch.js").read_text(encoding="utf-8")
+    header = el("header", el("h1", title))
+    return document(f"falsifier: {title}", header, el("main", "Reading ...", id="live"), script=script)
+
+
 def application(watch: Watch) -> "Application":
     """Return the pages as an application of aiohttp."""
     from aiohttp import web
 
-    name, lock = watch.directory.resolve().name, asyncio.Lock()
-    # The page's script fetches its content.
-    script = files("falsifier.views.report").joinpath("watch.js").read_text(encoding="utf-8")
-    header, main = el("header", el("h1", name)), el("main", "Reading ...", id="live")
-    page = document(f"falsifier: {name}", header, main, script=script)
+    name = watch.directory.resolve().name
+    lock = asyncio.Lock()
 
     @web.middleware
     async def from_here(request: "Request", handler: Callable[["Request"], Any]) -> "StreamResponse":
@@ -204,7 +223,7 @@ def application(watch: Watch) -> "Application":
         return answer
 
     async def whole(_: "Request") -> "Response":
-        return web.Response(text=page, content_type="text/html")
+        return web.Response(text=page(name), content_type="text/html")
 
     async def live(request: "Request") -> "StreamResponse":
         async with lock:  # figures are drawn one at a time, beside the loop that answers
@@ -215,25 +234,35 @@ def application(watch: Watch) -> "Application":
             return web.Response(status=304, headers=headers)
         return web.Response(text=text, content_type="text/html", headers=headers)
 
+    async def stop(request: "Request") -> "Response":
+        if not watch.token or not compare_digest(request.headers.get("X-Token", ""), watch.token):
+            raise web.HTTPForbidden(text="stopping was not allowed: falsifier watch --page --allow-stop")
+        watch.stop()
+        return web.Response(text="stopping")
+
     made = web.Application(middlewares=[from_here])
     made.router.add_get("/", whole)
     made.router.add_get("/live", live)
+    made.router.add_post("/stop", stop)
     return made
 
 
-async def serve(directory: Path, *, announce: Callable[[str], None]) -> None:
+async def serve(directory: Path, *, announce: Callable[[str], None], allow_stop: bool = False) -> None:
     """Serve the page of a directory on 127.0.0.1 until this is cancelled.
 
     Args:
         directory: a run, a campaign, or a folder of runs.
         announce: called with the page's address, which has a free port.
+        allow_stop: whether the page has a button that stops the run or campaign.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.
     """
     from aiohttp import web
 
-    runner = web.AppRunner(application(Watch(directory)), access_log=None)
+    runner = web.AppRunner(
+        application(Watch(directory, token_urlsafe() if allow_stop else "")), access_log=None
+    )
     await runner.setup()
     try:
         site = web.TCPSite(runner, "127.0.0.1", 0)

@@ -1,4 +1,4 @@
-"""The page that follows runs: its content and its server."""
+"""The page that follows runs: its content, its server, and the stop that it may ask for."""
 
 import asyncio
 import re
@@ -11,24 +11,27 @@ from threading import Thread
 
 import pytest
 
+from falsifier.campaigns import Progress, run_campaign
 from falsifier.errors import JournalError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
+from falsifier.testing import lag_problem
 from falsifier.views.html import Html
 from falsifier.views.report import watch as module
 from falsifier.views.report.watch import Watch, serve
+from tests.campaigns.support import request, work_in_threads
 from tests.patience import HANG
 from tests.problems import hard, impossible
 from tests.views.chromium import chromium, needs_chromium
 
 
 @contextmanager
-def served(directory: Path) -> Iterator[int]:
+def served(directory: Path, *, allow_stop: bool = False) -> Iterator[int]:
     """Serve the page in a thread; yield its port."""
     told: Queue[str] = Queue()
     loop = asyncio.new_event_loop()
-    task = loop.create_task(serve(directory, announce=told.put))
+    task = loop.create_task(serve(directory, announce=told.put, allow_stop=allow_stop))
 
     def work() -> None:
         with pytest.raises(asyncio.CancelledError):
@@ -44,9 +47,9 @@ def served(directory: Path) -> Iterator[int]:
         thread.join()
 
 
-def asked(port: int, path: str, **headers: str) -> HTTPResponse:
+def asked(port: int, path: str, method: str = "GET", **headers: str) -> HTTPResponse:
     connection = HTTPConnection("127.0.0.1", port, timeout=HANG)
-    connection.request("GET", path, headers={name.replace("_", "-"): v for name, v in headers.items()})
+    connection.request(method, path, headers={name.replace("_", "-"): v for name, v in headers.items()})
     return connection.getresponse()
 
 
@@ -58,7 +61,7 @@ def test_a_run_is_shown_as_in_its_report_with_how_the_search_goes(tmp_path: Path
     for title in ("Robustness over simulations", "What was tried", "What it costs"):
         assert f"<h3>{title}</h3>" in text
     assert text.count("data:image/svg+xml") == 3
-    assert "not running" in text
+    assert "not running" in text and "<button" not in text
 
 
 def test_what_a_model_was_asked_last_is_shown(tmp_path: Path) -> None:
@@ -126,6 +129,40 @@ def test_the_page_is_served_to_this_machine_and_what_has_not_changed_is_not_sent
         assert (first.status, 'class="card violated"' in first.read().decode()) == (200, True)
         assert asked(port, "/live", If_None_Match=first.headers["ETag"]).status == 304
         assert asked(port, "/live", Host="evil.example").status == 403
+        assert asked(port, "/stop", "POST").status == 403
+
+
+def test_a_stop_needs_the_pages_token_and_ends_a_run_that_can_be_resumed(tmp_path: Path) -> None:
+    watch, steps = Watch, []
+
+    def press(event: Event) -> None:
+        if isinstance(event, Evaluated):
+            steps.append(event.index)
+            if event.index == 1:
+                with served(tmp_path / "run", allow_stop=True) as port:
+                    token = re.search(r'data-token="([^"]*)"', asked(port, "/live").read().decode())
+                    assert token is not None
+                    assert asked(port, "/stop", "POST", X_Token="wrong").status == 403
+                    assert asked(port, "/stop", "POST", X_Token=token[1]).status == 200
+
+    problem = lag_problem("G[0,10] (x <= 2)", name="LONG")
+    result = falsify(problem, "uniform", budget=100_000, directory=tmp_path / "run", listeners=[press])
+    assert (result.status, result.reason) == ("interrupted", "stopped by the user")
+    assert "<button" not in watch(tmp_path / "run", token="t").look()[0], "nothing is left to stop"
+    (again,) = resume(tmp_path / "run", problems=[problem], budget=len(steps) + 1)
+    assert again.status == "not falsified"
+
+
+def test_a_stop_of_a_campaign_ends_all_its_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    work_in_threads(monkeypatch)
+
+    def press(progress: Progress) -> None:
+        if progress.spent.simulations and not progress.finished:
+            Watch(tmp_path / "c", token="t").stop()
+
+    ended = run_campaign(request("impossible", budget=100_000), tmp_path / "c", listeners=[press])
+    assert ended.reason == "stopped on the watch page"
+    assert not ended.progress.finished and not (tmp_path / "c" / "stop").exists()
 
 
 @needs_chromium
