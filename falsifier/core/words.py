@@ -36,7 +36,7 @@ def signal_text(signal: Signal) -> str:
     Switches and dwell help the reader judge whether the signal is plausible on the real system.
 
     >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"))
-    'constant: 100 at 0 s, 0 at 2.5 s (1 switch)'
+    'held: 100 at 0 s, 0 at 2.5 s (1 switch)'
     >>> signal_text(Signal((0.0,), (3.0,)))
     'constant 3'
     """
@@ -48,7 +48,8 @@ def signal_text(signal: Signal) -> str:
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
     dwell = signal.shortest_dwell
     lively = "" if dwell is None else f", shortest dwell {dwell:.4g} s"
-    return f"{signal.interpolation}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"
+    form = "held" if signal.interpolation == "constant" else signal.interpolation
+    return f"{form}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"
 
 
 def parameterization_text(r: InputRange) -> str:

@@ -83,6 +83,6 @@ def test_inputs_come_first_with_the_units_of_the_space() -> None:
 def test_a_long_signal_is_cut_in_the_middle_and_says_how_lively_it_is() -> None:
     times = tuple(0.5 * i for i in range(40))
     text = signal_text(Signal(times, tuple(float(i % 2) for i in range(40)), "constant"))
-    assert text.startswith("constant: 0 at 0 s, 1 at 0.5 s")
+    assert text.startswith("held: 0 at 0 s, 1 at 0.5 s")
     assert "... 28 more ..." in text
     assert text.endswith("1 at 19.5 s (39 switches, shortest dwell 0.5 s)")
