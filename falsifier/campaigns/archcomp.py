@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Literal
 
 import numpy as np
@@ -189,7 +190,13 @@ def bundled_problem(requirement: str, instance: str, stop_time: float | None) ->
     Raises:
         SpecError: if there is none of that name, or the stop time is too short for the requirement.
     """
-    return load_problem(bundled_target(requirement), profile=_PROFILES[instance], stop_time=stop_time)
+    try:
+        target = bundled_target(requirement)
+    except SpecError:  # its text lists all names, which would be repeated in each row
+        raise SpecError(
+            f"no bundled requirement {requirement!r}; falsifier check {quote(requirement)} lists them"
+        ) from None
+    return load_problem(target, profile=_PROFILES[instance], stop_time=stop_time)
 
 
 def tolerance(requirement: str) -> float:

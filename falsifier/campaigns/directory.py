@@ -46,6 +46,19 @@ def is_campaign(directory: Path) -> bool:
     return (directory / CAMPAIGN).exists()
 
 
+def check_new(directory: Path) -> None:
+    """Check that no campaign was started in a directory.
+
+    Raises:
+        JournalError: if one was.
+    """
+    if is_campaign(directory):
+        raise JournalError(
+            f"{directory} already contains a campaign: choose another --out, or to continue it: "
+            f"falsifier resume {directory}"
+        )
+
+
 def write_campaign(directory: Path, record: CampaignRecord) -> None:
     """Write campaign.json."""
     write_sealed(directory / CAMPAIGN, record)

@@ -8,7 +8,7 @@ from time import perf_counter
 from falsifier.campaigns.directory import (
     CampaignRecord,
     campaign_lock,
-    is_campaign,
+    check_new,
     read_campaign,
     run_directory,
     write_campaign,
@@ -18,7 +18,7 @@ from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import RunTask, Schedule
 from falsifier.core.arguments import whole
 from falsifier.counterexamples.store import keep_recorded
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import SpecError
 from falsifier.evaluation.workers import open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
@@ -74,11 +74,7 @@ def run_campaign(
     jobs = whole("jobs", jobs, least=1)
     problems = check_request(request)
     with campaign_lock(directory):
-        if is_campaign(directory):
-            raise JournalError(
-                f"{directory} already contains a campaign: choose another --out, or to continue it: "
-                f"falsifier resume {directory}"
-            )
+        check_new(directory)
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         return _work(directory, record, problems, jobs, tuple(listeners))

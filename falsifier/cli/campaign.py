@@ -16,7 +16,7 @@ import click
 from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, cross, run_campaign, suite
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
-from falsifier.campaigns.directory import is_campaign
+from falsifier.campaigns.directory import check_new, is_campaign
 from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.request import Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
@@ -159,8 +159,9 @@ def bench(
         runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget),
         limits=totals,
     )
-    check_request(request)
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
+    check_new(directory)
+    check_request(request)
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
     for method in dict.fromkeys(map(method_of, request.runs)):
         allowed = ", if the spec allows it" if method.parameterization == "free" else ""

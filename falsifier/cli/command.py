@@ -34,7 +34,8 @@ class Command(click.Command):
         """Parse the arguments.
 
         Raises:
-            click.UsageError: if one is empty: as a path it would mean the current folder.
+            click.UsageError: if one is empty: as a path it would mean the current folder; or if a number is
+                none, or beyond its limits.
         """
         for before, given in zip(["", *args], args, strict=False):
             if not given or (given.startswith("--") and given.find("=") == len(given) - 1):
@@ -44,13 +45,27 @@ class Command(click.Command):
                     f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)",
                     ctx,
                 )
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except click.BadParameter as error:
+            expected = _number_text(error.param.type) if error.param else ""
+            if not expected or error.param is None:
+                raise
+            given = error.message.partition(" is not ")[0]  # how click begins what it says of a number
+            raise click.UsageError(f"{error.param.opts[-1]} {given}: expected {expected}", ctx) from None
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options below their headings."""
         for heading, rows in option_groups(self, ctx):
             with formatter.section(heading):
                 formatter.write_dl(rows)
+
+
+def _number_text(kind: "click.ParamType[Any]") -> str:
+    """What an option of this type expects; empty if that is no number."""
+    if isinstance(kind, click.IntRange):
+        return f"a whole number from {kind.min}" + (" on" if kind.max is None else f" to {kind.max}")
+    return {click.INT: "a whole number", click.FLOAT: "a number"}.get(kind, "")
 
 
 def option_groups(command: click.Command, ctx: click.Context) -> list[tuple[str, list[tuple[str, str]]]]:

@@ -50,9 +50,15 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         inputs = {v.name for v in problem.info.inputs}
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
+        signals = {**read, **stored.signals, **constant}
+        if inputs and not signals:
+            warn(
+                f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
+                "values; --inputs u.csv or --set NAME=VALUE gives some"
+            )
         evaluation = simulate_inputs(
             problem,
-            {**read, **stored.signals, **constant},
+            signals,
             {**stored.parameters, **{n: value for n, value in given.items() if n not in inputs}},
         )
     if evaluation.verdict is None:

@@ -232,6 +232,12 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
         SpecError: if it is neither, or every simulation of the run failed.
     """
     if not holds_run(place):
+        if not place.is_dir() and place.suffix.lower() != ".json":
+            found = "" if place.exists() else "no such file; "
+            raise SpecError(
+                f"{place}: {found}expected a CSV file of inputs (u.csv), a counterexample.json or a run "
+                "directory"
+            )
         return Candidate.from_json(load(place).candidate)
     names = manifest.read(place).names
     judged = _judged(place, requirement if requirement in names else names[0])

@@ -109,7 +109,7 @@ def _existing(path: Path, fmu: str, key: str) -> Path:
         )
     found = path.parent / fmu
     if not found.is_file():
-        raise SpecError(f"no such FMU: {found}; give its path relative to the spec file", key=key)
+        raise SpecError(f"no such FMU: {found.resolve()}; give its path relative to the spec file", key=key)
     return found
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
 from falsifier.errors import JournalError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -97,12 +98,15 @@ def exchange_before(records: Iterable[Record], index: int) -> Exchange | None:
         JournalError: if the journal contains no such evaluation.
     """
     last: Exchange | None = None
+    count = 0
     for record in records:
         if isinstance(record, ExchangeRecord):
             last = record.exchange
-        elif isinstance(record, AskedRecord) and 0 <= index - record.first < len(record.candidates):
-            return last
-    raise JournalError(f"the run has no sample {index + 1}")
+        elif isinstance(record, AskedRecord):
+            if 0 <= index - record.first < len(record.candidates):
+                return last
+            count = record.first + len(record.candidates)
+    raise JournalError(f"the run has no sample {index + 1}: it has {counted(count, 'sample')}")
 
 
 def doubtful_confirmations(

@@ -36,7 +36,7 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     no_run = falsifier("llm", "prompt", "AT1", "--at", "1", cwd=tmp_path)
     assert (no_run.code, "AT1: not a run directory" in no_run.err) == (2, True)
     none = falsifier("llm", "prompt", "run", "--at", "3", cwd=tmp_path)
-    assert (none.code, "the run has no sample 3" in none.err) == (2, True)
+    assert (none.code, "the run has no sample 3: it has 2 samples" in none.err) == (2, True)
     both = falsifier("llm", "prompt", "AT1", "--after", "run", "--at", "2", cwd=tmp_path)
     assert (both.code, "--after: --at prints what a run sent" in both.err) == (2, True)
     other = falsifier("llm", "prompt", "CC1", "--after", "run", cwd=tmp_path)

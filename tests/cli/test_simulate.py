@@ -46,7 +46,7 @@ def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tm
         requirements.R.formula = 'G (y <= 5)'
     """)
     done = falsifier("simulate", "lag.toml", "--json", cwd=tmp_path)
-    assert done.code == 0, done.err
+    assert done.code == 0 and "R: no inputs given" in done.err, done.err
     alone = falsifier("simulate", str(lag), "--stl", "G[0,1] (y <= 5)", "--json", cwd=tmp_path)
     assert alone.code == 0 and alone.json["robustness"] > done.json["robustness"], alone.err
     searched = falsifier("check", "lag.toml", cwd=tmp_path)
@@ -67,6 +67,7 @@ def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
         ([EASY, "--set", "u=high"], "options cannot change"),
         ([EASY, "--set", "w=1"], "no parameter 'w'"),
         ([EASY, "--inputs", "none.csv"], "none.csv"),
+        ([EASY, "--inputs", __file__], "expected a CSV file of inputs"),
         (["python:tests.problems:unusable", "--set", "u=1"], "out of order"),
     ],
 )
