@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.campaigns.archcomp import COLUMNS, export, read_rows, tolerance, validate
+from falsifier.campaigns.archcomp import COLUMNS, bundled_problem, export, read_rows, tolerance, validate
 from falsifier.errors import SpecError
 from falsifier.problem.problem import Problem
 from tests import problems
@@ -121,3 +121,9 @@ def test_another_tools_counterexample_of_the_bundled_transmission_holds(tmp_path
     (finding,) = validate(read_rows(rows(tmp_path, line)))
     assert finding.holds
     assert finding.reason == "reproduced"
+
+
+def test_an_unknown_requirement_is_named_without_the_list_of_all() -> None:
+    with pytest.raises(SpecError, match="no bundled requirement 'XX1'") as raised:
+        bundled_problem("XX1", "1", None)
+    assert "AT1" not in str(raised.value)

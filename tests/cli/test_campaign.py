@@ -157,3 +157,10 @@ def test_a_campaign_as_a_user_starts_it(tmp_path: Path) -> None:
     again = falsifier("bench", HARD, "--engine", "corners", "--out", "c", cwd=tmp_path)
     assert again.code == 2
     assert "falsifier resume c" in again.err
+
+
+def test_a_used_directory_is_refused_before_progress_is_told(command: Any) -> None:
+    assert "4 runs in used" in bench(command, "--out", "used").output
+    again = bench(command, "--out", "used")
+    assert "already contains a campaign" in str(again.exception)
+    assert "runs in used" not in again.output
