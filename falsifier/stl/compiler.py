@@ -49,21 +49,20 @@ _NEGATION = op.scaled(-1.0)
 _CONNECTIVES: dict[type[Formula], op.Function] = {Not: _NEGATION, And: np.minimum, Or: np.maximum}
 
 
-def compile_formula(formula: Formula, *, step: float, samples: int, first: int = 0, last: int = 0) -> Program:
+def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 0) -> Program:
     """Compile a formula for trajectories on one time grid.
 
     Args:
         formula: the formula.
         step: sampling step in s.
         samples: number of samples of a trajectory.
-        first: first sample at which the formula's robustness is needed.
-        last: last sample at which it is needed.
+        last: last sample at which the formula's robustness is needed; the first one is 0.
 
     Raises:
         FormulaError: naming the window that ends after the trajectory or is not a multiple of the step.
     """
     compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
-    compiler.demand(formula, first, last)
+    compiler.demand(formula, 0, last)
     compiler.place(formula)
     return Program(
         compiler.part(formula),

@@ -162,24 +162,6 @@ class Monitor:
             raise FormulaError(f"{part} is no part of {self.formula}")
         return min(p.first for p in places) * self.step, max(p.last for p in places) * self.step
 
-    def robustness(self, trajectory: Trajectory, time: float = 0.0) -> dict[Formula, float]:
-        """Return the robustness of every distinct sub-formula at one time in s.
-
-        Sub-formulas whose windows extend past the end from that time are omitted; at time 0 there are none.
-
-        Raises:
-            MonitorError: if the trajectory cannot be evaluated or the time is outside it.
-        """
-        sample = round(time / self.step)
-        if not 0 <= sample < self.samples:
-            end = (self.samples - 1) * self.step
-            raise MonitorError(f"{time:g} s is outside the trajectory, which ends at {end:g} s")
-        result: dict[Formula, float] = {}
-        for part in dict.fromkeys(self.formula.walk()):
-            if sample + self._reach(part) < self.samples:
-                result[part] = self._values(part, trajectory, sample, sample).item(0)
-        return result
-
     def course(self, trajectory: Trajectory, part: Formula | None = None) -> NDArray[np.float64]:
         """Return the robustness over time of a sub-formula, or of the whole formula.
 
@@ -191,7 +173,10 @@ class Monitor:
             MonitorError: if the trajectory cannot be evaluated.
         """
         part = self.formula if part is None else part
-        return self._values(part, trajectory, 0, self.samples - 1 - self._reach(part))
+        last = self.samples - 1 - round(part.horizon(self.step) / self.step)
+        program = compile_formula(part, step=self.step, samples=self.samples, last=last)
+        buffer = fill(program, trajectory, np.empty(program.size))
+        return program.root.over(buffer, 0, last).copy()
 
     def batch(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
         """Return the robustness at time 0 of many trajectories at once.
@@ -209,14 +194,6 @@ class Monitor:
 
     def _take_buffer(self) -> NDArray[np.float64]:
         return self._spare.pop() if self._spare else np.empty(self._program.size)
-
-    def _reach(self, part: Formula) -> int:
-        return round(part.horizon(self.step) / self.step)
-
-    def _values(self, part: Formula, trajectory: Trajectory, first: int, last: int) -> NDArray[np.float64]:
-        program = compile_formula(part, step=self.step, samples=self.samples, first=first, last=last)
-        buffer = fill(program, trajectory, np.empty(program.size))
-        return program.root.over(buffer, first, last).copy()
 
 
 def _watched(root: Part) -> Iterator[tuple[Formula, Part]]:

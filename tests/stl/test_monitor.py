@@ -199,7 +199,7 @@ def test_bounds_are_counted_in_steps_without_rounding_errors(step: float) -> Non
 )
 def test_bad_trajectories_are_errors_and_never_a_number(t: Trajectory, message: str) -> None:
     monitor = Monitor(parse("G[0,1] (x <= 3)"), 1.0, 3)
-    for ask in (monitor.evaluate, monitor.diagnose, monitor.robustness, monitor.course):
+    for ask in (monitor.evaluate, monitor.diagnose, monitor.extremes, monitor.course):
         with pytest.raises(MonitorError, match=message):
             ask(t)
 
@@ -221,23 +221,6 @@ def test_predicates_outside_their_domain_are_errors(text: str) -> None:
 
 
 # -- sub-formulas, batches, other kinds of columns -----------------------------------------------------------
-
-
-def test_robustness_of_every_sub_formula() -> None:
-    t = trajectory(x=X, y=Y)
-    formula = parse("G[1,2] (x <= 4) -> F[0,3] (y >= 8)")
-    values = Monitor(formula, 1.0, 5).robustness(t)
-    assert {str(f): v for f, v in values.items()} == {
-        str(formula): ON_LIMIT,
-        "G[1,2] (x <= 4)": ON_LIMIT,
-        "x <= 4": 1.0,
-        "F[0,3] (y >= 8)": ON_LIMIT,
-        "y >= 8": -6.0,
-    }
-    later = Monitor(formula, 1.0, 5).robustness(t, time=3.0)
-    assert {str(f): v for f, v in later.items()} == {"x <= 4": 3.0, "y >= 8": ON_LIMIT}
-    with pytest.raises(MonitorError, match="outside"):
-        Monitor(formula, 1.0, 5).robustness(t, time=9.0)
 
 
 @pytest.mark.parametrize("seed", range(60))

@@ -163,11 +163,12 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
         if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
             continue
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
-        found = monitor.robustness(trajectory, step.time)
+        sample = round(step.time / monitor.step)
+        courses = ((side, monitor.course(trajectory, side)) for side in sides)
         words = (
-            f"{side} robustness {signed(found[side], 4)}{_scale(view, side)}"
-            for side in sides
-            if side in found
+            f"{side} robustness {signed(course.item(sample), 4)}{_scale(view, side)}"
+            for side, course in courses
+            if sample < len(course)
         )
         yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
 
