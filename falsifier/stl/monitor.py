@@ -151,17 +151,6 @@ class Monitor:
         self._spare.append(buffer)
         return found
 
-    def window(self, part: Formula) -> tuple[float, float]:
-        """Return the first and last time in s at which a sub-formula matters to the robustness at time 0.
-
-        Raises:
-            FormulaError: if it is no part of the formula.
-        """
-        places = [found.place for found in self._program.root.walk() if found.formula == part]
-        if not places:
-            raise FormulaError(f"{part} is no part of {self.formula}")
-        return min(p.first for p in places) * self.step, max(p.last for p in places) * self.step
-
     def course(self, trajectory: Trajectory, part: Formula | None = None) -> NDArray[np.float64]:
         """Return the robustness over time of a sub-formula, or of the whole formula.
 
@@ -177,6 +166,25 @@ class Monitor:
         program = compile_formula(part, step=self.step, samples=self.samples, last=last)
         buffer = fill(program, trajectory, np.empty(program.size))
         return program.root.over(buffer, 0, last).copy()
+
+    def courses(self, trajectory: Trajectory) -> dict[Formula, NDArray[np.float64]]:
+        """Return the robustness over time of every distinct sub-formula, where it matters to that at time 0.
+
+        Returns:
+            One value per sample, shape (samples,) each; NaN at times at which it does not matter, where it
+            may have no value.
+
+        Raises:
+            MonitorError: if the trajectory cannot be evaluated.
+        """
+        buffer = fill(self._program, trajectory, self._take_buffer())
+        found = {}
+        for part in self._program.root.walk():
+            first, last = max(part.place.first, 0), part.place.last  # X has the place of its operand
+            found[part.formula] = np.full(self.samples, np.nan)
+            found[part.formula][first : last + 1] = part.over(buffer, first, last)
+        self._spare.append(buffer)
+        return found
 
     def batch(self, columns: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
         """Return the robustness at time 0 of many trajectories at once.

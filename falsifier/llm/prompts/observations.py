@@ -81,9 +81,10 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     monitor = monitor_for(view)
     diagnosis = monitor.diagnose(trajectory)
     reasons = tuple(_reasons(verdict, diagnosis))
-    parts = tuple(_parts(view, monitor, diagnosis, trajectory))
+    over_time = monitor.courses(trajectory)
+    parts = tuple(_parts(view, diagnosis, over_time))
     there = _values_there(view, trajectory, diagnosis)
-    predicates = _predicates(view, monitor, diagnosis, trajectory)
+    predicates = _predicates(view, diagnosis, trajectory, over_time)
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
     courses = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
@@ -153,7 +154,7 @@ def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
     return Monitor(formula, step=step, samples=samples)
 
 
-def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
+def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
     """Robustness of both sides of every connective on the path to the deciding predicate."""
     above: type[Formula] | None = None
     for step in diagnosis.path:
@@ -163,12 +164,10 @@ def _parts(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Traje
         if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
             continue
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
-        sample = round(step.time / monitor.step)
-        courses = ((side, monitor.course(trajectory, side)) for side in sides)
+        sample = round(step.time / view.experiment.output_interval)
         words = (
-            f"{side} robustness {signed(course.item(sample), 4)}{_scale(view, side)}"
-            for side, course in courses
-            if sample < len(course)
+            f"{side} robustness {signed(over_time[side].item(sample), 4)}{_scale(view, side)}"
+            for side in sides
         )
         yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
 
@@ -179,16 +178,18 @@ def _scale(view: View, part: Formula) -> str:
     return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
 
 
-def _predicates(view: View, monitor: Monitor, diagnosis: Diagnosis, trajectory: Trajectory) -> Iterator[str]:
+def _predicates(
+    view: View, diagnosis: Diagnosis, trajectory: Trajectory, over_time: Mapping[Formula, Array]
+) -> Iterator[str]:
     """When each predicate was false, among the times at which the requirement asks for it.
 
     Of the one that decided without being false all is told by then.
     """
     clock, step = _clock(view), trajectory.step
     for predicate in view.requirement.formula.predicates:
-        start, end = monitor.window(predicate)
-        asked = slice(round(start / step), round(end / step) + 1)
-        margin, times = monitor.course(trajectory, predicate)[asked], trajectory.times[asked]
+        asked = ~np.isnan(over_time[predicate])
+        margin, times = over_time[predicate][asked], trajectory.times[asked]
+        start, end = float(times[0]), float(times[-1])
         wrong = margin < 0
         stretch = longest_stretch(times, wrong)
         near = int(np.abs(margin).argmin())

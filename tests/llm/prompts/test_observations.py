@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
+from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.prompts.observations import monitor_for, observed
 from falsifier.llm.prompts.view import View
@@ -112,3 +113,13 @@ def test_without_a_trajectory_there_is_the_verdict_alone() -> None:
     bare = Evaluation(found.candidate, "ok", found.verdict)
     assert facts(View.of(problem), bare) == ["decided at t = 10 s by x <= 0.9"]
     assert observed(View.of(problem), found).line == "decided at t = 10 s by x <= 0.9"
+
+
+def test_a_part_that_has_no_value_where_it_does_not_matter_is_told_where_it_does() -> None:
+    problem = lag_problem("G[0,0.5] (sqrt(x + 0.2) <= 9 or x >= 0) and x <= 3")
+    engine, view = make_engine("corners", problem, seed=0), View.of(problem)
+    seen = [evaluate(problem, *engine.ask()) for _ in range(12)]
+    judged = [e for e in seen if e.trajectory is not None]
+    assert any((e.trajectory["x"] < -0.2).any() for e in judged if e.trajectory is not None)
+    for evaluation in judged:
+        assert any("sqrt(x + 0.2) <= 9, from 0 to 0.5 s" in line for line in observed(view, evaluation).full)
