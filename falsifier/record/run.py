@@ -13,7 +13,7 @@ from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
-from falsifier.engines.protocol import KNOWN, AsksLLM, Engine
+from falsifier.engines.protocol import KNOWN, Engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -307,7 +307,6 @@ def carry_out(
             known=known,
             steps=steps,
             jobs=request.jobs,
-            in_batches=any(isinstance(each, AsksLLM) for each in engines),
             searched=searched_space(problems[0].space, request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,

@@ -41,7 +41,6 @@ def search(
     known: Sequence[Candidate] = (),
     steps: Steps | None = None,
     jobs: int = 1,
-    in_batches: bool = False,
     searched: SearchSpace | None = None,
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
@@ -60,8 +59,6 @@ def search(
         known: candidates that are simulated first, before any engine is asked; they count.
         steps: how to ask, simulate and confirm; default: everything in this process.
         jobs: number of simulations at a time.
-        in_batches: whether an engine is asked for that many candidates at once, because each question costs;
-            otherwise it is asked for one whenever a simulation has ended.
         searched: the part of the search space that the engines use; default: all of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
@@ -93,7 +90,7 @@ def search(
     status: ResultStatus
     try:
         loop.attach()
-        reason = loop.run(jobs, in_batches=in_batches)
+        reason = loop.run(jobs)
         status, reason = loop.concluded(reason)
     except KeyboardInterrupt:
         status, reason = "interrupted", "stopped by the user"
@@ -159,7 +156,7 @@ class _Loop:
             if isinstance(state.engine, FollowsRun):
                 state.engine.begin(self.budget.simulations)
 
-    def run(self, jobs: int, *, in_batches: bool) -> str:
+    def run(self, jobs: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
             RunStarted(
@@ -171,7 +168,7 @@ class _Loop:
             )
         )
         while standing := [state for state in self.states if state.counterexample is None]:
-            wanted = self.wanted(jobs, in_batches=in_batches)
+            wanted = self.wanted(jobs)
             if not wanted:
                 self.settle(*self.waiting.popleft(), standing)
                 continue
@@ -195,12 +192,14 @@ class _Loop:
             spent = replace(spent, seconds=0.0)
         return self.budget.exceeded(spent)
 
-    def wanted(self, jobs: int, *, in_batches: bool) -> int:
+    def wanted(self, jobs: int) -> int:
         """Return the number of candidates to ask for now; 0: wait for the oldest simulation first.
 
         It depends on counts alone: a run depends on its seed and the number of jobs, not on the clock, and a
         resumed run repeats it.
         """
+        # Each question costs: a language model is asked for as many candidates as are simulated at a time.
+        in_batches = self.asks_llm
         waiting, limit = len(self.waiting), self.budget.simulations
         left = jobs if limit is None else limit - self.count - waiting
         if waiting and (left <= 0 or waiting >= (1 if in_batches else jobs)):
@@ -217,12 +216,16 @@ class _Loop:
             return "failed", self.failure_text()
         if self.last_defect and not self.is_answered:
             reason = f"{reason}; the language model gave no usable answer: {self.last_defect}"
-        asks = any(isinstance(state.engine, AsksLLM) for state in self.states)
-        stand_ins = (KNOWN, RANDOM_CHANGE) if asks and not self.is_answered else ()
+        stand_ins = (KNOWN, RANDOM_CHANGE) if self.asks_llm and not self.is_answered else ()
         evaluations = (evaluation for state in self.states for evaluation in state.evaluations)
         if all(evaluation.candidate.origin in stand_ins for evaluation in evaluations):
             return "failed", reason if self.count else f"{reason}; nothing was simulated"
         return "not falsified", reason
+
+    @property
+    def asks_llm(self) -> bool:
+        """Whether an engine asks a language model."""
+        return any(isinstance(state.engine, AsksLLM) for state in self.states)
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
