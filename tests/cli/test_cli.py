@@ -16,8 +16,8 @@ from tests.command import ROOT, falsifier
     [
         (["run", "AT1", "--stl", "G[0,20] (sped <= 120)"], "did you mean 'speed'"),
         (["run", "AT1", "--search", "throtle=0:100:7"], "did you mean 'throttle'"),
-        (["run", "AT1", "--budget", "0"], "'--budget': 0 is not in the range 1<="),
-        (["check", "AT1", "--budget", "-1"], "'--budget': -1 is not in the range 0<="),
+        (["run", "AT1", "--budget", "0"], "--budget 0: expected a whole number from 1 to"),
+        (["check", "AT1", "--budget", "-1"], "--budget -1: expected a whole number from 0 to"),
         (["init", ""], "an argument is empty"),
         (["run", "AT1", "--out", ""], "--out: the value is empty"),
         (["run", "AT1:R1"], "no requirement 'R1': AT1 is itself a requirement, of AT"),
