@@ -67,7 +67,7 @@ def variant_option(*, multiple: bool = False) -> Decorator:
 api_base_option = click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
 
 
-anonymous_option = click.option("--anonymous", is_flag=True, help="Use neutral names and scales in prompts.")
+anonymous_option = click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")
 
 
 llm_option_option = click.option(

@@ -1,7 +1,7 @@
 """What a language model is told of a search, and the form of its answers; ``preview`` shows it unasked."""
 
 import re
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from functools import cached_property
 
 from falsifier.context.values import NOTHING
@@ -28,7 +28,7 @@ _WORD = re.compile(r"[^\W\d]\w*")
 class Briefing:
     """What a language model (LLM) knows of a search. It never gets the model.
 
-    Candidates and samples are kept as they are told: with neutral names and scales if it is anonymous.
+    Candidates and samples are kept as they are told: with neutral names if it is anonymous.
 
     For the arguments see ``LLMEngine``.
 
@@ -80,10 +80,6 @@ class Briefing:
         """Return a candidate as it can be simulated, from how it is told."""
         return self._disguise.revealed(candidate) if self._disguise else candidate
 
-    def canonical(self, candidate: Candidate) -> Candidate:
-        """Return a candidate as it will be told once it was simulated, from how it was proposed."""
-        return self._disguise.canonical(candidate) if self._disguise else candidate
-
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
         told = self.hidden(candidate)
@@ -120,27 +116,21 @@ class Briefing:
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
-        verdict, disguise = confirmation.evaluation.verdict, self._disguise
-
-        def shown(robustness: float) -> float:
-            return disguise.hidden_robustness(verdict, robustness) if disguise and verdict else robustness
-
-        self._doubts[self.hidden(confirmation.candidate).key] = in_doubt(confirmation, shown)
+        self._doubts[self.hidden(confirmation.candidate).key] = in_doubt(confirmation)
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add samples, whoever proposed their candidates."""
-        questions = self._questions  # first: values at time 0 determine scales before trajectories do
-        if self._disguise:
-            self._disguise = disguise = self._disguise.fitted(evaluations)
-            evaluations = [disguise.hidden(e) for e in evaluations]
-            questions.view = disguise.view
         for evaluation in evaluations:
+            if self._disguise:
+                evaluation = self._disguise.hidden(evaluation)
             key = evaluation.candidate.key
             self.told += 1
             self.numbers[key] = self.told
             if evaluation.robustness is not None and evaluation.robustness < self._smallest:
                 self._smallest, self.best = evaluation.robustness, evaluation.candidate
-            questions.tell(evaluation, doubt=self._doubts.get(key, ""), why=self.rationales.get(key, ""))
+            self._questions.tell(
+                evaluation, doubt=self._doubts.get(key, ""), why=self.rationales.get(key, "")
+            )
         self.pending = [c for c in self.pending if c.key not in self.numbers]
 
     def question(self, count: int, notes: Sequence[str] = ()) -> tuple[Message, ...]:
@@ -152,9 +142,8 @@ class Briefing:
     @cached_property
     def _questions(self) -> Questions:
         """Made when it is first needed, because the FMU is initialised for the outputs at time 0."""
-        start = start_values(self._problem) if self._disguise or self.variant.has("circumstances") else {}
+        start = start_values(self._problem) if self.variant.has("circumstances") else {}
         if self._disguise:
-            self._disguise = Disguise.of(self._view, start)
             start = self._disguise.hidden_values(start)
         return Questions(self.view, self.variant, start=start, llm=self._llm)
 
@@ -224,27 +213,24 @@ def preview(
     return briefing.question(1)
 
 
-def in_doubt(confirmation: Confirmation, shown: Callable[[float], float] = float) -> str:
-    """Why a violation does not count, without any name, and what would count.
-
-    ``shown`` turns a robustness into the number that is told.
-    """
+def in_doubt(confirmation: Confirmation) -> str:
+    """Why a violation does not count, without any name, and what would count."""
     found, robustness = confirmation.evaluation.robustness, confirmation.robustness
     halved, reference = confirmation.halved, confirmation.reference
     again: float | None = None
     if robustness is None:
         why = "a second simulation of it failed"
     elif robustness >= 0:
-        again, why = robustness, f"a second simulation gave robustness {signed(shown(robustness), 3)}"
+        again, why = robustness, f"a second simulation gave robustness {signed(robustness, 3)}"
     elif halved is not None and halved >= 0:
-        again, why = halved, f"at half the simulation step its robustness is {signed(shown(halved), 3)}"
+        again, why = halved, f"at half the simulation step its robustness is {signed(halved, 3)}"
     else:
         why = "a second monitor does not confirm it"
         if reference is not None:
-            why += f", {signed(shown(reference), 3)} instead of {signed(shown(robustness), 3)}"
+            why += f", {signed(reference, 3)} instead of {signed(robustness, 3)}"
     text = f"this does not count as a violation, it is {confirmation.outcome}: {why}"
     if again is None:
         return text
     assert found is not None, "a violation has a robustness"
-    error = f"{shown(again) - shown(found):.2g}"
+    error = f"{again - found:.2g}"
     return f"{text}. Find one that is clearer: below 0 by more than {error}, the error of the simulation"

@@ -157,7 +157,7 @@ class LLMEngine:
         """Return what is simulated in place of an answer."""
         briefing = self.briefing
         seed = (self._sample, briefing.told, len(briefing.pending))
-        changed = briefing.canonical(random_change(briefing.view.space, briefing.best, seed=seed))
+        changed = random_change(briefing.view.space, briefing.best, seed=seed)
         what = "a random change of the best sample" if briefing.best else "a random sample"
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"
         changed = replace(changed, origin=RANDOM_CHANGE, rationale=rationale)
@@ -169,19 +169,18 @@ class LLMEngine:
         return real
 
     def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:
-        """Return the new ones of the proposed candidates, as they will be told.
+        """Return the new ones of the proposed candidates.
 
         Raises:
             RejectedReplyError: if there is none.
         """
         briefing = self.briefing
-        candidates = [briefing.canonical(c) for c in proposed]
         seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in briefing.numbers.items()}
         seen |= {c.key: "one that was proposed already" for c in briefing.pending}
-        new = {c.key: c for c in candidates if c.key not in seen}
+        new = {c.key: c for c in proposed if c.key not in seen}
         if not new:
             # The published prompts number only the samples that they show.
-            which = "an earlier sample" if briefing.variant.is_published else seen[candidates[0].key]
+            which = "an earlier sample" if briefing.variant.is_published else seen[proposed[0].key]
             raise RejectedReplyError(f"it repeats {which}")
         return list(new.values())
 

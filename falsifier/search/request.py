@@ -44,7 +44,7 @@ class LLMSettings(_Strict):
     timeout: float | None = Field(
         default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
     )
-    anonymous: bool = Field(default=False, description="Use neutral names and scales in prompts.")
+    anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
     @model_validator(mode="after")

@@ -103,7 +103,7 @@ def test_a_run_on_a_staircase_is_told_by_coverage(tmp_path: Path) -> None:
     assert coverage_json(coverage(tmp_path / "smooth"))["levels"] == []
 
 
-def test_a_prompt_tells_what_is_missing_and_nothing_of_it_under_neutral_names() -> None:
+def test_a_prompt_tells_what_is_missing_under_the_names_that_it_uses() -> None:
     evaluations = [commanded(0, k) for k in range(6)] + [commanded(1, 2)] + [commanded(1, 5, 5)] * 5
     told, anonymous = (
         preview(commands_problem(), variant="MP5", evaluations=evaluations, anonymous=hidden)
@@ -115,6 +115,6 @@ def test_a_prompt_tells_what_is_missing_and_nothing_of_it_under_neutral_names() 
     assert "stage counts up: it reached 2 in 1 of 12 samples, first in sample 7; the step from 2 to 3" in text
     assert sum(count_tokens(m.content) for m in told) <= 6000
     assert "stage" not in "".join(m.content for m in anonymous)
-    assert "counts up" not in anonymous[1].content
+    assert "y1 counts up: it reached 2" in anonymous[1].content
     published = preview(commands_problem(), variant="MP4", evaluations=evaluations)
     assert "Few values" not in published[1].content
