@@ -6,7 +6,6 @@ libraries do the rest.
 """
 
 import csv
-import json
 import re
 from collections.abc import Iterable
 from io import StringIO
@@ -90,18 +89,6 @@ def modelica_path(name: str) -> str:
     if _MODELICA_PATH.fullmatch(name):
         return name
     return f"'{''.join(_MODELICA_ESCAPES.get(c, c) for c in _writable(name))}'"
-
-
-def toml_string(text: str) -> str:
-    r"""Return a text as a TOML string; without escapes if possible.
-
-    >>> print(toml_string('a "b"'), toml_string("a'b\n"))
-    'a "b"' "a'b\n"
-    """
-    if text.isprintable() and "'" not in text and ('"' in text or "\\" in text):
-        return f"'{text}'"
-    # TOML escapes as JSON does, and DEL in addition.
-    return json.dumps(_writable(text), ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def csv_cell(text: str) -> str:

@@ -2,7 +2,6 @@
 
 import ast
 import re
-import tomllib
 
 import pytest
 from hypothesis import given
@@ -19,9 +18,7 @@ from tests.hostile.names import names
 
 @given(names)
 def test_literals_are_read_back_as_the_same_text(name: str) -> None:
-    writable = re.sub("[\0\ud800-\udfff]", "\ufffd", name)
     assert ast.literal_eval(literals.python_docstring(name)) == name
-    assert tomllib.loads(f"a = {literals.toml_string(name)}")["a"] == writable
     assert re.fullmatch(r'"(?:[^"\\]|\\.)*"', literals.modelica_string(name), re.DOTALL)
     assert re.fullmatch(r"[\w.]+|'(?:[^'\\]|\\.)*'", literals.modelica_path(name), re.DOTALL)
 
