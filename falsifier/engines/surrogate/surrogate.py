@@ -64,6 +64,8 @@ _PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8}
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The arms with a share of turns that no rating takes away.
 _SIMPLE = ("coverage", "uniform", "corners", "cma")
+# Of these, those that do not go on from what was reached: something new that they reach is chance, no merit.
+_BLIND = _SIMPLE[1:]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,7 +146,7 @@ class Surrogate:
             if pending is not None:
                 if pending.push and is_new:
                     self._pushes.succeeded(pending.push)
-                self._policy.learn(pending.arm, brought, is_new=is_new)
+                self._policy.learn(pending.arm, brought, is_new=is_new and pending.arm not in _BLIND)
                 if pending.predicted is not None and sample is not None:
                     cost, violated = self.history.scaled_cost(), sample.robustness < 0
                     self.forecasts.judge(pending.predicted, sample.margins, cost, violated=violated)
