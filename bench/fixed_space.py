@@ -28,7 +28,7 @@ from falsifier.problem.problem import Problem
 Point = NDArray[np.float64]
 
 REQUIREMENTS = {"NNb": "NN:NNb", "NNx": "NN:NNx", "SC": "SC:SC"}
-ENGINES = ("uniform", "cma", "annealing")
+ENGINES = ("uniform", "cma")
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 # Time in s simulated beyond the formula's horizon; nothing later matters.
 MARGIN = 0.2

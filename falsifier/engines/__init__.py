@@ -67,7 +67,6 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
         "uniform": Registered("falsifier.engines.simple:Uniform", "uniform random points"),
         "sobol": Registered("falsifier.engines.simple:Sobol", "scrambled Sobol sequence"),
         "corners": Registered("falsifier.engines.simple:Corners", "constant extremes first, then random"),
-        "annealing": Registered("falsifier.engines.optimisers.annealing:Annealing", "scipy's dual annealing"),
         "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(
             "falsifier.engines.optimisers.bayesian:Bayesian", "Gaussian process with expected improvement"

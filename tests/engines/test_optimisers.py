@@ -1,7 +1,5 @@
 """The general optimisers on the fixed control points: what they share, and what only one of them does."""
 
-import gc
-import threading
 from dataclasses import replace
 from functools import partial
 
@@ -15,16 +13,11 @@ from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardi
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.testing import drive, lag_problem
 from tests.engines.support import best_of, bowl, box_problem, flat
-from tests.patience import HANG
 
 
 @pytest.mark.parametrize(("name", "simulations"), [("cma", 150), ("bayesian", 40), ("optuna", 80)])
 def test_it_gets_deeper_into_a_bowl_than_random_points(name: str, simulations: int) -> None:
     assert best_of(name, simulations=simulations) < 1.3 < best_of("uniform", simulations=simulations)
-
-
-def test_annealing_gets_deeper_than_a_few_random_points() -> None:
-    assert best_of("annealing", simulations=150) < best_of("uniform", simulations=10)
 
 
 def test_in_a_known_valley_optuna_does_not_ask_for_the_same_place_several_times_at_once() -> None:
@@ -35,31 +28,6 @@ def test_in_a_known_valley_optuna_does_not_ask_for_the_same_place_several_times_
     batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
     distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
     assert distances.min() > 5e-3
-
-
-def test_annealing_goes_one_step_at_a_time_and_bridges_the_wait_with_random_points() -> None:
-    problem = box_problem()
-    engine = make_engine("annealing", problem, seed=0)
-    first, second = engine.ask(2)
-    assert (first.rationale, second.rationale) == (
-        "a step of simulated annealing",
-        "uniform random, while annealing waits",
-    )
-    engine.tell([bowl(problem, second)])
-    assert engine.ask()[0].rationale == "uniform random, while annealing waits"
-    engine.tell([Evaluation(first, "failed", reason="diverged")])
-    assert engine.ask()[0].rationale == "a step of simulated annealing"
-
-
-def test_annealing_that_nobody_holds_any_more_ends_its_thread() -> None:
-    before = set(threading.enumerate())
-    engine = make_engine("annealing", box_problem(), seed=0)
-    assert np.isfinite(engine.ask()[0].parameters["x0"])
-    (thread,) = set(threading.enumerate()) - before
-    del engine
-    gc.collect()
-    thread.join(HANG)
-    assert not thread.is_alive()
 
 
 def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() -> None:
@@ -83,7 +51,7 @@ def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
     assert generations == {1}, "a plateau ends a start after its first generation"
 
 
-@pytest.mark.parametrize("name", ["annealing", "cma", "optuna"])
+@pytest.mark.parametrize("name", ["cma", "optuna"])
 def test_candidates_of_whole_numbers_are_recognised(name: str) -> None:
     problem = box_problem()
     space = replace(problem.space, inputs=tuple(replace(r, kind="integer") for r in problem.space.inputs))

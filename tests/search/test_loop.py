@@ -163,7 +163,7 @@ def whole(problem: Problem, kind: ValueKind) -> Problem:
 
 
 @pytest.mark.parametrize(
-    "engine", ["surrogate", "coverage", "corners", "uniform", "sobol", "annealing", "cma", "bayesian"]
+    "engine", ["surrogate", "coverage", "corners", "uniform", "sobol", "cma", "bayesian"]
 )
 def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
     problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
