@@ -1,6 +1,6 @@
 """What workers are asked to simulate, in bytes.
 
-``falsifier/fmu/worker/system_request.c`` is the other side. Components come in the order in which they step.
+``falsifier/fmu/worker/system/request.c`` is the other side. Components come in the order in which they step.
 """
 
 from collections.abc import Hashable, Sequence

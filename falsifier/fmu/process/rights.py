@@ -9,7 +9,7 @@ from shlex import quote
 from falsifier.core.literals import printable
 from falsifier.errors import SpecError, did_you_mean
 
-# Letters and bits of worker/sandbox.h.
+# Letters and bits of worker/platform/sandbox.h.
 _WRITABLE, _READABLE, _HIDDEN, _PROGRAMS, _NETWORK, _WINE, _MEMORY, _COMMAND = b"WRHPNIMC"
 _FILES, _PROCESSES, _SYSTEM_CALLS, _REFUSALS = 1, 2, 4, 8
 
@@ -137,7 +137,7 @@ def encoded(
     memory: int,
     command: Sequence[str] = (),
 ) -> bytes:
-    """Return what the guard of a worker is told; see worker/guard.c.
+    """Return what the guard of a worker is told; see worker/platform/guard.c.
 
     Args:
         rights: what the FMU may do.
@@ -165,7 +165,7 @@ class Told:
     Attributes:
         cause: what ended the process, empty if the guard does not know.
         refusals: what was refused before, and how it can be allowed; empty if nothing.
-        enforced: what is enforced, as bits of ``enum enforced`` in worker/sandbox.h.
+        enforced: what is enforced, as bits of ``enum enforced`` in worker/platform/sandbox.h.
     """
 
     cause: str = ""
@@ -207,7 +207,7 @@ def described(rights: Rights, enforced: int) -> str:
 
     Args:
         rights: what users have allowed and denied.
-        enforced: bits of ``enum enforced`` in worker/sandbox.h.
+        enforced: bits of ``enum enforced`` in worker/platform/sandbox.h.
     """
     places = "".join(f" and {path}" for path in rights.writable)
     connecting, executing = "open network connections", "execute programs"

@@ -30,10 +30,10 @@ _MADE = re.compile(rf"{_PREFIX}[0-9a-f]{{32}}({re.escape(_LOCK_SUFFIX)})?")
 _MAKING_SECONDS = 3600.0
 
 WORKER = Path(__file__).parents[1] / "worker"
-# Platforms whose system calls sandbox_linux.c knows.
+# Platforms whose system calls platform/sandbox_linux.c knows.
 _CONFINED = ("x86_64-linux", "aarch64-linux")
-_FLAGS = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
-_NOT_HERE = ("platform_windows.c", "sandbox_linux.c", "calls_linux.c", "sandbox_none.c")
+_FLAGS = ("-I.", "-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+_NOT_HERE = ("windows.c", "sandbox_linux.c", "calls_linux.c", "sandbox_none.c")
 # Names of further variables to pass on, separated by commas.
 MORE = "FALSIFIER_FMU_VARIABLES"
 
@@ -194,7 +194,8 @@ def _compiled(root: Path, found: str) -> Path:
     if path.exists():
         return path
     kept = ("sandbox_linux.c", "calls_linux.c") if found in _CONFINED else ("sandbox_none.c",)
-    sources = [p.name for p in sorted(WORKER.glob("*.c")) if p.name in kept or p.name not in _NOT_HERE]
+    files = [path for path in sorted(WORKER.rglob("*.c")) if path.name in kept or path.name not in _NOT_HERE]
+    sources = [str(path.relative_to(WORKER)) for path in files]
     libraries = ("-lm", "-ldl") if found.endswith("-linux") else ("-lm",)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     try:
@@ -219,7 +220,7 @@ def _kept() -> Path | None:
 @lru_cache(maxsize=1)
 def _sum_of_sources() -> str:
     """Return a checksum of what the program is compiled from, so that no other version's is taken."""
-    files = sorted((*WORKER.glob("*.c"), *WORKER.glob("*.h")))
+    files = sorted(WORKER.rglob("*.[ch]"))
     return checksum(b"".join(file.read_bytes() for file in files) + " ".join(_FLAGS).encode())
 
 

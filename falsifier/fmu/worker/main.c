@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "platform.h"
+#include "platform/platform.h"
 #include "session.h"
 
 enum kind { CONNECT, LOAD, PREPARE, SIMULATE };

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "platform.h"
+#include "platform/platform.h"
 #include "worker.h"
 
 static void *read_bytes(struct request *r, size_t count)

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "platform.h"
+#include "platform/platform.h"
 #include "session.h"
-#include "system.h"
+#include "system/system.h"
 
 /* Simulations longer than this are not repeated to find out whether a reset reproduces the results. */
 #define MOST_TEST_SECONDS 1.0

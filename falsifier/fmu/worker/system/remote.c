@@ -18,9 +18,9 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "platform.h"
-#include "sandbox.h"
-#include "system.h"
+#include "platform/platform.h"
+#include "platform/sandbox.h"
+#include "system/system.h"
 
 /* Pages that nobody writes to take no memory. */
 #define SHARED_BYTES ((size_t)64 << 20)

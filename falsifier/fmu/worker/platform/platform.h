@@ -1,4 +1,4 @@
-/* What the operating systems do differently: platform_posix.c and platform_windows.c. */
+/* What the operating systems do differently: posix.c and windows.c. */
 
 #ifndef PLATFORM_H
 #define PLATFORM_H

@@ -30,8 +30,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "calls_linux.h"
-#include "sandbox.h"
+#include "platform/calls_linux.h"
+#include "platform/sandbox.h"
 
 /* linux/landlock.h, which many machines do not have. */
 enum { CREATE_RULESET = 444, ADD_RULE, RESTRICT_SELF };

@@ -2,7 +2,7 @@
 
 #include <signal.h>
 
-#include "sandbox.h"
+#include "platform/sandbox.h"
 
 unsigned confine(const struct policy *policy, int *listener)
 {

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "system.h"
+#include "system/system.h"
 
 static size_t inputs_of(const struct component *c)
 {

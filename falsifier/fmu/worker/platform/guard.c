@@ -23,7 +23,7 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "sandbox.h"
+#include "platform/sandbox.h"
 
 enum { LINE = 5, MOST_BYTES = 1 << 20, MOST_TOLD = 32, TICK_MS = 100, CANNOT_START = 71 };
 

@@ -21,8 +21,8 @@
 #include <sys/syscall.h>
 #endif
 
-#include "platform.h"
-#include "sandbox.h"
+#include "platform/platform.h"
+#include "platform/sandbox.h"
 
 enum { REPLIES = 3, ROOM = 4, LAST = ROOM };
 

@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
-#include "system.h"
+#include "system/system.h"
 
 /* Connected outputs that the error of a system that does not converge names. */
 #define MOST_NAMED 6

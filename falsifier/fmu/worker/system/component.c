@@ -2,7 +2,7 @@
 
 #include <stdlib.h>
 
-#include "system.h"
+#include "system/system.h"
 
 static struct outcome made(const char *wrong)
 {

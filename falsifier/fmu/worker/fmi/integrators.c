@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "model_exchange.h"
+#include "fmi/model_exchange.h"
 
 static const double C[7] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
 static const double A[7][6] = {

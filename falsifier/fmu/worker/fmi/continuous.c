@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "model_exchange.h"
+#include "fmi/model_exchange.h"
 
 /* Rounds of one event iteration after which the FMU is considered stuck. */
 #define MOST_ROUNDS 1000

@@ -109,7 +109,7 @@ void end_process_of(struct component *c);
 void send_plan(struct component *c, const struct request *r);
 double *shared_numbers(struct component *c, size_t count); /* that it is given, or that are read from it */
 
-/* system_request.c */
+/* request.c */
 void read_components(struct request *r, struct system *s);
 void read_system_plan(struct request *r, struct system *s, double *room);
 

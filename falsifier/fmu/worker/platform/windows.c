@@ -6,8 +6,8 @@
 #include <windows.h>
 #include <psapi.h>
 
-#include "platform.h"
-#include "system.h"
+#include "platform/platform.h"
+#include "system/system.h"
 
 #define LONGEST_PATH 4096
 

@@ -23,8 +23,8 @@
 #include <time.h>
 #include <unistd.h>
 
-#include "calls_linux.h"
-#include "sandbox.h"
+#include "platform/calls_linux.h"
+#include "platform/sandbox.h"
 
 #ifndef SECCOMP_USER_NOTIF_FLAG_CONTINUE
 #define SECCOMP_USER_NOTIF_FLAG_CONTINUE 1

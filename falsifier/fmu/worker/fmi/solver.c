@@ -8,8 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "model_exchange.h"
-#include "platform.h"
+#include "fmi/model_exchange.h"
+#include "platform/platform.h"
 
 /* Constants of Hairer and Wanner: a problem is stiff after 15 steps with h times the dominant eigenvalue above
  * 3.25 (the method is stable up to 3.3); 6 other steps in a row reset the count. */

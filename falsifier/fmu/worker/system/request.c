@@ -1,6 +1,6 @@
 /* What requests say of a system: its components, and the tables that its values pass through. */
 
-#include "system.h"
+#include "system/system.h"
 
 static size_t *read_rows(struct request *r, size_t count)
 {
