@@ -27,7 +27,7 @@ _MOST_TOLD = 1 << 16
 _LEAST_MEMORY = {"d": (resource.RLIMIT_DATA, 300 << 20), "v": (resource.RLIMIT_AS, 500 << 20)}
 
 
-class Program:
+class WatchedProgram:
     """A program that answers requests, and the process that watches it, which is the one that is started.
 
     It has the requests on descriptor 0, prints to 1 and 2, and sends its replies to 3; 4 is shared memory. It

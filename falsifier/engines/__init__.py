@@ -60,7 +60,7 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             uses_context=True,
         ),
         "coverage": Registered(
-            "falsifier.engines.coverage:Coverage",
+            "falsifier.engines.coverage:CoverageEngine",
             "goes on from inputs that reached something new; does not use robustness",
             is_free=True,
         ),

@@ -31,7 +31,7 @@ from falsifier.search.steps import Steps, proposals
 
 
 @dataclass(kw_only=True)
-class Replayed(Steps):
+class ReplayedSteps(Steps):
     """The steps that a journal contains, then live ones.
 
     Attributes:
@@ -93,7 +93,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         return live
     exchanges, unrepeated = _played_back(records)
     evaluations = recorded_evaluations(directory, records)
-    return Replayed(
+    return ReplayedSteps(
         executor=live.executor,
         replayed=len(evaluations),
         seconds=max(map(elapsed_at, records)),

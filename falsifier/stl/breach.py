@@ -33,7 +33,7 @@ from falsifier.stl.formula import (
     negated,
 )
 from falsifier.stl.lexer import name_text
-from falsifier.stl.program import Part
+from falsifier.stl.program import CompiledPart
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -103,7 +103,7 @@ class Breach:
         return "; ".join(self.lines)
 
 
-def find_breach(root: Part, buffer: Floats, trajectory: Trajectory) -> Breach:
+def find_breach(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Breach:
     """Return what broke on a trajectory that violates a formula.
 
     Args:
@@ -118,11 +118,11 @@ def find_breach(root: Part, buffer: Floats, trajectory: Trajectory) -> Breach:
 class _Demand(NamedTuple):
     """A part of a formula that had to be true, or false; no negation, as those are carried down."""
 
-    part: Part
+    part: CompiledPart
     wanted: bool
 
     @classmethod
-    def of(cls, part: Part, *, wanted: bool) -> "_Demand":
+    def of(cls, part: CompiledPart, *, wanted: bool) -> "_Demand":
         while isinstance(part.formula, Not):
             part, wanted = part.children[0], not wanted
         return cls(part, wanted)
@@ -371,7 +371,7 @@ class _Search:
         return {name: float(column[sample]) for name, column in self.trajectory.columns.items()}
 
 
-def _inner(part: Part, window: Span) -> Span:
+def _inner(part: CompiledPart, window: Span) -> Span:
     """The samples at which the operand of a temporal operator counts if it is evaluated over a window."""
     (first, _), (_, last) = part.window_at(window[0]) or window, part.window_at(window[1]) or window
     return first, last

@@ -1,8 +1,8 @@
 """Compiler from a formula to a program for one time grid.
 
 First pass (``demand``): determine at which samples each sub-formula and expression is needed. Second pass
-(``place``): assign each a place in one flat buffer and emit the steps that fill it. Samples that are not
-needed are not computed; a part that occurs twice in a formula is computed once.
+(``location``): assign each a location in one flat buffer and emit the steps that fill it. Samples that are
+not needed are not computed; a part that occurs twice in a formula is computed once.
 """
 
 import math
@@ -40,7 +40,7 @@ from falsifier.stl.formula import (
     parts_of,
 )
 from falsifier.stl.margins import on_limit
-from falsifier.stl.program import Part, Place, Program
+from falsifier.stl.program import CompiledPart, Location, Program
 
 _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Of numbers that are all floating-point, power is the faster one.
@@ -63,7 +63,7 @@ def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 
     """
     compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
     compiler.demand(formula, 0, last)
-    compiler.place(formula)
+    compiler.location(formula)
     return Program(
         compiler.part(formula),
         formula.signals,
@@ -99,9 +99,9 @@ class _Compiler:
     step: float
     samples: int
     needs: dict[Node, tuple[int, int]] = field(default_factory=dict)
-    places: dict[Node, Place] = field(default_factory=dict)
+    locations: dict[Node, Location] = field(default_factory=dict)
     steps: list[op.Operation] = field(default_factory=list)
-    checked: dict[int, tuple[Predicate, Place]] = field(default_factory=dict)
+    checked: dict[int, tuple[Predicate, Location]] = field(default_factory=dict)
     size: int = 0
 
     # -- at which samples each part is needed ------------------------------------------------------------
@@ -140,58 +140,63 @@ class _Compiler:
 
     # -- the steps ---------------------------------------------------------------------------------------
 
-    def place(self, node: Node) -> Place:
-        """Emit the steps of a part, only once, and return the place of its values."""
-        if node not in self.places:
+    def location(self, node: Node) -> Location:
+        """Emit the steps of a part, only once, and return the location of its values."""
+        if node not in self.locations:
             first, last = self.needs[node]
             if isinstance(node, Expression):
-                self.places[node] = self._expression(node, first, last)
+                self.locations[node] = self._expression(node, first, last)
             else:
-                self.places[node] = self._formula(node, first, last)
-        return self.places[node]
+                self.locations[node] = self._formula(node, first, last)
+        return self.locations[node]
 
     def _emit(
-        self, function: op.Function, first: int, last: int, *operands: Place, ahead: tuple[int, int] = (0, 0)
-    ) -> Place:
-        """Append one step and return the place of its result.
+        self,
+        function: op.Function,
+        first: int,
+        last: int,
+        *operands: Location,
+        ahead: tuple[int, int] = (0, 0),
+    ) -> Location:
+        """Append one step and return the location of its result.
 
         Args:
             function: what it calculates.
             first: first sample of its result and of its operands.
             last: last sample of them.
-            operands: their places.
+            operands: their locations.
             ahead: by how many samples the first and the last one of the operands are later.
         """
         start, end = first + ahead[0], last + ahead[1] + 1
-        reads = [slice(place.at(start), place.at(end)) for place in operands]
-        result = Place(self.size - first, first, last)
+        reads = [slice(location.at(start), location.at(end)) for location in operands]
+        result = Location(self.size - first, first, last)
         self.size = result.at(last + 1)
         self.steps.append(op.calculating(function, slice(result.at(first), self.size), *reads))
         return result
 
-    def _expression(self, node: Expression, first: int, last: int) -> Place:
+    def _expression(self, node: Expression, first: int, last: int) -> Location:
         if isinstance(node, Name):
-            return Place(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
+            return Location(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
         if not node.signals:
             return self._emit(op.constant(_constant(node)), first, last)
         match node:
             case Arithmetic():
                 return self._arithmetic(node, first, last)
             case Negative(operand):
-                return self._emit(_NEGATION, first, last, self.place(operand))
+                return self._emit(_NEGATION, first, last, self.location(operand))
             case Call(name, operands):
-                function, sides = FUNCTIONS_OF[name], [self.place(operand) for operand in operands]
+                function, sides = FUNCTIONS_OF[name], [self.location(operand) for operand in operands]
                 result = self._emit(function, first, last, *sides[:2])
                 for other in sides[2:]:
                     result = self._emit(function, first, last, result, other)
                 return result
         raise TypeError(f"not an expression: {node!r}")
 
-    def _arithmetic(self, node: Arithmetic, first: int, last: int) -> Place:
+    def _arithmetic(self, node: Arithmetic, first: int, last: int) -> Location:
         left, right, operator = node.left, node.right, node.operator
         if operator == "^" and not right.signals and _constant(right) == 2:
             # One multiplication is much faster than pow, and squares are frequent.
-            base = self.place(left)
+            base = self.location(left)
             return self._emit(np.multiply, first, last, base, base)
         if operator in "+-*" and not (left.signals and right.signals):
             c = _constant(left if right.signals else right)
@@ -199,11 +204,11 @@ class _Compiler:
             if operator == "-" and left.signals:
                 factor, offset = 1.0, -c
             return self._emit(
-                op.scaled(factor, offset), first, last, self.place(left if left.signals else right)
+                op.scaled(factor, offset), first, last, self.location(left if left.signals else right)
             )
-        return self._emit(_ARITHMETIC[operator], first, last, self.place(left), self.place(right))
+        return self._emit(_ARITHMETIC[operator], first, last, self.location(left), self.location(right))
 
-    def _predicate(self, node: Predicate, first: int, last: int) -> Place:
+    def _predicate(self, node: Predicate, first: int, last: int) -> Location:
         left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
         margin = self._expression(Arithmetic("-", left, right), first, last)
         if node.operator in ("==", "!="):
@@ -214,10 +219,10 @@ class _Compiler:
         self.steps.append(op.checking(slice(margin.at(first), margin.at(last + 1)), on_limit(node.operator)))
         return margin
 
-    def _formula(self, node: Formula, first: int, last: int) -> Place:
+    def _formula(self, node: Formula, first: int, last: int) -> Location:
         if isinstance(node, Predicate):
             return self._predicate(node, first, last)
-        parts = [self.place(child) for child in node.children]
+        parts = [self.location(child) for child in node.children]
         match node:
             case Next():
                 return parts[0].later(1)
@@ -233,17 +238,17 @@ class _Compiler:
                 return self._emit(np.minimum, first, last, forth, back)
         return self._emit(_CONNECTIVES[type(node)], first, last, *parts)
 
-    def _implication(self, left: Place, right: Place, first: int, last: int) -> Place:
+    def _implication(self, left: Location, right: Location, first: int, last: int) -> Location:
         return self._emit(np.maximum, first, last, self._emit(_NEGATION, first, last, left), right)
 
-    def _window(self, node: Always | Eventually, below: Place, first: int, last: int) -> Place:
+    def _window(self, node: Always | Eventually, below: Location, first: int, last: int) -> Location:
         extreme, end = np.minimum if isinstance(node, Always) else np.maximum, self.samples - 1
         if node.window is None and first < last:
             return self._emit(op.rest(extreme), first, end, below)
         ahead = window_samples(node.window, self.step) if node.window else (0, end - first)
         return self._emit(op.window(extreme), first, last, below, ahead=ahead)
 
-    def _until(self, node: Until, left: Place, right: Place, first: int, last: int) -> Place:
+    def _until(self, node: Until, left: Location, right: Location, first: int, last: int) -> Location:
         """Emit ``l U[a,b] r`` as ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, in samples.
 
         The three parts together are equivalent to the bounded until, and each takes linear time. The
@@ -263,13 +268,13 @@ class _Compiler:
             result = self._emit(np.minimum, first, last, before, result)
         return result
 
-    def part(self, node: Formula) -> Part:
-        """Return a sub-formula with its place and all parts below it."""
+    def part(self, node: Formula) -> CompiledPart:
+        """Return a sub-formula with its location and all parts below it."""
         window: tuple[int, int | None] | None = None
         if isinstance(node, Temporal):
             window = window_samples(node.window, self.step) if node.window else (0, None)
         children = tuple(self.part(child) for child in node.children)
-        return Part(node, str(node), self.places[node], window, self.samples, children)
+        return CompiledPart(node, str(node), self.locations[node], window, self.samples, children)
 
 
 def _constant(node: Expression) -> float:

@@ -29,7 +29,7 @@ from falsifier.stl.formula import (
     Until,
 )
 from falsifier.stl.margins import is_on_limit
-from falsifier.stl.program import Part
+from falsifier.stl.program import CompiledPart
 
 Floats = NDArray[np.float64]
 # Digits of numbers; of values that are compared more if their difference is small.
@@ -48,13 +48,13 @@ class Waypoint(NamedTuple):
         window: first and last sample of its operator's window; None if it has no window.
     """
 
-    part: Part
+    part: CompiledPart
     sample: int
     value: float
     window: tuple[int, int] | None
 
 
-def path_to_decider(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoint]:
+def path_to_decider(part: CompiledPart, buffer: Floats, sample: int = 0) -> list[Waypoint]:
     """Return the path from a compiled formula at this sample to the predicate that decided its value.
 
     Args:
@@ -70,7 +70,7 @@ def path_to_decider(part: Part, buffer: Floats, sample: int = 0) -> list[Waypoin
         part, sample = _decider(path[-1], buffer)
 
 
-def _decider(here: Waypoint, buffer: Floats) -> tuple[Part, int]:
+def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
     kind, children, sample = type(here.part.formula), here.part.children, here.sample
     first, last = here.window or (sample, sample)
     if kind is Not:
@@ -121,7 +121,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Vacuity:
+class VacuousImplication:
     """An implication whose condition was false at every time at which it was evaluated.
 
     Attributes:
@@ -167,7 +167,7 @@ class Diagnosis:
     robustness: float
     critical_time: float
     path: tuple[Step, ...]
-    vacuities: tuple[Vacuity, ...] = ()
+    vacuities: tuple[VacuousImplication, ...] = ()
 
     @property
     def vacuous(self) -> bool:
@@ -182,7 +182,7 @@ class Diagnosis:
         return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
 
-def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
+def diagnose(root: CompiledPart, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
     """Return the diagnosis of an evaluated formula.
 
     Args:
@@ -215,16 +215,18 @@ def diagnose(root: Part, buffer: NDArray[np.float64], trajectory: Trajectory) ->
     return Diagnosis(path[0].value, critical, tuple(steps), tuple(vacuities.values()))
 
 
-def _vacuity(part: Part, buffer: NDArray[np.float64], times: NDArray[np.float64]) -> Vacuity | None:
+def _vacuity(
+    part: CompiledPart, buffer: NDArray[np.float64], times: NDArray[np.float64]
+) -> VacuousImplication | None:
     if not isinstance(part.formula, Implies):
         return None
-    first, last = part.place.first, part.place.last
+    first, last = part.location.first, part.location.last
     lefts, rights = (child.over(buffer, first, last) for child in part.children)
     nearest = int(lefts.argmax())
     if lefts[nearest] >= 0:
         return None
     window = (float(times[first]), float(times[last]))
-    return Vacuity(
+    return VacuousImplication(
         part.formula, window, float(times[first + nearest]), float(lefts[nearest]), bool((rights < 0).any())
     )
 

@@ -14,7 +14,7 @@ from falsifier.stl.breach import Breach, find_breach
 from falsifier.stl.compiler import compile_formula
 from falsifier.stl.diagnosis import Diagnosis, diagnose, path_to_decider
 from falsifier.stl.formula import Formula, Implies, Or, Predicate
-from falsifier.stl.program import Part, Program, fill, fill_many
+from falsifier.stl.program import CompiledPart, Program, fill, fill_many
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Monitor:
     formula: Formula
     step: float
     samples: int
-    watched: tuple[tuple[Formula, Part], ...] = field(init=False, repr=False, compare=False)
+    watched: tuple[tuple[Formula, CompiledPart], ...] = field(init=False, repr=False, compare=False)
     _program: Program = field(init=False, repr=False, compare=False)
     _spare: list[NDArray[np.float64]] = field(init=False, repr=False, compare=False)
 
@@ -143,7 +143,7 @@ class Monitor:
         buffer = fill(self._program, trajectory, self._take_buffer())
         found = []
         for _, part in self.watched:
-            first, last = part.place.first, part.place.last
+            first, last = part.location.first, part.location.last
             values = part.over(buffer, first, last)
             low, high = int(values.argmin()), int(values.argmax())
             lowest, highest = (first + low) * self.step, (first + high) * self.step
@@ -180,7 +180,7 @@ class Monitor:
         buffer = fill(self._program, trajectory, self._take_buffer())
         found = {}
         for part in self._program.root.walk():
-            first, last = max(part.place.first, 0), part.place.last  # X has the place of its operand
+            first, last = max(part.location.first, 0), part.location.last  # X has the location of its operand
             found[part.formula] = np.full(self.samples, np.nan)
             found[part.formula][first : last + 1] = part.over(buffer, first, last)
         self._spare.append(buffer)
@@ -204,7 +204,7 @@ class Monitor:
         return self._spare.pop() if self._spare else np.empty(self._program.size)
 
 
-def _watched(root: Part) -> Iterator[tuple[Formula, Part]]:
+def _watched(root: CompiledPart) -> Iterator[tuple[Formula, CompiledPart]]:
     for part in root.walk():
         match part.formula:
             case Implies():

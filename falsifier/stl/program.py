@@ -1,4 +1,4 @@
-"""A compiled formula: its steps over one flat buffer, the place of each part's values, and running it."""
+"""A compiled formula: its steps over one flat buffer, the location of each part's values, and running it."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -113,7 +113,7 @@ def until(a: Floats, b: Floats, out: Floats) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class Location:
     """Location of one part's values in the buffer.
 
     Attributes:
@@ -130,19 +130,19 @@ class Place:
         """Return the offset in the buffer of the value at this sample."""
         return self.base + sample
 
-    def later(self, samples: int) -> "Place":
-        """Return the place in which each sample has the value of one that many samples later."""
-        return Place(self.base + samples, self.first - samples, self.last - samples)
+    def later(self, samples: int) -> "Location":
+        """Return the location in which each sample has the value of one that many samples later."""
+        return Location(self.base + samples, self.first - samples, self.last - samples)
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class CompiledPart:
     """A sub-formula and the location of its values.
 
     Attributes:
         formula: the sub-formula.
         text: its text.
-        place: its samples and their offsets.
+        location: its samples and their offsets.
         window: window of a temporal operator, in samples from the sample at which it is evaluated; an end of
             None is the last sample of the trajectory.
         samples: number of samples of one trajectory.
@@ -151,18 +151,18 @@ class Part:
 
     formula: Formula
     text: str
-    place: Place
+    location: Location
     window: tuple[int, int | None] | None
     samples: int
-    children: tuple["Part", ...]
+    children: tuple["CompiledPart", ...]
 
     def at(self, buffer: Floats, sample: int) -> float:
         """Return the robustness at a sample."""
-        return buffer.item(self.place.base + sample)
+        return buffer.item(self.location.base + sample)
 
     def over(self, buffer: Floats, first: int, last: int) -> Floats:
         """Return the robustness at the samples from first to last inclusive."""
-        return buffer[self.place.base + first : self.place.base + last + 1]
+        return buffer[self.location.base + first : self.location.base + last + 1]
 
     def window_at(self, sample: int) -> tuple[int, int] | None:
         """Return the first and last sample of a temporal operator's window if evaluated at this sample."""
@@ -171,7 +171,7 @@ class Part:
         start, end = self.window
         return sample + start, self.samples - 1 if end is None else sample + end
 
-    def walk(self) -> Iterator["Part"]:
+    def walk(self) -> Iterator["CompiledPart"]:
         """Yield this part and all below it, from left to right."""
         yield self
         for child in self.children:
@@ -180,7 +180,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Steps, and the place of each part's values.
+    """Steps, and the location of each part's values.
 
     Attributes:
         root: the whole formula.
@@ -190,17 +190,17 @@ class Program:
         times: the time grid in s, shape (n,).
         steps: what fills the buffer, in order.
         size: length of the buffer.
-        checked: the predicate that each check is for, and its place, by the number of the step.
+        checked: the predicate that each check is for, and its location, by the number of the step.
     """
 
-    root: Part
+    root: CompiledPart
     signals: tuple[str, ...]
     step: float
     samples: int
     times: NDArray[np.float64]
     steps: tuple[Operation, ...]
     size: int
-    checked: dict[int, tuple[Predicate, Place]]
+    checked: dict[int, tuple[Predicate, Location]]
 
 
 def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
@@ -265,7 +265,7 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
             problem = _run(program, alone, n * len(used))
             if problem:
                 raise MonitorError(f"trajectory {which}: {problem}")
-    return np.array(buffer[program.root.place.at(0)])
+    return np.array(buffer[program.root.location.at(0)])
 
 
 def _run(program: Program, buffer: Floats, signals: int) -> str:
@@ -281,11 +281,11 @@ def _run(program: Program, buffer: Floats, signals: int) -> str:
     return ""
 
 
-def _problem(program: Program, buffer: Floats, predicate: Predicate, place: Place) -> str:
+def _problem(program: Program, buffer: Floats, predicate: Predicate, location: Location) -> str:
     if buffer.ndim > 1:
         return f"{predicate} has no finite value"
-    margins = buffer[place.at(place.first) : place.at(place.last + 1)]
-    sample = place.first + int(np.flatnonzero(~np.isfinite(margins))[0])
+    margins = buffer[location.at(location.first) : location.at(location.last + 1)]
+    sample = location.first + int(np.flatnonzero(~np.isfinite(margins))[0])
     here = {name: buffer[i * program.samples + sample] for i, name in enumerate(program.signals)}
     sides = [side for side in (predicate.left, predicate.right) if side.signals]
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)

@@ -35,7 +35,7 @@ def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
     rights = encoded(Rights(), (tmp_path,), (), memory=0, command=("/bin/sh", "-c", script))
     with posix_files.sealed_file(8) as output, posix_files.sealed_file(8) as shared:
         path = [str(worker_program(tmp_path))]
-        program = posix.Program(path, {}, output.fileno(), rights, shared.fileno())
+        program = posix.WatchedProgram(path, {}, output.fileno(), rights, shared.fileno())
         with pytest.raises(TimeoutError):
             program.read(100, 0.0)
         program.send(b"hello\n", HANG)

@@ -1,5 +1,5 @@
 """Search led by what trajectories did that no earlier one did, for robustness without a slope."""
 
-from falsifier.engines.coverage.explorer import Coverage, Explorer
+from falsifier.engines.coverage.explorer import CoverageEngine, Explorer
 
-__all__ = ["Coverage", "Explorer"]
+__all__ = ["CoverageEngine", "Explorer"]

@@ -37,7 +37,7 @@ _IDEAS, _DRAWS = 10, 100
 
 
 @dataclass(slots=True, eq=False)
-class Reached:
+class MarkedInput:
     """The input that reached a mark first, or much earlier than the first one.
 
     Attributes:
@@ -65,11 +65,11 @@ class Explorer:
         self._aimed = Programs(layout, levels)
         # Whether levels are known at which something changes.
         self.has_levels = bool(levels)
-        self._reached: dict[Mark, Reached] = {}
+        self._reached: dict[Mark, MarkedInput] = {}
         self._by_source: dict[str, list[Mark]] = defaultdict(list)
         self._hits: Counter[Mark] = Counter()
         self._lowest = inf
-        self._at_lowest: list[Reached] = []
+        self._at_lowest: list[MarkedInput] = []
         self._new: Counter[str] = Counter()
         self._seen = 0
 
@@ -87,7 +87,7 @@ class Explorer:
         if difference < -_SAME_LEVEL * abs(robustness):
             self._lowest, self._at_lowest = robustness, []
         if difference <= _SAME_LEVEL * abs(robustness):
-            self._at_lowest.append(Reached(point, critical))
+            self._at_lowest.append(MarkedInput(point, critical))
         marks = self._marker.marks(trajectory)
         new = [mark for mark in marks if mark not in self._reached]
         self._new.update({mark.source for mark in new})
@@ -99,7 +99,7 @@ class Explorer:
             if known is None and mark.what[0] == "changes" and mark.source in self._marker.kinds:
                 self._programs.remember(point, time, self._interval)
             if known is None or time < 0.95 * known.time:
-                self._reached[mark] = Reached(point, time, known.tries if known else 0)
+                self._reached[mark] = MarkedInput(point, time, known.tries if known else 0)
         events, sources = ("is", "changes", "after"), self._marker.kinds
         return any(m.source == MODES or (m.source in sources and m.what[0] in events) for m in new)
 
@@ -152,7 +152,7 @@ class Explorer:
             self._programs.another_end(rng, reached.point, time), f"{where}, continued differently"
         )
 
-    def _again(self, rng: np.random.Generator, reached: Reached) -> Array:
+    def _again(self, rng: np.random.Generator, reached: MarkedInput) -> Array:
         """Return the input that goes on with what it did before the lowest robustness, until the end."""
         point, time = reached.point, reached.time
         if rng.random() < _SOONER:
@@ -194,7 +194,7 @@ def describe(mark: Mark) -> str:
             return f"{source} go {what[0]}"
 
 
-class Coverage:
+class CoverageEngine:
     """Collects inputs that reached something new, and goes on from these; robustness is not used."""
 
     name = "coverage"

@@ -20,7 +20,7 @@ _FINE = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sample:
+class SimulatedPoint:
     """One simulated candidate.
 
     Attributes:
@@ -53,12 +53,12 @@ class History:
     problem: Problem
     grid: TimeGrid
     layout: Layout
-    samples: list[Sample] = field(default_factory=list)
+    samples: list[SimulatedPoint] = field(default_factory=list)
     cost: PredictedCost | None = None
     _discrete: frozenset[str] = frozenset()
     _scaled: PredictedCost | None = None
 
-    def add(self, evaluation: Evaluation, point: Array) -> Sample | None:
+    def add(self, evaluation: Evaluation, point: Array) -> SimulatedPoint | None:
         """Add the evaluation of a point; return its sample, or None if there is nothing to learn from."""
         trajectory, robustness = evaluation.trajectory, evaluation.robustness
         if trajectory is None or robustness is None:
@@ -69,7 +69,7 @@ class History:
         cells = self.grid.cells
         margins = self.cost.margins(trace.states[None, : cells + 1], trace.inputs[None, :cells])
         critical = evaluation.verdict.critical_time / (self.grid.step * cells) if evaluation.verdict else 1.0
-        sample = Sample(point, trace, margins, float(learnable(robustness)), min(critical, 1.0))
+        sample = SimulatedPoint(point, trace, margins, float(learnable(robustness)), min(critical, 1.0))
         self.samples.append(sample)
         self._scaled = None
         return sample

@@ -101,7 +101,7 @@ class Garbled(Closed):
     """What has arrived is not a reply, so the connection cannot be used any more."""
 
 
-def send(program: posix.Program, kind: Request, payload: bytes = b"") -> None:
+def send(program: posix.WatchedProgram, kind: Request, payload: bytes = b"") -> None:
     """Send one request.
 
     Raises:
@@ -113,7 +113,7 @@ def send(program: posix.Program, kind: Request, payload: bytes = b"") -> None:
         raise Closed from error
 
 
-def receive(program: posix.Program, limit: float, *, polling: float = 0.0) -> Reply:
+def receive(program: posix.WatchedProgram, limit: float, *, polling: float = 0.0) -> Reply:
     """Wait for a reply, at most this many seconds.
 
     Args:
@@ -140,7 +140,7 @@ def receive(program: posix.Program, limit: float, *, polling: float = 0.0) -> Re
     return Reply(where, status, printable(text), reached, printed, more, leaving)
 
 
-def _exactly(program: posix.Program, count: int, limit: float, polling: float = 0.0) -> bytes:
+def _exactly(program: posix.WatchedProgram, count: int, limit: float, polling: float = 0.0) -> bytes:
     """Receive this many bytes, at least one; the limit in s is for the first of them."""
     data = program.read(count, limit, polling)
     until = time.perf_counter() + _REST_SECONDS

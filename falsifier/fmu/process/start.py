@@ -163,7 +163,7 @@ class Started:
         try:
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
             told = encoded(rights, (self.scratch, folder), _hidden(), memory=memory, command=command)
-            self.program = posix.Program(
+            self.program = posix.WatchedProgram(
                 [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), self._replies
             )
         except BaseException as error:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines.coverage import Coverage
+from falsifier.engines.coverage import CoverageEngine
 from falsifier.engines.coverage.explorer import describe
 from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.engines.coverage.programs import Programs
@@ -38,7 +38,7 @@ def test_values_in_narrow_bands_are_used_again_once_they_are_found(seed: int) ->
 @pytest.mark.parametrize("points", [1, 3])
 def test_nothing_is_simulated_twice(points: int) -> None:
     problem = lag_problem("G[0,10] (x <= 99)", points=points)
-    asked = drive(Coverage(problem, seed=2), partial(evaluate, problem), rounds=40)
+    asked = drive(CoverageEngine(problem, seed=2), partial(evaluate, problem), rounds=40)
     assert len({c.key for c in asked}) == 40
 
 
@@ -46,7 +46,7 @@ def test_a_small_space_is_searched_as_a_whole() -> None:
     problem = lag_problem(
         "G[0,10] (x <= 99)", inputs=0, parameters=[ParameterRange("x0", 0, 9, kind="integer")]
     )
-    asked = drive(Coverage(problem, seed=2), partial(evaluate, problem), rounds=14)
+    asked = drive(CoverageEngine(problem, seed=2), partial(evaluate, problem), rounds=14)
     assert len({c.key for c in asked[:10]}) == 10
     assert len(asked) == 14, "then it repeats"
 
