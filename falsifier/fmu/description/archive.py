@@ -35,15 +35,8 @@ _MAX_NAME_BYTES, _MAX_PATH_BYTES = 255, 2048
 # Of a name in a message.
 _SHOWN_CHARACTERS = 100
 
-_MACHINES = {
-    "amd64": "x86_64",
-    "x86_64": "x86_64",
-    "i386": "x86",
-    "i686": "x86",
-    "x86": "x86",
-    "arm64": "aarch64",
-    "aarch64": "aarch64",
-}
+# FMI 3 names of machines, where the system has others.
+_MACHINES = {"amd64": "x86_64", "i386": "x86", "i686": "x86", "arm64": "aarch64"}
 # FMI 3 names of the folders of FMI 1 and 2. FMI 2 defines none for ARM; tools use the FMI 3 names there.
 _OLD_PLATFORMS = {
     "linux64": "x86_64-linux",
@@ -166,13 +159,7 @@ def this_platform() -> str:
 
 
 def library_file(fmi_version: str, identifier: str, platform: str) -> PurePosixPath:
-    """Return the path of a library inside an FMU.
-
-    Args:
-        fmi_version: FMI version of the FMU.
-        identifier: its model identifier.
-        platform: FMI 3 name of the platform.
-    """
+    """Return the path inside an FMU of the library of a model identifier for a platform."""
     folder = platform
     if not fmi_version.startswith("3"):
         folder = next((old for old, new in _OLD_PLATFORMS.items() if new == platform), platform)

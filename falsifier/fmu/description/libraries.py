@@ -47,13 +47,7 @@ class Libraries:
 
 
 def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface, str]) -> Libraries:
-    """Look up the libraries in an FMU; the only one for a platform may have any name.
-
-    Args:
-        path: path of the FMU.
-        fmi_version: its FMI version.
-        identifiers: model identifier by interface.
-    """
+    """Look up the libraries in an FMU by their identifiers; the only one for a platform may have any name."""
     names = archive.entry_names(path)
     places, windows_places = (
         {i: archive.library_file(fmi_version, name, platform) for i, name in identifiers.items()}
@@ -111,11 +105,7 @@ def _missing_text(
 ) -> str:
     """Say that an FMU has no library for this platform, why those that it has do not help, and what does.
 
-    Args:
-        fmu: file name of the FMU.
-        names: names of its entries.
-        expected: libraries that could run here, this platform's first.
-        needs_wine: whether that for Windows can be simulated here.
+    The expected libraries are those that could run here, this platform's first.
     """
     for place in expected[:1] if needs_wine else expected:
         if found := sorted(path.name for path in _beside(names, place)):
