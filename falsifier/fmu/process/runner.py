@@ -27,10 +27,6 @@ _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
 class Runner:
     """Simulates one FMU or system in a worker.
 
-    Args:
-        workplace: returns the folder of all workers.
-        order: what to simulate.
-
     Attributes:
         reuse: how the next simulation starts, whichever process it runs in; None until that was tested.
         untrusted: ways to start that made the FMU crash or hang.

@@ -121,13 +121,7 @@ class Output:
 
 
 class Started:
-    """A worker's process with what belongs to it.
-
-    Args:
-        workplace: the folder of all workers.
-        folder: where its FMUs are.
-        rights: what these may do.
-        through_wine: whether it is the program for Windows.
+    """A worker's process with what belongs to it, for FMUs that were unpacked to a folder.
 
     Attributes:
         program: the process.

@@ -99,16 +99,12 @@ class Patience:
 class Worker(Started):
     """One worker: its process, its memory, and its messages.
 
-    Args:
-        workplace: the folder of all workers.
-        order: what it simulates.
-        reuse: how the next simulation starts; None: it finds out after the first.
-        untrusted: ways to start that it does not try.
-        logging: whether to ask the FMU for messages.
+    Simulations after the first start by ``reuse``; without one, it finds out how, and does not try untrusted
+    ways.
 
     Attributes:
         plan: the plan for which it is prepared; None: it has not loaded the FMU.
-        logging: as above.
+        logging: whether it asks the FMU for messages.
         awaits_test: whether it is finding out how simulations can start.
         simulations: number of simulations that it has completed.
         started: when it was started, by time.perf_counter().
