@@ -53,7 +53,10 @@ def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface,
         {i: archive.library_file(fmi_version, name, platform) for i, name in identifiers.items()}
         for platform in (archive.this_platform(), archive.WINDOWS)
     )
-    here, windows = _found(names, places), _found(names, windows_places)
+    here, windows = (
+        {i: found for i, place in expected.items() if (found := _find(names, place)) is not None}
+        for expected in (places, windows_places)
+    )
     through_wine = [i for i in windows if i not in here and can_run_windows()]
     lacking = {
         interface: _missing_text(
@@ -83,12 +86,8 @@ def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface,
 def platforms(names: Iterable[str]) -> tuple[str, ...]:
     """Return the FMI 3 names (``x86_64-linux``) of the platforms for which the entries contain binaries."""
     paths = [PurePosixPath(name).parts for name in names]
-    return tuple(sorted({archive.platform_of(p[1]) for p in paths if len(p) == 3 and p[0] == "binaries"}))
-
-
-def _found(names: Sequence[str], places: Mapping[Interface, PurePosixPath]) -> dict[Interface, PurePosixPath]:
-    found = {interface: _find(names, place) for interface, place in places.items()}
-    return {interface: place for interface, place in found.items() if place is not None}
+    folders = {p[1] for p in paths if len(p) == 3 and p[0] == "binaries"}
+    return tuple(sorted({archive.OLD_PLATFORMS.get(folder, folder) for folder in folders}))
 
 
 def _name_notes(

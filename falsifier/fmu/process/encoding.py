@@ -17,17 +17,16 @@ from falsifier.fmu.process.network import Member
 
 # Storage types of values; their position is the number that request.c reads.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
-_STORED_3: Mapping[str, str] = {
-    "Float64": "f8",
-    "Float32": "f4",
-    "Boolean": "u1",
-    **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
-    **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
-}
 STORED: Mapping[int, Mapping[str, str]] = {
     1: {"Real": "f8", "Integer": "i4", "Boolean": "u1"},
     2: {"Real": "f8", "Integer": "i4", "Boolean": "i4"},
-    3: _STORED_3,
+    3: {
+        "Float64": "f8",
+        "Float32": "f4",
+        "Boolean": "u1",
+        **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
+        **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
+    },
 }
 
 

@@ -47,12 +47,8 @@ class Memory:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self._file = posix_files.unnamed_file() if path is None else path.open("x+b", buffering=0)
+        self.file = posix_files.unnamed_file() if path is None else path.open("x+b", buffering=0)
         self._count = 0
-
-    def fileno(self) -> int:
-        """Descriptor of the file."""
-        return self._file.fileno()
 
     def fit(self, count: int) -> None:
         """Make room for at least this many values.
@@ -61,18 +57,18 @@ class Memory:
             OSError: if there is none, or files may not be so large.
         """
         if count > self._count:
-            posix_files.enlarge(self._file, 8 * count)
+            posix_files.enlarge(self.file, 8 * count)
             self._count = count
 
     def write(self, values: NDArray[np.float64], position: int) -> None:
         """Let the worker see these values."""
-        os.pwrite(self.fileno(), values.data, 8 * position)
+        os.pwrite(self.file.fileno(), values.data, 8 * position)
 
     def read(self, values: NDArray[np.float64], position: int) -> None:
         """Fill an array, shape (n,), with what the worker has written; with NaN if the file has shrunk."""
-        self._file.seek(8 * position)
+        self.file.seek(8 * position)
         left = values.view(np.uint8).data
-        while left and (count := self._file.readinto(left)):
+        while left and (count := self.file.readinto(left)):
             left = left[count:]
         if left:
             values[:] = np.nan
@@ -80,24 +76,16 @@ class Memory:
     def header(self, position: int) -> float:
         """Return a number of the header, as the worker says; it may be anything."""
         value = np.zeros(1)
-        if not self._file.closed:
+        if not self.file.closed:
             self.read(value, position)
         return float(value[0])
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 class Output:
     """A file for a process's output, with a position that it shares with this process."""
 
     def __init__(self) -> None:
-        self._file = posix_files.sealed_file(_MOST_BYTES)
-
-    def fileno(self) -> int:
-        """Descriptor of the file, for the process that prints."""
-        return self._file.fileno()
+        self.file = posix_files.sealed_file(_MOST_BYTES)
 
     def take(self, until: int | None = None) -> tuple[str, ...]:
         """Return the lines printed since the last call; only the last of much output.
@@ -105,19 +93,16 @@ class Output:
         Args:
             until: position where they end, if the process goes on printing; it may say anything.
         """
-        position = os.lseek(self.fileno(), 0, os.SEEK_CUR)
+        descriptor = self.file.fileno()
+        position = os.lseek(descriptor, 0, os.SEEK_CUR)
         if not position:
             return ()
         # The process may have moved the position, which would otherwise be the number of bytes.
         size = min(position, _MOST_BYTES if until is None else until, _MOST_BYTES)
-        text = os.pread(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
-        os.lseek(self.fileno(), 0, os.SEEK_SET)
+        text = os.pread(descriptor, min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        os.lseek(descriptor, 0, os.SEEK_SET)
         lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
         return lines if size < _MOST_BYTES else (*lines, _DROPPED)
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 class Started:
@@ -159,7 +144,7 @@ class Started:
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
             told = encoded(rights, (scratch, folder), _hidden(), memory=memory, command=command)
             self.program = posix.Program(
-                [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), replies
+                [str(path)], environment, self.output.file.fileno(), told, self.memory.file.fileno(), replies
             )
         except BaseException as error:
             self._close()
@@ -176,8 +161,8 @@ class Started:
         return self._code
 
     def _close(self) -> None:
-        self.output.close()
-        self.memory.close()
+        self.output.file.close()
+        self.memory.file.close()
         posix_files.remove_tree(self._scratch)
 
 
