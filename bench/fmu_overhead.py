@@ -153,11 +153,11 @@ def endurance(count: int) -> str:
         for _ in range(300):
             model.simulate({}, {}, experiment)
         fmu = runner(model)
-        first = fmu._worker.pid if fmu._worker else 0
+        first = fmu._worker.program.pid if fmu._worker else 0
         before = memory_kib(os.getpid()), memory_kib(first) if first else 0, descriptors()
         for _ in range(count):
             model.simulate({}, {}, experiment)
-        last = fmu._worker.pid if fmu._worker else 0
+        last = fmu._worker.program.pid if fmu._worker else 0
         after = memory_kib(os.getpid()), memory_kib(last) if last else 0, descriptors()
         lines.append(
             f"| {name} | {before[0]} -> {after[0]} | {before[1]} -> {after[1]}"

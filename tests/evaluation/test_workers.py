@@ -73,7 +73,7 @@ def test_a_simulation_in_a_thread_is_stopped_at_the_end() -> None:
 
     def workers() -> list[int]:
         found = [runner._worker for runner in runners(model)]
-        return [worker.pid for worker in found if worker is not None and worker.plan is not None]
+        return [worker.program.pid for worker in found if worker is not None and worker.plan is not None]
 
     with local_executor(2, model) as executor:
         assert executor is not None

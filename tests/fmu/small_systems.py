@@ -27,7 +27,7 @@ def system(
 
 def pids(model: System) -> list[int]:
     workers = [runner._worker for runner in fixtures.runners(model)]
-    return [worker.pid for worker in workers if worker is not None]
+    return [worker.program.pid for worker in workers if worker is not None]
 
 
 def loop(coupling: Coupling | None = None, *, plant: str = "Plant_2", pi: str = "Gain_2") -> System:

@@ -34,7 +34,7 @@ def test_a_reset_that_corrupts_memory_is_not_used_again() -> None:
     expected = run(fresh, ("y",), signals=ONE)["y"].tolist()
     for _ in range(8):
         assert run(model, ("y",), signals=ONE)["y"].tolist() == expected
-    trust = fixtures.runner(model)._experience
+    trust = fixtures.runner(model)
     assert (trust.reuse, trust.untrusted) == ("instance", ("reset",))
 
 
@@ -45,9 +45,9 @@ def test_a_reset_that_hangs_does_not_cost_the_time_limit() -> None:
     assert first == second
     # The trial would be waited for five times as long as one simulation may take.
     assert time.perf_counter() - started < 300.0
-    assert fixtures.runner(model)._experience.untrusted == ("reset",)
+    assert fixtures.runner(model).untrusted == ("reset",)
     run(model, ("y",), signals=ONE)
-    assert fixtures.runner(model)._experience.reuse == "instance"
+    assert fixtures.runner(model).reuse == "instance"
 
 
 @pytest.mark.parametrize("name", ["Silent_2", "Silent_3"])

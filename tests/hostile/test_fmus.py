@@ -100,7 +100,7 @@ def test_output_without_end_fills_neither_memory_nor_messages(hostile: FmuModel)
     found = attack(hostile, FLOOD)
     assert found.log[-1] == "(further output was dropped)"
     assert sum(map(len, found.log)) < 100_000
-    assert os.fstat(worker(hostile)._started.output.fileno()).st_size <= 1 << 20
+    assert os.fstat(worker(hostile).output.file.fileno()).st_size <= 1 << 20
 
 
 def test_what_an_fmu_forks_ends_with_its_process(hostile: FmuModel) -> None:

@@ -35,17 +35,10 @@ _MAX_NAME_BYTES, _MAX_PATH_BYTES = 255, 2048
 # Of a name in a message.
 _SHOWN_CHARACTERS = 100
 
-_MACHINES = {
-    "amd64": "x86_64",
-    "x86_64": "x86_64",
-    "i386": "x86",
-    "i686": "x86",
-    "x86": "x86",
-    "arm64": "aarch64",
-    "aarch64": "aarch64",
-}
+# FMI 3 names of machines, where the system has others.
+_MACHINES = {"amd64": "x86_64", "i386": "x86", "i686": "x86", "arm64": "aarch64"}
 # FMI 3 names of the folders of FMI 1 and 2. FMI 2 defines none for ARM; tools use the FMI 3 names there.
-_OLD_PLATFORMS = {
+OLD_PLATFORMS = {
     "linux64": "x86_64-linux",
     "linux32": "x86-linux",
     "win64": "x86_64-windows",
@@ -154,11 +147,6 @@ def entry_names(path: Path) -> tuple[str, ...]:
         return tuple(archive.namelist())
 
 
-def platform_of(folder: str) -> str:
-    """Return the FMI 3 name (``x86_64-linux``) of the platform of a folder below ``binaries``."""
-    return _OLD_PLATFORMS.get(folder, folder)
-
-
 def this_platform() -> str:
     """Return the FMI 3 name of the platform that this Python runs on."""
     machine = platform.machine().lower()
@@ -166,16 +154,10 @@ def this_platform() -> str:
 
 
 def library_file(fmi_version: str, identifier: str, platform: str) -> PurePosixPath:
-    """Return the path of a library inside an FMU.
-
-    Args:
-        fmi_version: FMI version of the FMU.
-        identifier: its model identifier.
-        platform: FMI 3 name of the platform.
-    """
+    """Return the path inside an FMU of the library of a model identifier for a platform."""
     folder = platform
     if not fmi_version.startswith("3"):
-        folder = next((old for old, new in _OLD_PLATFORMS.items() if new == platform), platform)
+        folder = next((old for old, new in OLD_PLATFORMS.items() if new == platform), platform)
     suffix = _LIBRARY_SUFFIX.get(platform.rpartition("-")[2], ".so")
     return PurePosixPath("binaries", folder, identifier + suffix)
 

@@ -47,19 +47,16 @@ class Libraries:
 
 
 def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface, str]) -> Libraries:
-    """Look up the libraries in an FMU; the only one for a platform may have any name.
-
-    Args:
-        path: path of the FMU.
-        fmi_version: its FMI version.
-        identifiers: model identifier by interface.
-    """
+    """Look up the libraries in an FMU by their identifiers; the only one for a platform may have any name."""
     names = archive.entry_names(path)
     places, windows_places = (
         {i: archive.library_file(fmi_version, name, platform) for i, name in identifiers.items()}
         for platform in (archive.this_platform(), archive.WINDOWS)
     )
-    here, windows = _found(names, places), _found(names, windows_places)
+    here, windows = (
+        {i: found for i, place in expected.items() if (found := _find(names, place)) is not None}
+        for expected in (places, windows_places)
+    )
     through_wine = [i for i in windows if i not in here and can_run_windows()]
     lacking = {
         interface: _missing_text(
@@ -89,12 +86,8 @@ def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface,
 def platforms(names: Iterable[str]) -> tuple[str, ...]:
     """Return the FMI 3 names (``x86_64-linux``) of the platforms for which the entries contain binaries."""
     paths = [PurePosixPath(name).parts for name in names]
-    return tuple(sorted({archive.platform_of(p[1]) for p in paths if len(p) == 3 and p[0] == "binaries"}))
-
-
-def _found(names: Sequence[str], places: Mapping[Interface, PurePosixPath]) -> dict[Interface, PurePosixPath]:
-    found = {interface: _find(names, place) for interface, place in places.items()}
-    return {interface: place for interface, place in found.items() if place is not None}
+    folders = {p[1] for p in paths if len(p) == 3 and p[0] == "binaries"}
+    return tuple(sorted({archive.OLD_PLATFORMS.get(folder, folder) for folder in folders}))
 
 
 def _name_notes(
@@ -111,11 +104,7 @@ def _missing_text(
 ) -> str:
     """Say that an FMU has no library for this platform, why those that it has do not help, and what does.
 
-    Args:
-        fmu: file name of the FMU.
-        names: names of its entries.
-        expected: libraries that could run here, this platform's first.
-        needs_wine: whether that for Windows can be simulated here.
+    The expected libraries are those that could run here, this platform's first.
     """
     for place in expected[:1] if needs_wine else expected:
         if found := sorted(path.name for path in _beside(names, place)):

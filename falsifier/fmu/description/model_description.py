@@ -116,19 +116,15 @@ def describe(path: Path, sha256: str) -> Description:
     """
     text = archive.read_entry(path, "modelDescription.xml")
     root = read_xml(text, f"{path}: modelDescription.xml", ModelError)
-    described = parse(root, name=str(path), platforms=platforms(archive.entry_names(path)))
+    described = parse(root, name=str(path))
     libraries = find_libraries(path, described.info.fmi_version, described.identifiers)
-    info = replace(described.info, notes=(*described.info.notes, *libraries.notes))
+    notes, supported = (*described.info.notes, *libraries.notes), platforms(archive.entry_names(path))
+    info = replace(described.info, notes=notes, platforms=supported)
     return replace(described, info=info, libraries=libraries)
 
 
-def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Description:
-    """Return the description in a parsed modelDescription.xml.
-
-    Args:
-        root: the ``fmiModelDescription`` element.
-        name: file name for error messages.
-        platforms: platforms for which the archive contains binaries.
+def parse(root: Element, *, name: str) -> Description:
+    """Return the description in a parsed modelDescription.xml of a file that errors call by this name.
 
     Raises:
         ModelError: if the FMI version is not 1, 2 or 3, or an attribute is missing or invalid.
@@ -141,14 +137,14 @@ def parse(root: Element, *, name: str, platforms: tuple[str, ...] = ()) -> Descr
         if len(text) > LONGEST_NAME:
             element.set("description", f"{text[:LONGEST_NAME]} ...")
     try:
-        return _parse(root, version, platforms)
+        return _parse(root, version)
     except (KeyError, ValueError, IndexError) as error:
         raise ModelError(
             f"{name}: modelDescription.xml does not follow FMI {version} ({type(error).__name__}: {error})"
         ) from error
 
 
-def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Description:
+def _parse(root: Element, version: str) -> Description:
     major = int(version[0])
     interfaces = _interfaces(root, major)
     identifiers = {interface: stated["modelIdentifier"] for interface, stated in interfaces.items()}
@@ -163,7 +159,6 @@ def _parse(root: Element, version: str, platforms: tuple[str, ...]) -> Descripti
         description=root.get("description", ""),
         fmi_version=version,
         interfaces=tuple(identifiers),
-        platforms=platforms,
         tool=tool,
         start_time=finite(experiment.get("startTime")),
         stop_time=_positive(experiment.get("stopTime")),

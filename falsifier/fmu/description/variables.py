@@ -39,6 +39,8 @@ _CAUSALITIES: Mapping[str, Causality] = {
     "independent": "independent",
 }
 _NO_ELEMENT = Element("none")
+# Causality, variability, and why the variable cannot be set; empty if it can.
+_Role = tuple[Causality, str, str]
 # Why variables of these causalities cannot be set.
 _REFUSALS: Mapping[str, str] = {
     "structuralParameter": "it is a structural parameter, which sets array sizes",
@@ -78,10 +80,6 @@ def read_variables(
 ) -> tuple[tuple[Variable, ...], dict[str, Slot], dict[int, tuple[float, ...]]]:
     """Return the scalar variables, elements of arrays among them, in the order of the description.
 
-    Args:
-        root: the ``fmiModelDescription`` element.
-        major: major FMI version.
-
     Returns:
         The variables, how to access each by name, and the start values of all elements by value reference,
         for arrays only.
@@ -93,38 +91,26 @@ def read_variables(
     variables: list[Variable] = []
     slots: dict[str, Slot] = {}
     for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
-        _check_variable(variable, slot, slots)
+        check_length(variable.name)
+        if variable.name in slots:
+            raise ValueError(f"two variables are named {variable.name!r}")
+        if not 0 <= slot.reference <= _LARGEST_REFERENCE:
+            raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
         variables.append(variable)
         slots[variable.name] = slot
-    return *with_aliases_marked(variables, slots), arrays
+    return *_with_aliases_marked(variables, slots), arrays
 
 
 def check_length(name: str) -> None:
-    """Refuse names that are too long to be shown.
-
-    Raises:
-        ValueError: if the name is.
-    """
+    """Raise ValueError for a name that is too long to be shown."""
     if len(name) > LONGEST_NAME:
         raise ValueError(f"the name {name[:40]!r}... has more than {LONGEST_NAME} characters")
 
 
-def _check_variable(variable: Variable, slot: Slot, known: Mapping[str, Slot]) -> None:
-    check_length(variable.name)
-    if variable.name in known:
-        raise ValueError(f"two variables are named {variable.name!r}")
-    if not 0 <= slot.reference <= _LARGEST_REFERENCE:
-        raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
-
-
-def with_aliases_marked(
+def _with_aliases_marked(
     variables: Sequence[Variable], slots: Mapping[str, Slot]
 ) -> tuple[tuple[Variable, ...], dict[str, Slot]]:
-    """Mark all but one of the names of each variable that can be set: setting two of them would set it twice.
-
-    Returns:
-        The variables and their slots in the same order; aliases cannot be set.
-    """
+    """Mark all names but one of each variable that can be set: setting two of them would set it twice."""
     first: dict[tuple[str, int, int], str] = {}
     marked: dict[str, Variable] = {}
     changed = dict(slots)
@@ -162,7 +148,7 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
         start, is_state = _start(kind, typed.get("start")), position in states
         variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
         reference, negated = int(element.attrib["valueReference"]), element.get("alias") == "negatedAlias"
-        yield variable, Slot(reference, code, negated=negated, refusal=role.refusal)
+        yield variable, Slot(reference, code, negated=negated, refusal=role[2])
 
 
 def _states_2(root: Element, elements: list[Element]) -> set[int]:
@@ -193,7 +179,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         role = _role(element, 3, default, has_start=bool(starts))
         clocks = set(map(int, element.get("clocks", "").split()))
         if clocks:
-            role = replace(role, refusal="it belongs to a clock; only the FMU itself may change it")
+            role = (*role[:2], "it belongs to a clock; only the FMU itself may change it")
         shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
         count = prod(shape)
         if not 0 <= count <= _MAX_ELEMENTS:
@@ -202,7 +188,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
         if shape and kind != "string":
             arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
         variable = _variable(element, element, definition, (kind, code), role, is_state=reference in states)
-        is_clocked = bool(clocks) and (clocks <= ticked or role.causality == "input")
+        is_clocked = bool(clocks) and (clocks <= ticked or variable.causality == "input")
         names = [(variable.name, variable.description)]
         names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
         for name, description in names:
@@ -216,17 +202,8 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                         start=starts[offset] if starts else None,
                         is_clocked=is_clocked,
                     ),
-                    Slot(reference, code, offset, count, refusal=role.refusal, declared=variable.name),
+                    Slot(reference, code, offset, count, refusal=role[2], declared=variable.name),
                 )
-
-
-@dataclass(frozen=True, slots=True)
-class _Role:
-    """Causality, variability, and why the variable cannot be set; empty if it can."""
-
-    causality: Causality
-    variability: str
-    refusal: str
 
 
 def _variable(
@@ -239,31 +216,21 @@ def _variable(
     *,
     is_state: bool,
 ) -> Variable:
-    """Return a variable.
-
-    Args:
-        element: with its name.
-        typed: with the attributes of its type.
-        definition: with those of its declared type, which hold unless it states others.
-        type_: kind and type code.
-        role: its role.
-        start: its start value.
-        is_state: whether it is a continuous state.
-    """
+    """Return a variable; what its declared type, the definition, says holds unless its own type says more."""
     attributes = {**definition.attrib, **typed.attrib}
     items = enumerate(definition.findall("Item"), start=1)
     return Variable(
         name=element.attrib["name"],
         kind=type_[0],
-        causality=role.causality,
-        variability=role.variability,
+        causality=role[0],
+        variability=role[1],
         unit=_unit(attributes.get("unit")),
         display_unit=_unit(attributes.get("displayUnit")),
         low=_limit(attributes.get("min")),
         high=_limit(attributes.get("max")),
         nominal=finite(attributes.get("nominal")),
         start=start,
-        settable=not role.refusal,
+        settable=not role[2],
         is_state=is_state,
         literals={item.attrib["name"]: int(item.get("value", k)) for k, item in items},
         description=element.get("description", ""),
@@ -286,7 +253,7 @@ def _role(element: Element, major: int, default_variability: str = "continuous",
         refusal = "" if initial in ("exact", "approx") else "the model computes its initial value"
     if variability == "constant":
         refusal = "it is a constant"
-    return _Role(_CAUSALITIES.get(causality, "local"), variability, refusal)
+    return _CAUSALITIES.get(causality, "local"), variability, refusal
 
 
 def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:

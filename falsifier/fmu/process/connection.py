@@ -93,38 +93,21 @@ class Reply:
         return self.where == Where.DONE
 
 
-class Closed(Exception):
-    """The process has ended, or closed its end of the connection."""
-
-
-class Garbled(Closed):
+class Garbled(ConnectionError):
     """What has arrived is not a reply, so the connection cannot be used any more."""
 
 
 def send(program: posix.WatchedProgram, kind: Request, payload: bytes = b"") -> None:
-    """Send one request.
-
-    Raises:
-        Closed: if the program has ended, or does not read it.
-    """
-    try:
-        program.send(_REQUEST.pack(kind, len(payload)) + payload, _SENDING_SECONDS)
-    except ConnectionError as error:
-        raise Closed from error
+    """Send one request; ConnectionError if the program has ended, or does not read it."""
+    program.send(_REQUEST.pack(kind, len(payload)) + payload, _SENDING_SECONDS)
 
 
 def receive(program: posix.WatchedProgram, limit: float, *, polling: float = 0.0) -> Reply:
-    """Wait for a reply, at most this many seconds.
-
-    Args:
-        program: which replies.
-        limit: in s.
-        polling: for how many seconds at first to poll, yielding to other processes.
+    """Wait for a reply, at most this many seconds; at first poll, yielding to other processes.
 
     Raises:
         TimeoutError: if there was none.
-        Closed: if the program has ended or closed its end.
-        Garbled: if what arrived is not a reply.
+        ConnectionError: if the program has ended or closed its end; Garbled if what arrived is not a reply.
     """
     mark, where, status, flags, length, printed, reached = _REPLY.unpack(
         _exactly(program, _REPLY.size, limit, polling)
@@ -153,5 +136,5 @@ def _exactly(program: posix.WatchedProgram, count: int, limit: float, polling: f
             raise Garbled from None
         data = data + more if more else b""
     if not data:
-        raise Closed
+        raise ConnectionError("the program has ended, or closed its end")
     return data

@@ -17,17 +17,16 @@ from falsifier.fmu.process.network import Member
 
 # Storage types of values; their position is the number that request.c reads.
 STORAGE: tuple[str, ...] = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
-_STORED_3: Mapping[str, str] = {
-    "Float64": "f8",
-    "Float32": "f4",
-    "Boolean": "u1",
-    **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
-    **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
-}
 STORED: Mapping[int, Mapping[str, str]] = {
     1: {"Real": "f8", "Integer": "i4", "Boolean": "u1"},
     2: {"Real": "f8", "Integer": "i4", "Boolean": "i4"},
-    3: _STORED_3,
+    3: {
+        "Float64": "f8",
+        "Float32": "f4",
+        "Boolean": "u1",
+        **{f"Int{b}": f"i{b // 8}" for b in (8, 16, 32, 64)},
+        **{f"UInt{b}": f"u{b // 8}" for b in (8, 16, 32, 64)},
+    },
 }
 
 
@@ -62,24 +61,19 @@ def ports(description: Description, names: Sequence[str]) -> bytes:
 
 
 def inputs(description: Description, names: Sequence[str], parameters: Sequence[str]) -> bytes:
-    """Return the same for inputs, and which parameters are fixed elements of their arrays (FMI 3).
+    """Return the same for inputs, and which parameters are other elements of their arrays (FMI 3).
 
     Setting an input sets its whole array, and must not put the other elements back to their start values.
     """
-    fixed = fixed_elements(description, names, parameters)
-    calls, places = _table(description, [*names, *(parameters[k] for k in fixed)])
-    own, others = places[: len(names)], places[len(names) :]
-    numbered = [place + integers(k) for place, k in zip(others, fixed, strict=True)]
-    return calls + integers(len(own)) + b"".join(own) + integers(len(numbered)) + b"".join(numbered)
-
-
-def fixed_elements(description: Description, names: Sequence[str], parameters: Sequence[str]) -> list[int]:
-    """Return the positions of the parameters that are other elements of the inputs' arrays (FMI 3)."""
     slots = [description.slot(name) for name in names]
     arrays = {slot.reference for slot in slots if slot.size > 1}
     driven = {(slot.reference, slot.offset) for slot in slots}
     found = [(k, description.slot(name)) for k, name in enumerate(parameters)]
-    return [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
+    fixed = [k for k, s in found if s.reference in arrays and (s.reference, s.offset) not in driven]
+    calls, places = _table(description, [*names, *(parameters[k] for k in fixed)])
+    own, others = places[: len(names)], places[len(names) :]
+    numbered = [place + integers(k) for place, k in zip(others, fixed, strict=True)]
+    return calls + integers(len(own)) + b"".join(own) + integers(len(numbered)) + b"".join(numbered)
 
 
 def _table(description: Description, names: Sequence[str]) -> tuple[bytes, list[bytes]]:
@@ -109,13 +103,7 @@ def _table(description: Description, names: Sequence[str]) -> tuple[bytes, list[
 
 
 def fmu(member: Member, folder: Path, *, logging: bool, through_wine: bool) -> bytes:
-    """Return what the worker needs to load an FMU.
-
-    Args:
-        member: the FMU and its interface.
-        folder: where it was unpacked.
-        logging: whether to ask it for messages.
-        through_wine: whether the worker is the program for Windows.
+    """Return what the worker needs to load an FMU that was unpacked to this folder.
 
     Raises:
         ModelError: if it has no library for the worker.

@@ -3,7 +3,7 @@
 ``falsifier/fmu/worker/system/request.c`` is the other side. Components come in the order in which they step.
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -13,8 +13,11 @@ from falsifier.errors import SpecError
 from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process import encoding
 from falsifier.fmu.process.network import SYSTEM, Member, Network, Place
-from falsifier.fmu.process.plan import Plan, solver_tolerance
+from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.rights import Rights
+
+# Relative, of the solver (model exchange).
+_DEFAULT_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,14 +44,10 @@ class Order:
         Raises:
             ModelError: if an FMU has no library for this machine.
         """
-        parts = [encoding.integers(self.network.coupling.isolation == "each", len(self.network.order))]
-        for k in self.network.order:
-            parts.append(
-                encoding.fmu(
-                    self.network.members[k], folder / str(k), logging=logging, through_wine=self.through_wine
-                )
-            )
-        return b"".join(parts)
+        network = self.network
+        options = {"logging": logging, "through_wine": self.through_wine}
+        parts = (encoding.fmu(network.members[k], folder / str(k), **options) for k in network.order)
+        return encoding.integers(network.coupling.isolation == "each", len(network.order)) + b"".join(parts)
 
     def prepare(self, plan: Plan) -> bytes:
         """Return the request to prepare for a plan's simulations.
@@ -57,7 +56,7 @@ class Order:
             SpecError: if a component's own step does not fit; see ``own_steps``.
         """
         network = self.network
-        coupling, signals = network.coupling, network.connected_outputs()
+        coupling, signals, feeds = network.coupling, network.connected_outputs(), _feeds(network, plan)
         steps = any(m.interface == "co-simulation" or m.step is not None for m in network.members)
         # Solvers that exchange nothing stop at the output grid only.
         every = plan.every if steps or network.links else 1
@@ -70,27 +69,36 @@ class Order:
             encoding.integers(coupling.method == "jacobi", coupling.max_rounds),
             encoding.reals(coupling.tolerance),
             encoding.integers(len(signals)),
-            *(_component(network, plan, position) for position in range(len(network.order))),
+            *(_component(network, plan, position, feeds) for position in range(len(network.order))),
             encoding.integers(len(copies), *(number for pair in copies for number in pair)),
         ]
         return b"".join(parts)
 
 
-def _sources_of(network: Network, plan: Plan) -> dict[Place, Place]:
-    """Return where the values of all inputs with a source come from: an output, or what the plan drives."""
-    driven = (network.places[name] for name in plan.inputs)
-    links = {link.target: link.source for link in network.links}
-    return links | {place: place for place in driven if place.member != SYSTEM}
+def _feeds(network: Network, plan: Plan) -> dict[Place, bytes]:
+    """Return where the value of each input with a source comes from, and how it is converted."""
+    signals = network.connected_outputs()
+    rows = {network.places[name]: row for row, name in enumerate(plan.inputs)}
+    found = {}
+    for link in network.links:
+        is_signal = link.source in signals
+        row = signals[link.source] if is_signal else rows[link.source]
+        numbers = encoding.reals(link.factor, link.offset, link.start)
+        found[link.target] = encoding.integers(is_signal, row) + numbers + encoding.integers(link.is_linear)
+    for place, row in rows.items():
+        if place.member != SYSTEM:
+            found[place] = encoding.integers(0, row) + encoding.reals(1.0, 0.0, 0.0) + encoding.integers(0)
+    return found
 
 
-def _component(network: Network, plan: Plan, position: int) -> bytes:
+def _component(network: Network, plan: Plan, position: int, feeds: Mapping[Place, bytes]) -> bytes:
     number, signals = network.order[position], network.connected_outputs()
     member, strings = network.members[number], network.of_member(number, plan.strings)
     description = member.description
     given = network.of_member(number, zip(plan.parameters, count()))
     recorded = network.of_member(number, zip(plan.outputs, count()))
     recorded = [(name, row) for name, row in recorded if Place(number, name) not in signals]
-    inputs = [place.name for place in _sources_of(network, plan) if place.member == number]
+    inputs = [place.name for place in feeds if place.member == number]
     held = [name for name in inputs if _is_held(description, member.interface, name)]
     plain = [name for name in inputs if name not in held]
     parameters = [name for name, _ in given]
@@ -98,13 +106,13 @@ def _component(network: Network, plan: Plan, position: int) -> bytes:
     is_iterated = any(first <= position < last for first, last in network.loops)
     own = own_steps(member, plan.max_step, plan.stop_time)
     parts = [
-        encoding.reals(solver_tolerance(plan, description.info)),
+        encoding.reals(plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE),
         encoding.integers(own, loop_end, is_iterated, len(strings)),
         *(encoding.integers(description.slots[n].reference) + encoding.text(value) for n, value in strings),
         encoding.ports(description, parameters),
         encoding.integers(*(row for _, row in given)),
         *(encoding.inputs(description, names, parameters) for names in (plain, held)),
-        _feeds(network, plan, [Place(number, name) for name in (*plain, *held)]),
+        *(feeds[Place(number, name)] for name in (*plain, *held)),
         encoding.ports(description, [place.name for place in signals if place.member == number]),
         encoding.ports(description, [name for name, _ in recorded]),
         encoding.integers(*(row for _, row in recorded)),
@@ -113,12 +121,7 @@ def _component(network: Network, plan: Plan, position: int) -> bytes:
 
 
 def own_steps(member: Member, step: float, stop_time: float) -> int:
-    """Return the number of communication steps in a component's own step.
-
-    Args:
-        member: the component.
-        step: communication step in s.
-        stop_time: end of the simulation in s.
+    """Return the number of communication steps, of this many s, in a component's own step.
 
     Raises:
         SpecError: if the own step is longer than the simulation or no integer multiple of the communication
@@ -149,22 +152,3 @@ def _is_held(description: Description, interface: Interface, name: str) -> bool:
     if interface == "co-simulation":
         return description.major == 3 and description.event_mode and variable.variability != "continuous"
     return not variable.is_continuous
-
-
-def _feeds(network: Network, plan: Plan, targets: Sequence[Place]) -> bytes:
-    """Return where the value of each of these inputs comes from, and how it is converted."""
-    signals, sources = network.connected_outputs(), _sources_of(network, plan)
-    rows = {network.places[name]: row for row, name in enumerate(plan.inputs)}
-    links = {link.target: link for link in network.links}
-    parts = []
-    for target in targets:
-        source, link = sources[target], links.get(target)
-        row = signals[source] if source in signals else rows[source]
-        numbers = (1.0, 0.0, 0.0) if link is None else (link.factor, link.offset, link.start)
-        is_linear = link is not None and link.is_linear
-        parts.append(
-            encoding.integers(source in signals, row)
-            + encoding.reals(*numbers)
-            + encoding.integers(is_linear)
-        )
-    return b"".join(parts)

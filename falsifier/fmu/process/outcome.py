@@ -53,12 +53,7 @@ def failure(
 ) -> FalsifierError:
     """Return the error for a simulation that did not reach its stop time.
 
-    Args:
-        network: what was simulated.
-        plan: of the simulation.
-        reply: how it ended; a worker may tell anything.
-        refusals: what the FMUs tried and were refused, for the end of the message.
-        log: what the FMUs have said.
+    A worker may reply anything. The refusals, of what FMUs tried and may not, end the message.
     """
     component = "" if reply.where in _OF_ALL else network.stepped(reply.component)
     words = reply.text.split()

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import GRID_ROUNDING, Experiment, ModelInfo
+from falsifier.core.model import GRID_ROUNDING, Experiment
 from falsifier.errors import ModelError, SimulationError, SpecError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 
-_DEFAULT_TOLERANCE = 1e-6
 _DEFAULT_TIME_LIMIT = 60.0
 # Numbers at the start of the memory; their positions are those of ``enum header`` in worker.h.
 HEADER = 8
@@ -74,11 +73,6 @@ class Plan:
         return (self.samples - 1) * self.every
 
 
-def solver_tolerance(plan: Plan, info: ModelInfo) -> float:
-    """Return the relative tolerance of the solver (model exchange)."""
-    return plan.tolerance or info.tolerance or _DEFAULT_TOLERANCE
-
-
 def make_plan(
     description: Description,
     experiment: Experiment,
@@ -109,7 +103,12 @@ def make_plan(
     for name in experiment.outputs:
         description.slot(name)
     for name, _ in experiment.strings:
-        _check_string(description, name)
+        slot = description.slots.get(name)
+        if slot is None:
+            raise ModelError(f"{model}: no variable {name!r}; {did_you_mean(name, description.slots)}")
+        if slot.refusal or slot.type != "String" or slot.size != 1:
+            reason = slot.refusal or "it is not a single string"
+            raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
     times = experiment.times
     times.flags.writeable = False
     return Plan(
@@ -128,15 +127,6 @@ def make_plan(
         strings=experiment.strings,
         has_limit=experiment.time_limit is not None,
     )
-
-
-def _check_string(description: Description, name: str) -> None:
-    model, slot = description.info.name, description.slots.get(name)
-    if slot is None:
-        raise ModelError(f"{model}: no variable {name!r}; {did_you_mean(name, description.slots)}")
-    if slot.refusal or slot.type != "String" or slot.size != 1:
-        reason = slot.refusal or "it is not a single string"
-        raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
 
 
 def _steps_per_output(experiment: Experiment) -> int:

@@ -73,11 +73,7 @@ class Registry:
             runner.close()
 
     def stop(self, threads: Collection[int]) -> None:
-        """End the workers of threads of this process, also in the middle of a simulation.
-
-        Args:
-            threads: their identifiers (threading.get_ident); they start no other simulation.
-        """
+        """End the workers of threads (threading.get_ident), which start no other simulation, at once."""
         with self._lock:
             found = [self._runners.pop(each) for each in list(self._runners) if each[1] in threads]
         for runner in found:
@@ -121,13 +117,7 @@ def simulate(
     inputs: Mapping[str, NDArray[np.float64]],
     parameters: Mapping[str, float],
 ) -> Trajectory:
-    """Simulate once, in this thread's worker.
-
-    Args:
-        order: what to simulate.
-        experiment: times and outputs.
-        inputs: each input that is set as a piecewise cubic (``Signal.pieces``).
-        parameters: values of parameters and start values.
+    """Simulate once, in this thread's worker, with inputs as piecewise cubics (``Signal.pieces``).
 
     Raises:
         SimulationError: if there is no complete trajectory of finite numbers.
@@ -208,10 +198,6 @@ def rights_text(allow: Collection[str] = (), deny: Collection[str] = ()) -> str:
     """Say in one line what FMUs may do on this machine, and what of that it does not enforce.
 
     It starts a worker to see that.
-
-    Args:
-        allow: what users allow; see Rights.
-        deny: what they deny.
 
     Raises:
         SpecError: if one of these is unknown.

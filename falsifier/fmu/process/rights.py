@@ -111,13 +111,7 @@ def _kind_and_path(word: str) -> tuple[str, Path | None]:
 
 
 def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_root: bool) -> tuple[str, ...]:
-    """Return the files and folders that no FMU may read, whether they exist or not.
-
-    Args:
-        environment: variables that name such files.
-        homes: the user's home, by all that is known of it.
-        is_root: whether FMUs could read what is root's.
-    """
+    """Return what no FMU may read, whether it exists or not: in homes, of the machine, named by variables."""
     places = [Path(place) for place in (_OF_MACHINE + (_OF_ROOT if is_root else "")).split()]
     places += [home / name for home in homes for name in _IN_HOME.split()]
     places += [
@@ -203,12 +197,7 @@ def read_told(data: bytes) -> Told:
 
 
 def described(rights: Rights, enforced: int) -> str:
-    """Say in one line what FMUs may do on this machine.
-
-    Args:
-        rights: what users have allowed and denied.
-        enforced: bits of ``enum enforced`` in worker/platform/sandbox.h.
-    """
+    """Say in one line what FMUs may do where this is enforced: bits of ``enum enforced`` in sandbox.h."""
     places = "".join(f" and {path}" for path in rights.writable)
     connecting, executing = "open network connections", "execute programs"
     may = [f"change files in its own folders{places}"]

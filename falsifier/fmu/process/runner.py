@@ -1,15 +1,17 @@
 """Simulation of one FMU or system in a worker, which is replaced if it crashes, hangs or leaks memory."""
 
+import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.process import outcome
-from falsifier.fmu.process.connection import Closed, Reply
+from falsifier.fmu.process.connection import Reply
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker
@@ -22,55 +24,25 @@ _MAX_REPEATS = 3
 _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
 
 
-class Experience:
-    """What is known of one FMU, whichever process it runs in.
-
-    Attributes:
-        reuse: how the next simulation starts; None until that was tested.
-        untrusted: ways that made the FMU crash or hang.
-        trying: the way that is being tested.
-    """
-
-    def __init__(self) -> None:
-        self.reuse: Reuse | None = None
-        self.untrusted: tuple[Reuse, ...] = ()
-        self.trying: Reuse = "reset"
-        self._repeats = 0
-        self._seconds = 0.0
-
-    def took(self, seconds: float) -> None:
-        """Remember how long loading the FMU and its first simulation took."""
-        self._seconds = max(self._seconds, seconds)
-
-    @property
-    def patience(self) -> float:
-        """How long to wait for a trial, in s."""
-        return _LEAST_SECONDS + _DURATIONS * self._seconds
-
-    def distrust(self, reuse: Reuse) -> None:
-        """Never start in this way again, nor in a cheaper one; test the others."""
-        self.untrusted = REUSES[: REUSES.index(reuse) + 1]
-        self.reuse = "process" if reuse == "process" else None
-
-    def is_worth_repeating(self) -> bool:
-        """Whether to repeat a failure in a new process for its messages; counts the repetitions."""
-        self._repeats += 1
-        return self._repeats <= _MAX_REPEATS
-
-
 class Runner:
     """Simulates one FMU or system in a worker.
 
-    Args:
-        workplace: returns the folder of all workers.
-        order: what to simulate.
+    Attributes:
+        reuse: how the next simulation starts, whichever process it runs in; None until that was tested.
+        untrusted: ways to start that made the FMU crash or hang.
     """
 
     def __init__(self, workplace: Callable[[], Workplace], order: Order) -> None:
         self._workplace, self._order = workplace, order
+        self.reuse: Reuse | None = None
+        self.untrusted: tuple[Reuse, ...] = ()
+        # The way that is being tested.
+        self._trying: Reuse = "reset"
+        # How long loading the FMU and its first simulation took at most.
+        self._seconds = 0.0
+        self._repeats = 0
         self._worker: Worker | None = None
         self._has_loaded = False
-        self._experience = Experience()
         self._lock = threading.Lock()
         self._is_stopped = False
 
@@ -92,9 +64,9 @@ class Runner:
             SimulationError: if there is no complete trajectory.
             ModelError: if the FMU cannot be used.
         """
-        with self._lock:
+        with self._using():
             worker = self._worker_for(plan)
-            is_reused, reuse = worker.simulations > 0, self._experience.reuse
+            is_reused, reuse = worker.simulations > 0, self.reuse
             try:
                 return self._simulate(worker, plan, given)
             except SimulationError as error:
@@ -107,7 +79,7 @@ class Runner:
                 raise failure from None
             repeated = self._simulate(speaking, plan, given)
             if is_reused and reuse is not None:
-                self._experience.distrust(reuse)
+                self._distrust(reuse)
             return repeated
 
     def load(self, plan: Plan) -> None:
@@ -116,7 +88,7 @@ class Runner:
         Raises:
             ModelError: if that fails.
         """
-        with self._lock:
+        with self._using():
             self._worker_for(plan)
 
     def close(self) -> None:
@@ -129,25 +101,49 @@ class Runner:
         self._is_stopped = True
         worker = self._worker
         if worker is not None:
-            worker.stop()
+            worker.program.stop()
         self.close()
 
     def forget(self) -> None:
         """Leave the worker to another process, of which this is a copy."""
         if self._worker is not None:
-            self._worker.forget()
+            with contextlib.suppress(OSError):
+                self._worker.program.forget()
             self._worker = None
+
+    @contextmanager
+    def _using(self) -> Iterator[None]:
+        """Keep other threads away; end the worker after all that goes wrong, an interrupt too.
+
+        Otherwise its reply would be mistaken for that of the next simulation.
+        """
+        with self._lock:
+            try:
+                yield
+            except BaseException:
+                self._drop()
+                raise
+
+    def _distrust(self, reuse: Reuse) -> None:
+        """Never start in this way again, nor in a cheaper one; test the others."""
+        self.untrusted = REUSES[: REUSES.index(reuse) + 1]
+        self.reuse = "process" if reuse == "process" else None
 
     def _should_repeat(self, error: SimulationError, *, is_reused: bool) -> bool:
         if self._is_stopped or error.status == "timeout" or (self._order.logging and not is_reused):
             return False
-        return (is_reused and error.status == "crashed") or self._experience.is_worth_repeating()
+        return (is_reused and error.status == "crashed") or self._is_worth_repeating()
+
+    def _is_worth_repeating(self) -> bool:
+        """Whether to repeat a failure in a new process for its messages; counts the repetitions."""
+        self._repeats += 1
+        return self._repeats <= _MAX_REPEATS
 
     def _speaking_worker(self, plan: Plan) -> Worker:
         """Return a new worker that asks the FMU for messages; it serves one simulation."""
         self._drop()
         worker = self._worker = Worker(self._workplace(), self._order, "process", (), logging=True)
-        self._prepare(worker, plan, is_new=True)
+        self._prepare(worker, plan)
         return worker
 
     def _simulate(
@@ -155,28 +151,19 @@ class Runner:
     ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         self._check_wanted()  # it may have been stopped while the worker was being started
         try:
-            worker.start(given)
-            reply = worker.wait()
+            reply = worker.simulate(plan, given)
         except TimeoutError:
-            reached, during, log = worker.reached, worker.during + worker.refusals, worker.take_log()
-            self._drop()
-            raise outcome.overdue(plan, reached, during, log) from None
-        except Closed as error:
-            reason, log = worker.crash(error)
-            self._worker = None
-            raise outcome.crash(plan, reason, log) from None
-        except BaseException:
-            # Interrupted: otherwise its reply would be mistaken for that of the next simulation.
-            self._drop()
-            raise
+            during = worker.during + worker.refusals
+            raise outcome.overdue(plan, worker.reached, during, worker.output.take()) from None
+        except ConnectionError as error:
+            raise outcome.crash(plan, *worker.crash(error)) from None
         if not reply.is_done:
-            log, refusals = worker.take_log(), worker.refusals
-            self._drop()
+            log, refusals = worker.output.take(), worker.refusals
             raise outcome.failure(self._order.network, plan, reply, refusals, log)
         outputs = worker.outputs(plan)
-        log = worker.take_log(reply)
+        log = worker.output.take(reply.printed)
         if worker.simulations == 1:
-            self._experience.took(time.perf_counter() - worker.started)
+            self._seconds = max(self._seconds, time.perf_counter() - worker.started)
         if reply.leaving:
             self._drop()
         return outputs, log
@@ -189,36 +176,32 @@ class Runner:
         self._check_wanted()
         if self._worker is not None and self._worker.awaits_test:
             self._await_test(self._worker)
-        if self._worker is not None and not self._worker.is_alive:  # it has died since its last simulation
+        if self._worker is not None and not self._worker.program.is_alive:  # since its last simulation
             self._drop()
-        worker, known = self._worker, self._experience
-        is_new = worker is None
+        worker = self._worker
         if worker is None:
-            worker = self._worker = Worker(
-                self._workplace(), self._order, known.reuse, known.untrusted, logging=self._order.logging
-            )
+            logging = self._order.logging
+            worker = Worker(self._workplace(), self._order, self.reuse, self.untrusted, logging=logging)
+            self._worker = worker
         if worker.plan is plan:
             return worker
         try:
-            self._prepare(worker, plan, is_new=is_new)
+            self._prepare(worker, plan)
         except ModelError:
-            if worker.logging or not known.is_worth_repeating():
+            if worker.logging or not self._is_worth_repeating():
                 raise
             # Once more, to hear why.
             return self._speaking_worker(plan)
         return worker
 
-    def _prepare(self, worker: Worker, plan: Plan, *, is_new: bool) -> None:
+    def _prepare(self, worker: Worker, plan: Plan) -> None:
         limit = plan.time_limit + GRACE_SECONDS
         try:
-            if is_new:
+            if worker.plan is None:
                 self._check(worker, worker.load(limit), may_load_later=True)
             self._check(worker, worker.prepare(plan, limit), may_load_later=False)
-        except (Closed, TimeoutError) as error:
+        except (ConnectionError, TimeoutError) as error:
             raise self._not_loaded(worker, error, plan.time_limit) from None
-        except BaseException:
-            self._drop()
-            raise
         self._has_loaded = True
 
     def _check(self, worker: Worker, reply: Reply, *, may_load_later: bool) -> None:
@@ -226,46 +209,42 @@ class Runner:
             return
         name = self._order.network.stepped(reply.component)
         said = f"{name}: {reply.text}" if name else reply.text
-        text = f"{self._order.network.name}: {said}{worker.refusals}{outcome.last_lines(worker.take_log())}"
+        log = outcome.last_lines(worker.output.take())
+        text = f"{self._order.network.name}: {said}{worker.refusals}{log}"
         # What has loaded before is not unusable for that.
         raise SimulationError(text) if may_load_later and self._has_loaded else ModelError(text)
 
     def _not_loaded(self, worker: Worker, error: Exception, time_limit: float) -> Exception:
         """Error of an FMU that crashed or hung while it was loaded: unusable if it has never been loaded."""
-        if isinstance(error, TimeoutError):
-            during, log = worker.during, worker.take_log()
-            self._drop()
-            reason = f"the FMU hung for {time_limit:g} s (time_limit) while it was loaded{during}"
+        hangs = isinstance(error, TimeoutError)
+        if hangs:
+            log = worker.output.take()
+            reason = f"the FMU hung for {time_limit:g} s (time_limit) while it was loaded{worker.during}"
         else:
             said, log = worker.crash(error)
-            self._worker = None
             how, _, end = said.partition(": ")
             reason = f"{how} while it was loaded{f' ({end})' if end else ''}"
         text = f"{self._order.network.name}: {reason}{outcome.last_lines(log)}"
         if not self._has_loaded:
             return ModelError(text)
-        hangs = isinstance(error, TimeoutError)
         return SimulationError(text, status="timeout" if hangs else "crashed", log=log)
 
     def _await_test(self, worker: Worker) -> None:
         """Receive the result of the worker's reuse test; what crashed or hung is not tried again."""
         worker.awaits_test = False
-        known = self._experience
+        patience = _LEAST_SECONDS + _DURATIONS * self._seconds
         try:
-            reply = worker.receive(known.patience)
+            reply = worker.receive(patience)
             while reply.more:
-                known.trying = _reuse(reply)
-                reply = worker.receive(known.patience)
-        except (Closed, TimeoutError):
-            known.distrust(known.trying)
+                self._trying = _reuse(reply)
+                reply = worker.receive(patience)
+        except (ConnectionError, TimeoutError):
+            self._distrust(self._trying)
             self._drop()
             return
-        except BaseException:
-            self._drop()
-            raise
-        worker.take_log()
-        known.reuse = _reuse(reply)
-        if reply.leaving or known.reuse == "process":
+        worker.output.take()
+        self.reuse = _reuse(reply)
+        if reply.leaving or self.reuse == "process":
             self._drop()
 
     def _drop(self) -> None:

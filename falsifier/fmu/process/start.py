@@ -13,7 +13,6 @@ from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
 from falsifier.errors import ModelError
 from falsifier.fmu.description.libraries import HOW_TO_INSTALL, find_wine, windows_path
-from falsifier.fmu.process.encoding import text
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment
 
@@ -45,19 +44,11 @@ class Memory:
 
     Args:
         path: of the file, for a worker that cannot get a descriptor; None: it has no name.
-
-    Attributes:
-        path: as above.
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self.path = path
-        self._file = posix_files.unnamed_file() if path is None else path.open("x+b", buffering=0)
+        self.file = posix_files.unnamed_file() if path is None else path.open("x+b", buffering=0)
         self._count = 0
-
-    def fileno(self) -> int:
-        """Descriptor of the file."""
-        return self._file.fileno()
 
     def fit(self, count: int) -> None:
         """Make room for at least this many values.
@@ -66,18 +57,18 @@ class Memory:
             OSError: if there is none, or files may not be so large.
         """
         if count > self._count:
-            posix_files.enlarge(self._file, 8 * count)
+            posix_files.enlarge(self.file, 8 * count)
             self._count = count
 
     def write(self, values: NDArray[np.float64], position: int) -> None:
         """Let the worker see these values."""
-        os.pwrite(self.fileno(), values.data, 8 * position)
+        os.pwrite(self.file.fileno(), values.data, 8 * position)
 
     def read(self, values: NDArray[np.float64], position: int) -> None:
         """Fill an array, shape (n,), with what the worker has written; with NaN if the file has shrunk."""
-        self._file.seek(8 * position)
+        self.file.seek(8 * position)
         left = values.view(np.uint8).data
-        while left and (count := self._file.readinto(left)):
+        while left and (count := self.file.readinto(left)):
             left = left[count:]
         if left:
             values[:] = np.nan
@@ -85,24 +76,16 @@ class Memory:
     def header(self, position: int) -> float:
         """Return a number of the header, as the worker says; it may be anything."""
         value = np.zeros(1)
-        if not self._file.closed:
+        if not self.file.closed:
             self.read(value, position)
         return float(value[0])
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
 
 
 class Output:
     """A file for a process's output, with a position that it shares with this process."""
 
     def __init__(self) -> None:
-        self._file = posix_files.sealed_file(_MOST_BYTES)
-
-    def fileno(self) -> int:
-        """Descriptor of the file, for the process that prints."""
-        return self._file.fileno()
+        self.file = posix_files.sealed_file(_MOST_BYTES)
 
     def take(self, until: int | None = None) -> tuple[str, ...]:
         """Return the lines printed since the last call; only the last of much output.
@@ -110,35 +93,28 @@ class Output:
         Args:
             until: position where they end, if the process goes on printing; it may say anything.
         """
-        position = os.lseek(self.fileno(), 0, os.SEEK_CUR)
+        descriptor = self.file.fileno()
+        position = os.lseek(descriptor, 0, os.SEEK_CUR)
         if not position:
             return ()
         # The process may have moved the position, which would otherwise be the number of bytes.
         size = min(position, _MOST_BYTES if until is None else until, _MOST_BYTES)
-        text = os.pread(self.fileno(), min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
-        os.lseek(self.fileno(), 0, os.SEEK_SET)
+        text = os.pread(descriptor, min(size, _SHOWN_BYTES), max(0, size - _SHOWN_BYTES))
+        os.lseek(descriptor, 0, os.SEEK_SET)
         lines = tuple(printable(text.decode("utf-8", "replace")).splitlines())
         return lines if size < _MOST_BYTES else (*lines, _DROPPED)
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
 
 class Started:
-    """A worker's process with what belongs to it.
-
-    Args:
-        workplace: the folder of all workers.
-        folder: where its FMUs are.
-        rights: what these may do.
-        through_wine: whether it is the program for Windows.
+    """A worker's process with what belongs to it, for FMUs that were unpacked to a folder.
 
     Attributes:
         program: the process.
         output: what it prints.
         memory: what it shares with this process.
-        scratch: its folder.
+        connect: what it is told first: where its replies go.
+        place: what it is told of where the memory is.
+        exception: the exception of Windows that has ended it, if it has told one.
 
     Raises:
         ModelError: if there is no program for this machine, or Wine is not installed.
@@ -152,19 +128,23 @@ class Started:
             if wine is None:
                 raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
             command = (str(wine), windows_path(workplace.program(windows=True)))
-        self.scratch = workplace.scratch()
+        self._scratch = scratch = workplace.scratch()
+        self._code: int | None = None
+        self.exception: int | None = None
         self.output = Output()
-        environment = worker_environment(os.environ, self.scratch)
+        environment = worker_environment(os.environ, scratch)
         if through_wine:
-            _make_prefix(self.scratch / "prefix")
-            environment = _wine_environment(environment, self.scratch)
-        self._replies = self.scratch / "replies" if through_wine else None
-        self.memory = Memory(self.scratch / "memory" if through_wine else None)
+            _make_prefix(scratch / "prefix")
+            environment = _wine_environment(environment, scratch)
+        # It gets no descriptors for these through Wine.
+        replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
+        self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
+        self.memory = Memory(shared)
         try:
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
-            told = encoded(rights, (self.scratch, folder), _hidden(), memory=memory, command=command)
+            told = encoded(rights, (scratch, folder), _hidden(), memory=memory, command=command)
             self.program = posix.WatchedProgram(
-                [str(path)], environment, self.output.fileno(), told, self.memory.fileno(), self._replies
+                [str(path)], environment, self.output.file.fileno(), told, self.memory.file.fileno(), replies
             )
         except BaseException as error:
             self._close()
@@ -172,36 +152,18 @@ class Started:
                 raise ModelError(f"{path} cannot be started: {error}") from error
             raise
 
-    @property
-    def connect(self) -> bytes:
-        """What the worker is told first: where its replies go."""
-        return text("" if self._replies is None else windows_path(self._replies))
-
-    @property
-    def place(self) -> str:
-        """What the worker is told of where the memory is."""
-        return "" if self.memory.path is None else windows_path(self.memory.path)
-
     def end(self) -> int:
         """End the process and remove its folder; return the exit code, negative for a signal."""
-        code = self.program.end()
-        self._close()
-        return code
-
-    def forget(self) -> None:
-        """Leave the process to another one, of which this is a copy."""
-        self.program.forget()
+        if self._code is None:
+            code, exception = self.program.end(), self.exception
+            self._code = code if exception is None else -_SIGNALS.get(exception, -(exception & 0xFF))
+            self._close()
+        return self._code
 
     def _close(self) -> None:
-        self.output.close()
-        self.memory.close()
-        posix_files.remove_tree(self.scratch)
-
-
-def crash_code(exception: int) -> int:
-    """Return the exit code that an exception of Windows has elsewhere: minus the number of a signal."""
-    found = _SIGNALS.get(exception)
-    return exception & 0xFF if found is None else -found
+        self.output.file.close()
+        self.memory.file.close()
+        posix_files.remove_tree(self._scratch)
 
 
 @lru_cache(maxsize=1)

@@ -1,6 +1,5 @@
 """One worker, as the process that requests simulations sees it, and how long it waits for one."""
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +15,6 @@ from falsifier.errors import ModelError
 from falsifier.fmu.description.libraries import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import (
     QUICK_SECONDS,
-    Closed,
     Garbled,
     Reply,
     Request,
@@ -28,7 +26,7 @@ from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import HEADER, Plan
 from falsifier.fmu.process.rights import Told, read_told
-from falsifier.fmu.process.start import RUNNING, SIMULATED, Started, crash_code
+from falsifier.fmu.process.start import RUNNING, SIMULATED, Started
 from falsifier.fmu.process.workplace import Workplace
 
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
@@ -65,11 +63,7 @@ def watching(listener: Listener) -> Iterator[None]:
 
 
 class Patience:
-    """How long to wait for one simulation.
-
-    Args:
-        plan: what is simulated.
-    """
+    """How long to wait for one simulation."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
@@ -102,19 +96,15 @@ class Patience:
                 listener(self._plan.model, min(max(reached, 0.0), self._plan.stop_time), self._plan.stop_time)
 
 
-class Worker:
+class Worker(Started):
     """One worker: its process, its memory, and its messages.
 
-    Args:
-        workplace: the folder of all workers.
-        order: what it simulates.
-        reuse: how the next simulation starts; None: it finds out after the first.
-        untrusted: ways to start that it does not try.
-        logging: whether to ask the FMU for messages.
+    Simulations after the first start by ``reuse``; without one, it finds out how, and does not try untrusted
+    ways.
 
     Attributes:
-        plan: the plan for which it is prepared.
-        logging: as above.
+        plan: the plan for which it is prepared; None: it has not loaded the FMU.
+        logging: whether it asks the FMU for messages.
         awaits_test: whether it is finding out how simulations can start.
         simulations: number of simulations that it has completed.
         started: when it was started, by time.perf_counter().
@@ -135,10 +125,9 @@ class Worker:
         self._order = order
         folder = workplace.unpacked([(m.path, m.sha256) for m in order.network.members])
         known = len(REUSES) if reuse is None else REUSES.index(reuse)
-        self._ways = integers(known, sum(1 << REUSES.index(way) for way in untrusted))
-        self._load = order.load(folder, logging=logging)
-        self._started = Started(workplace, folder, order.rights, through_wine=order.through_wine)
-        self._crash: int | None = None
+        ways = integers(known, sum(1 << REUSES.index(way) for way in untrusted))
+        self._load = ways + order.load(folder, logging=logging)
+        super().__init__(workplace, folder, order.rights, through_wine=order.through_wine)
         self.plan: Plan | None = None
         self.logging = logging
         self.awaits_test = False
@@ -146,71 +135,42 @@ class Worker:
         self.started = time.perf_counter()
         self._is_quick = False
 
-    @property
-    def pid(self) -> int:
-        """Process id."""
-        return self._started.program.pid
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the process is running."""
-        return self._started.program.is_alive
-
     def load(self, limit: float) -> Reply:
         """Connect and load the library; the limit is in s.
 
         Raises:
-            Closed: if the process ends.
+            ConnectionError: if the process ends.
             TimeoutError: if it takes longer.
         """
-        program = self._started.program
         try:
-            send(program, Request.CONNECT, self._started.connect)
+            send(self.program, Request.CONNECT, text(self.connect))
             self.receive(_STARTING_SECONDS)
-        except (Closed, TimeoutError) as error:
-            hint = (
-                f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
-                if self._order.through_wine
-                else ""
-            )
+        except (ConnectionError, TimeoutError) as error:
+            needed = f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
+            hint = needed if self._order.through_wine else ""
             end = exit_text(self.end())
             raise ModelError(f"the program that runs FMUs does not start ({end}){hint}") from error
         # The worker tells there which component it loads.
-        self._started.memory.fit(HEADER)
-        send(program, Request.LOAD, self._ways + self._load)
+        self.memory.fit(HEADER)
+        send(self.program, Request.LOAD, self._load)
         return self.receive(limit)
 
     def prepare(self, plan: Plan, limit: float) -> Reply:
         """Let the worker look up a plan's variables; errors as for ``load``."""
-        started = self._started
-        started.memory.fit(HEADER + plan.given + len(plan.outputs) * plan.samples)
-        send(started.program, Request.PREPARE, text(started.place) + self._order.prepare(plan))
+        self.memory.fit(HEADER + plan.given + len(plan.outputs) * plan.samples)
+        send(self.program, Request.PREPARE, text(self.place) + self._order.prepare(plan))
         reply = self.receive(limit)
         if reply.is_done:
             self.plan = plan
         return reply
 
-    def start(self, given: NDArray[np.float64]) -> None:
-        """Start a simulation with these numbers.
-
-        Raises:
-            Closed: if the process has ended.
-        """
-        assert self.plan is not None, "it is prepared"
-        self._started.memory.write(given, HEADER)
-        payload = reals(self.plan.time_limit) + integers(0 if self.plan.has_limit else SHARES)
-        send(self._started.program, Request.SIMULATE, payload)
-
-    def wait(self) -> Reply:
-        """Return the outcome of the simulation under way.
-
-        Raises:
-            TimeoutError: if there is none in time.
-            Closed: if the process has ended.
-        """
-        assert self.plan is not None, "it is prepared"
+    def simulate(self, plan: Plan, given: NDArray[np.float64]) -> Reply:
+        """Simulate once with these numbers; errors as for ``load``."""
+        self.memory.write(given, HEADER)
+        shares = 0 if plan.has_limit else SHARES
+        send(self.program, Request.SIMULATE, reals(plan.time_limit) + integers(shares))
         started = time.perf_counter()
-        patience = Patience(self.plan)
+        patience = Patience(plan)
         polling = QUICK_SECONDS if self._is_quick else 0.0
         while True:
             try:
@@ -227,55 +187,49 @@ class Worker:
     def outputs(self, plan: Plan) -> NDArray[np.float64]:
         """Return what the last simulation has recorded, shape (outputs, samples)."""
         found = np.empty(len(plan.outputs) * plan.samples)
-        self._started.memory.read(found, HEADER + plan.given)
+        self.memory.read(found, HEADER + plan.given)
         return found.reshape(len(plan.outputs), plan.samples)
 
     def receive(self, limit: float, polling: float = 0.0) -> Reply:
         """Wait for a reply; see ``connection.receive``."""
-        reply = receive(self._started.program, limit, polling=polling)
+        reply = receive(self.program, limit, polling=polling)
         if reply.where == Where.CRASHED:
-            self._crash = crash_code(reply.status)
-            raise Closed
-        return reply if reply.is_done else replace(reply, component=self.position)
+            self.exception = reply.status
+            raise ConnectionError("the program tells a crash")
+        return reply if reply.is_done else replace(reply, component=self._position)
 
     @property
     def reached(self) -> float:
         """Simulated time in s, as the worker says."""
-        return self._started.memory.header(SIMULATED)
+        return self.memory.header(SIMULATED)
 
     @property
-    def position(self) -> int:
+    def _position(self) -> int:
         """Position of the component of a system that runs or has failed; -1 if the worker tells nonsense."""
-        position = self._started.memory.header(RUNNING)
+        position = self.memory.header(RUNNING)
         return int(position) if 0 <= position < 1e9 else -1
 
     @property
     def during(self) -> str:
         """Which component of a system was running, in words; nothing for a single FMU."""
-        name = self._order.network.stepped(self.position)
+        name = self._order.network.stepped(self._position)
         return f" in component {name}" if name else ""
-
-    def take_log(self, reply: Reply | None = None) -> tuple[str, ...]:
-        """Return the lines that the FMU has written since the last call, before this reply.
-
-        Only the end of long output is kept.
-        """
-        return self._started.output.take(None if reply is None else reply.printed)
 
     def crash(self, error: Exception) -> tuple[str, tuple[str, ...]]:
         """End the process; return in words why it did not go on, and what it wrote."""
-        during, program = self.during, self._started.program
-        is_cut = not isinstance(error, Garbled) and not program.ends_within(_ENDING_SECONDS)
-        log, told = self.take_log(), self._told()
+        during, is_garbled = self.during, isinstance(error, Garbled)
+        is_cut = not is_garbled and not self.program.ends_within(_ENDING_SECONDS)
+        log, told = self.output.take(), self._told()
         code = self.end()
-        end = f"; {told.refusals}" if told.refusals else ""
         if told.cause:
-            return f"{told.cause}{during}{end}", log
-        if isinstance(error, Garbled):
-            return f"the FMU disturbed the replies of its process{during}{end}", log
-        if is_cut or code == _CUT_OFF:
-            return f"the FMU cut the connection of its process{during}{end}", log
-        return f"the FMU's process crashed{during}: {exit_text(code)}{end}", log
+            reason = f"{told.cause}{during}"
+        elif is_garbled:
+            reason = f"the FMU disturbed the replies of its process{during}"
+        elif is_cut or code == _CUT_OFF:
+            reason = f"the FMU cut the connection of its process{during}"
+        else:
+            reason = f"the FMU's process crashed{during}: {exit_text(code)}"
+        return f"{reason}; {told.refusals}" if told.refusals else reason, log
 
     @property
     def refusals(self) -> str:
@@ -283,23 +237,9 @@ class Worker:
         said = self._told().refusals
         return f"; {said}" if said else ""
 
-    def stop(self) -> None:
-        """Kill the process while another thread waits for it."""
-        self._started.program.stop()
-
-    def end(self) -> int:
-        """End the process; return its exit code, negative for a signal."""
-        code = self._started.end()
-        return code if self._crash is None else self._crash
-
-    def forget(self) -> None:
-        """Leave the process to another one, of which this is a copy."""
-        with contextlib.suppress(OSError):
-            self._started.forget()
-
     def _told(self) -> Told:
         """Return what the guard has told since the last call."""
-        parts = self._started.program.told().split(b"\0")
+        parts = self.program.told().split(b"\0")
         # Wine's processes signal each other, in ways that are not needed here.
         kept = [part for part in parts if not (self._order.through_wine and part[:1] == b"s")]
         return read_told(b"\0".join(kept))

@@ -117,9 +117,6 @@ class Workplace(WorkFolder):
         Two components with the same FMU get a folder each: a library that is loaded from two files has its
         static data twice.
 
-        Args:
-            archives: the FMUs and their hashes.
-
         Raises:
             ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
         """
@@ -235,12 +232,7 @@ def _protect_secrets(environment: Mapping[str, str]) -> None:
 
 
 def worker_environment(environment: Mapping[str, str], scratch: Path) -> dict[str, str]:
-    """Return the environment of a worker.
-
-    Args:
-        environment: that of this process.
-        scratch: the worker's folder, where its temporary files go.
-    """
+    """Return the environment of a worker, whose temporary files go to its scratch folder."""
     more = {name.strip() for name in environment.get(MORE, "").split(",")}
     passed = {name: value for name, value in environment.items() if _PASSED.fullmatch(name) or name in more}
     folders = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(scratch))

@@ -1,27 +1,37 @@
 """The files of an SSP package (``.ssp``, a zip archive) or beside a system description (``.ssd``).
 
-With the values that parameter bindings take from sets and files, renamed and transformed by mappings.
+With the values that parameter bindings take from sets and files, renamed and transformed by mappings. FMPy's
+reader is not used: it resolves entities, ignores transformations of connections (it looks for them in another
+namespace), default experiments and inline mappings, and reads packages only, not ``.ssd`` files.
 """
 
 import atexit
 import os
-from collections.abc import Mapping as Names
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from math import isfinite
 from pathlib import Path, PurePosixPath
+from typing import TypeVar
 from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import Element
 
-from falsifier.core.model import Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description.archive import extract, file_hash
-from falsifier.fmu.description.structure import Unit, conversion
+from falsifier.fmu.description.variables import is_true
+from falsifier.fmu.description.xml import read_xml
 from falsifier.fmu.process.workplace import WorkFolder
-from falsifier.fmu.ssp.markup import Binding, Transformation, Value, parse_mappings, parse_values
 
+T = TypeVar("T")
 SUFFIXES = (".ssp", ".ssd")
 _DESCRIPTION = "SystemStructure.ssd"
 _MAX_TEXT_BYTES = 64 << 20
+_NAMESPACE = "{http://ssp-standard.org/SSP"
+_VALUE_TAGS = ("Boolean", "String", "Enumeration", "Real", "Integer", "Float64", "Float32", *(
+    f"{u}Int{b}" for u in ("", "U") for b in (8, 16, 32, 64)
+))  # fmt: skip
+_MAPPINGS = tuple(f"{kind}MappingTransformation" for kind in ("Boolean", "Integer", "Enumeration"))
 
 
 class Package:
@@ -32,8 +42,7 @@ class Package:
         shown: its name in messages.
 
     Attributes:
-        description: file name of the system description.
-        key: tells this description from all others.
+        description: path of the system description.
 
     Raises:
         SpecError: if the file cannot be read, or the archive is rejected.
@@ -50,29 +59,7 @@ class Package:
                 raise SpecError(str(error)) from None
             if not path.is_file():
                 raise SpecError(f"{shown}: the package contains no {_DESCRIPTION}; export the system again")
-        self._path = path
-        self.description = path.name
-        self.key = str(path.resolve())
-
-    def structure(self) -> bytes:
-        """Return the text of the system description."""
-        return self._read(self._path)
-
-    def nested(self, source: str) -> "Package":
-        """Return the package of another system description, in this package or beside this one.
-
-        Raises:
-            SpecError: if it is missing, outside the package, or cannot be read.
-        """
-        return Package(self.file(source), f"{self.shown}: {source}")
-
-    def text(self, source: str) -> bytes:
-        """Return the content of a text file.
-
-        Raises:
-            SpecError: if it is missing, outside the package, or too large.
-        """
-        return self._read(self.file(source))
+        self.description = path
 
     def file(self, source: str) -> Path:
         """Return the path of a file.
@@ -88,20 +75,15 @@ class Package:
         if parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts:
             raise SpecError(
                 f"{self.shown}: {source!r} is not inside the package; put the file there and name it "
-                f"relative to {self.description}"
+                f"relative to {self.description.name}"
             )
-        found = self._path.parent / path
+        found = self.description.parent / path
         try:
             if found.is_file():
                 return found
         except (OSError, ValueError):  # the name is too long, or no name
             pass
         raise SpecError(f"{self.shown}: the resource {source!r} is missing; export the package again")
-
-    def _read(self, path: Path) -> bytes:
-        if path.stat().st_size > _MAX_TEXT_BYTES:
-            raise SpecError(f"{self.shown}: {path.name} has more than {_MAX_TEXT_BYTES >> 20} MiB")
-        return path.read_bytes()
 
 
 @lru_cache(maxsize=64)
@@ -127,76 +109,138 @@ def _folder() -> Path:
     return folder.path
 
 
+@contextmanager
+def opened(path: Path, shown: str, expected: str) -> Iterator[Element]:
+    """Give the root element of a file, for as long as it is read.
+
+    Raises:
+        SpecError: if it has not the expected name; also for what is then found wrong with its attributes.
+    """
+    if path.stat().st_size > _MAX_TEXT_BYTES:
+        raise SpecError(f"{shown} has more than {_MAX_TEXT_BYTES >> 20} MiB")
+    root = read_xml(path.read_bytes(), shown, SpecError)
+    if not root.tag.startswith(_NAMESPACE) or tag(root) != expected:
+        raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
+    try:
+        yield root
+    except KeyError as error:
+        raise SpecError(f"{shown}: the attribute {error} is missing") from None
+    except ValueError as error:
+        raise SpecError(f"{shown}: {error}") from None
+
+
+def tag(element: Element) -> str:
+    """Return the name of an element without its namespace."""
+    return element.tag.rpartition("}")[2]
+
+
+def type_and_unit(element: Element) -> tuple[str, str, Element]:
+    """Return type and unit of a value or connector, empty without one, and the element that states them."""
+    typed = next((child for child in element if tag(child) in _VALUE_TAGS), None)
+    if typed is None:
+        return "", "", element
+    unit = typed.get("unit", "")
+    return tag(typed), "" if unit == "1" else unit, typed
+
+
+def number(text: str) -> float:
+    """Return the finite number of an attribute; raise ValueError for others."""
+    found = float(text)
+    if not isfinite(found):
+        raise ValueError(f"{text!r} is not a finite number")
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Transformation:
+    """A linear transformation ``factor * value + offset``, and whether units are not converted before it."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+    suppress: bool = False
+
+
+def transformation(element: Element) -> Transformation:
+    """Return the transformation of a connection, or of an entry of a mapping."""
+    for child in element:
+        if tag(child) in _MAPPINGS:
+            raise ValueError(f"the element {tag(child)} is not supported; map the values inside a component")
+    stated = {k: v for each in element.findall("{*}LinearTransformation") for k, v in each.attrib.items()}
+    factor, offset = number(stated.get("factor", "1")), number(stated.get("offset", "0"))
+    if factor == 0.0:
+        raise ValueError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
+    return Transformation(factor, offset, is_true(element.get("suppressUnitConversion")))
+
+
 @dataclass(frozen=True, slots=True)
 class Given:
     """A value that a package gives, before the variable that it is for is known.
 
     Attributes:
-        value: the value in the parameter set.
+        name: its name in the parameter set.
+        value: a number, or the text of a string or of an enumeration's item.
+        is_item: whether it is the latter.
+        unit: its unit.
         transformation: transformation by a mapping.
-        units: units that the package defines.
     """
 
-    value: Value
-    transformation: Transformation
-    units: Names[str, Unit]
-
-    def number(self, variable: Variable, shown: str) -> float | str:
-        """Return the value for a variable, in its unit.
-
-        Raises:
-            SpecError: if type or unit do not fit.
-        """
-        value = self.value.value
-        if isinstance(value, str) and not self.value.is_item:
-            if variable.kind != "string":
-                raise SpecError(
-                    f"{shown}: {value!r} is a text, but {variable.name!r} is of type {variable.kind}"
-                )
-            return value
-        if isinstance(value, str):
-            if value not in variable.literals:
-                near = did_you_mean(value, variable.literals)
-                raise SpecError(f"{shown}: {variable.name!r} has no item {value!r}; {near}")
-            return float(variable.literals[value])
-        if variable.kind == "string":
-            raise SpecError(f"{shown}: {value:g} is a number, but {variable.name!r} is a text")
-        if not self.transformation.suppress:
-            found = conversion(self.value.unit, variable.unit, (self.units, self.units))
-            if found is None:
-                raise SpecError(
-                    f"{shown}: the parameter {self.value.name} is in {self.value.unit}, {variable.name!r} in "
-                    f"{variable.unit}, and the package defines no conversion; state the variable's unit"
-                )
-            value = found[0] * value + found[1]
-        return self.transformation.factor * value + self.transformation.offset
+    name: str
+    value: float | str
+    is_item: bool
+    unit: str
+    transformation: Transformation = Transformation()
 
 
-def bound_values(bindings: Sequence[Binding], package: Package, units: Names[str, Unit]) -> dict[str, Given]:
+def bound_values(element: Element, package: Package) -> dict[str, Given]:
     """Return the values of an element's bindings by name, relative to the element; later ones win.
 
     Raises:
         SpecError: if a file is missing or wrong.
     """
     found: dict[str, Given] = {}
-    for binding in bindings:
-        values = binding.values
-        if binding.source:
-            values = parse_values(package.text(binding.source), f"{package.shown}: {binding.source}")
-        named = {binding.prefix + value.name: value for value in values}
-        mappings = binding.mappings
-        if binding.mapping_source:
-            mappings = parse_mappings(
-                package.text(binding.mapping_source), f"{package.shown}: {binding.mapping_source}"
-            )
-        if mappings is None:
-            found |= {name: Given(value, Transformation(), units) for name, value in named.items()}
-            continue
-        for entry in mappings:
-            if entry.source not in named:
-                near = did_you_mean(entry.source, named)
-                raise SpecError(
-                    f"{package.shown}: a mapping names the unknown parameter {entry.source!r}; {near}"
+    for binding in element.findall("{*}ParameterBindings/{*}ParameterBinding"):
+        mapping = binding.find("{*}ParameterMapping")
+        for each in (binding, mapping):
+            if each is not None and each.get("sourceBase", "SSD") != "SSD":
+                raise ValueError(
+                    "parameters inside an FMU (sourceBase) are not supported; put them beside it"
                 )
-            found[entry.target] = Given(named[entry.source], entry.transformation, units)
+        values = _entries(binding, package, "ParameterSet", ".//{*}Parameters/{*}Parameter", _value)
+        named = {binding.get("prefix", "") + value.name: value for value in values}
+        if mapping is None:
+            found |= named
+            continue
+        # With a mapping, only what it names.
+        for source, target, change in _entries(
+            mapping, package, "ParameterMapping", ".//{*}MappingEntry", _mapped
+        ):
+            if source not in named:
+                near = did_you_mean(source, named)
+                raise SpecError(f"{package.shown}: a mapping names the unknown parameter {source!r}; {near}")
+            found[target] = replace(named[source], transformation=change)
     return found
+
+
+def _entries(
+    stated: Element, package: Package, expected: str, path: str, read: Callable[[Element], T]
+) -> list[T]:
+    """Return what an element contains, or the file that it names."""
+    if not (source := stated.get("source")):
+        return [read(each) for each in stated.findall(path)]
+    with opened(package.file(source), f"{package.shown}: {source}", expected) as root:
+        return [read(each) for each in root.findall(path)]
+
+
+def _value(parameter: Element) -> Given:
+    name = parameter.attrib["name"]
+    kind, unit, typed = type_and_unit(parameter)
+    if not kind:
+        raise ValueError(f"the parameter {name!r} has no value of a known type")
+    value: float | str = typed.attrib["value"]
+    if kind not in ("Enumeration", "String"):
+        value = float(is_true(str(value))) if kind == "Boolean" else number(str(value))
+    return Given(name, value, kind == "Enumeration", unit)
+
+
+def _mapped(entry: Element) -> tuple[str, str, Transformation]:
+    return entry.attrib["source"], entry.attrib["target"], transformation(entry)

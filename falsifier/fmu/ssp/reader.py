@@ -4,18 +4,28 @@ The meaning of connectors, transformations and parameter bindings is that of SSP
 no direction of their own, bindings of outer systems override those of inner ones, later ones earlier ones.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
-from falsifier.fmu.description.archive import file_hash
-from falsifier.fmu.description.model_description import Description, read_description
-from falsifier.fmu.description.structure import Unit, conversion, read_structure
+from falsifier.fmu.description.model_description import Description, describe
+from falsifier.fmu.description.structure import Unit, conversion, read_structure, read_units
 from falsifier.fmu.process.network import Coupling
-from falsifier.fmu.ssp.markup import Connector, Part, Structure, Transformation, Wire, parse_structure
-from falsifier.fmu.ssp.package import SUFFIXES, Given, Package, bound_values
+from falsifier.fmu.ssp.package import (
+    SUFFIXES,
+    Given,
+    Package,
+    Transformation,
+    bound_values,
+    number,
+    opened,
+    tag,
+    transformation,
+    type_and_unit,
+)
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.system import System
 
@@ -50,28 +60,26 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
     path = Path(path)
     reader = _Reader(str(path))
     try:
-        structure = reader.walk_file(Package(path, str(path)), "", ())
+        reader.walk_file(Package(path, str(path)), "", ())
     except RecursionError:
         raise SpecError(f"{path}: its systems are nested too deeply; flatten them") from None
-    start, stop = structure.start_time or 0.0, structure.stop_time
+    start, stop = reader.times.get("startTime", 0.0), reader.times.get("stopTime")
     if stop is not None and stop <= max(start, 0.0):
         raise SpecError(
             f"{path}: DefaultExperiment: the stop time {stop:g} s must be after the start time {start:g} s, "
             "and after 0, at which simulations start; correct the package, or leave the stop time out"
         )
-    connections = reader.connections()
-    inputs = reader.system_inputs()
+    connections, inputs, outputs = reader.wiring()
     values = reader.values(inputs, connections.keys())
     if start:
         reader.notes.append(f"the package starts at {start:g} s; simulations start at 0")
-    outputs, notes = tuple(reader.outputs()), tuple(reader.notes)
     try:
         return System(
-            {name: Component(fmu, None, reader.interfaces[name]) for name, fmu in reader.fmus.items()},
+            reader.components,
             connections,
             coupling=coupling or Coupling(),
-            frame=Frame(inputs, outputs, tuple(values.items()), stop, notes),
-            name=structure.root.name or path.stem,
+            frame=Frame(inputs, outputs, tuple(values.items()), stop, tuple(reader.notes)),
+            name=reader.name or path.stem,
             package=path,
         )
     except (SpecError, ModelError) as error:
@@ -90,77 +98,80 @@ class _Reader:
         shown: name of the package in messages.
 
     Attributes:
-        fmus: path of the FMU of each component.
-        interfaces: interface that the package states for it.
+        name: name of the whole.
+        times: start and stop time of the default experiment in s, by attribute, if they are stated.
+        components: the FMUs.
         notes: what the user should know, one sentence each.
     """
 
     def __init__(self, shown: str) -> None:
         self._shown = shown
-        self.fmus: dict[str, Path] = {}
-        self.interfaces: dict[str, Interface | None] = {}
+        self.name = ""
+        self.times: dict[str, float] = {}
+        self.components: dict[str, Component] = {}
         self.notes: list[str] = []
         self._elements: set[str] = set()
         self._descriptions: dict[str, Description] = {}
-        self._connectors: dict[End, Connector] = {}
+        # Kind and unit of each connector.
+        self._connectors: dict[End, tuple[str, str]] = {}
         # Where the value of a connector comes from, in the direction of the signal.
         self._steps: dict[End, tuple[End, Transformation]] = {}
         self._units: dict[str, Unit] = {}
         self._given: dict[str, Given] = {}
 
-    def walk_file(self, package: Package, at: str, above: tuple[str, ...]) -> Structure:
+    def walk_file(self, package: Package, at: str, above: tuple[Path, ...]) -> None:
         """Collect the elements of a system description that stands for the element at a path."""
-        if package.key in above:
+        file = package.description
+        if (key := file.resolve()) in above:
             raise SpecError(
                 f"{package.shown}: the system contains itself, at {at}; remove one of the references"
             )
-        structure = parse_structure(package.structure(), f"{package.shown}: {package.description}")
-        self._units |= structure.units
-        self._walk(structure.root, at, package, (*above, package.key))
-        return structure
+        with opened(file, f"{package.shown}: {file.name}", "SystemStructureDescription") as root:
+            version = root.get("version", "")
+            if version[:1] not in ("1", "2"):
+                raise ValueError(f"SSP version {version!r}; export it as SSP 1.0 or 2.0")
+            system = root.find("{*}System")
+            if system is None:
+                raise ValueError("it has no System")
+            stated = {k: v for each in root.findall("{*}DefaultExperiment") for k, v in each.attrib.items()}
+            times = {k: number(v) for k, v in stated.items() if k in ("startTime", "stopTime")}
+            if not above:
+                self.name, self.times = system.get("name", ""), times
+            self._units |= read_units(root, tag="{*}Units/{*}Unit")
+            self._walk(system, at, package, (*above, key))
 
-    def connections(self) -> dict[str, Connection | str]:
-        """Return where the inputs of components get their values."""
-        found: dict[str, Connection | str] = {}
-        for end, source, (factor, offset) in self._fed_inputs():
-            found[_title(end)] = Connection(_title(source), factor, offset)
-            if (factor, offset) != _UNCHANGED:
-                shown = f"* {factor:.6g} {offset:+.6g}"
-                self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
-        return found
+    def wiring(self) -> tuple[dict[str, Connection | str], tuple[Variable, ...], tuple[tuple[str, str], ...]]:
+        """Return where the inputs of components get their values, and the inputs and outputs of the whole.
 
-    def system_inputs(self) -> tuple[Variable, ...]:
-        """Return the inputs of the whole: each as its first target, with the connector's own unit."""
-        found: dict[End, Variable] = {}
-        for target, end, (factor, offset) in self._fed_inputs():
-            if end in found or self._is_component(end):
-                continue
-            first = self._descriptions[target[0]].info[target[1]]
-            limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
-            low, high = limits if factor > 0 else limits[::-1]
-            start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
-            unit = self._unit(end) or first.unit
-            found[end] = replace(
-                first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of=""
-            )
-        return tuple(found.values())
-
-    def outputs(self) -> Iterator[tuple[str, str]]:
-        """Yield the outputs of the whole that pass an output of a component unchanged, with its name."""
-        for end, connector in self._connectors.items():
-            if end[0] == "" and connector.kind == "output":
+        An input of the whole is like its first target, with the connector's own unit. Outputs of the whole
+        are those that pass an output of a component unchanged; they come with its name.
+        """
+        connections: dict[str, Connection | str] = {}
+        inputs: dict[End, Variable] = {}
+        outputs: list[tuple[str, str]] = []
+        for end, (kind, _) in self._connectors.items():
+            if kind == "output" and not end[0]:
                 source, found = self._traced(end)
-                if found == _UNCHANGED and self._is_component(source):
-                    yield end[1], _title(source)
+                if found == _UNCHANGED and source[0] in self.components:
+                    outputs.append((end[1], _title(source)))
+            elif kind == "input" and end[0] in self.components and end in self._steps:
+                source, (factor, offset) = self._traced(end)
+                connections[_title(end)] = Connection(_title(source), factor, offset)
+                if (factor, offset) != _UNCHANGED:
+                    shown = f"* {factor:.6g} {offset:+.6g}"
+                    self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
+                if source not in inputs and source[0] not in self.components:
+                    inputs[source] = self._system_input(source, end, factor, offset)
+        return connections, tuple(inputs.values()), tuple(outputs)
 
-    def values(self, inputs: tuple[Variable, ...], connected: Collection[str]) -> dict[str, float | str]:
+    def values(self, inputs: Sequence[Variable], connected: Collection[str]) -> dict[str, float | str]:
         """Return the values of variables; those that name nothing are noted."""
         found: dict[str, float | str] = {}
         own = {v.name: v for v in inputs}
         for name, given in self._given.items():
             targets = list(self._targets(name))
             if name in own:
-                found[name] = given.number(own[name], self._shown)
+                found[name] = self._value(given, own[name])
             elif not targets:
                 self.notes.append(f"the parameter {name} of the package names nothing that can be set")
             for end in targets:
@@ -169,108 +180,121 @@ class _Reader:
                     continue
                 if refusal := description.slots[end[1]].refusal:
                     raise self._wrong(f"the parameter {_title(end)} cannot be set: {refusal}")
-                found[_title(end)] = given.number(description.info[end[1]], self._shown)
+                found[_title(end)] = self._value(given, description.info[end[1]])
         return found
 
     def _wrong(self, what: str) -> SpecError:
         return SpecError(f"{self._shown}: {what}")
 
-    def _walk(self, part: Part, at: str, package: Package, above: tuple[str, ...]) -> None:
-        self._declare(part, at)
-        for child in part.parts:
-            path = f"{at}.{child.name}" if at else child.name
+    def _walk(self, system: Element, at: str, package: Package, above: tuple[Path, ...]) -> None:
+        self._declare(system, at)
+        children = []
+        for child in system.findall("{*}Elements/*"):
+            name = child.get("name", "")
+            if tag(child) == "SignalDictionaryReference":
+                raise ValueError(
+                    f"{name!r} refers to a signal dictionary, which is not supported; connect the components "
+                    "directly"
+                )
+            if tag(child) not in ("Component", "System"):
+                continue
+            children.append(name)
+            path = f"{at}.{name}" if at else name
             if path in self._elements:
                 raise self._wrong(f"two elements are named {path!r}; rename one of them")
             self._elements.add(path)
             if len(self._elements) > _MAX_ELEMENTS:
                 raise self._wrong(f"the system has more than {_MAX_ELEMENTS} elements; split it")
-            if not child.source:
+            if tag(child) == "System":
                 self._walk(child, path, package, above)
-            elif child.type in _NESTED_TYPES:
-                self._declare(child, path)
-                self.walk_file(package.nested(child.source), path, above)
-                self._bind(child, path, package)
             else:
-                self._component(child, path, package)
-        for wire in part.wires:
-            self._wire(wire, part, at)
-        self._bind(part, at, package)
+                self._component(child, path, package, above)
+        for wire in system.findall("{*}Connections/{*}Connection"):
+            self._wire(wire, at, children)
+        self._bind(system, at, package)
 
-    def _declare(self, part: Part, at: str) -> None:
-        for connector in part.connectors:
-            if connector.kind not in _KINDS:
-                raise self._wrong(
-                    f"the connector {_title((at, connector.name))} is of kind {connector.kind!r}; expected "
-                    f"one of {', '.join(_KINDS)}"
-                )
-            self._connectors[at, connector.name] = connector
+    def _declare(self, element: Element, at: str, variables: Mapping[str, Variable] | None = None) -> None:
+        """Note the connectors of an element; those of an FMU must fit its variables."""
+        for connector in element.findall("{*}Connectors/{*}Connector"):
+            name, kind = connector.attrib["name"], connector.attrib["kind"]
+            stated, unit, _ = type_and_unit(connector)
+            title = f"the connector {_title((at, name))}"
+            if variables is not None:
+                if name not in variables:
+                    near = did_you_mean(name, variables)
+                    raise self._wrong(f"the FMU of {at} has no variable for {title}; {near}")
+                self._check_connector(title, kind, stated, unit, variables[name])
+                unit = unit or variables[name].unit
+            if kind not in _KINDS:
+                raise self._wrong(f"{title} is of kind {kind!r}; expected one of {', '.join(_KINDS)}")
+            self._connectors[at, name] = kind, unit
 
-    def _component(self, part: Part, at: str, package: Package) -> None:
-        if part.type != _FMU_TYPE:
-            raise self._wrong(f"the component {at} is of type {part.type}; only FMUs are supported")
-        if part.implementation not in _INTERFACES:
+    def _component(self, element: Element, at: str, package: Package, above: tuple[Path, ...]) -> None:
+        name, source = element.attrib["name"], element.attrib["source"]
+        if not (name and source):
+            raise ValueError(
+                f"a component has the name {name!r} and the source {source!r}; neither may be empty"
+            )
+        type_, implementation = element.get("type", _FMU_TYPE), element.get("implementation", "any")
+        if type_ in _NESTED_TYPES:
+            self._declare(element, at)
+            self.walk_file(Package(package.file(source), f"{package.shown}: {source}"), at, above)
+            self._bind(element, at, package)
+            return
+        if type_ != _FMU_TYPE:
+            raise self._wrong(f"the component {at} is of type {type_}; only FMUs are supported")
+        if implementation not in _INTERFACES:
             known = ", ".join(_INTERFACES)
-            raise self._wrong(
-                f"the implementation of {at} is {part.implementation!r}; expected one of {known}"
-            )
-        fmu = self.fmus[at] = package.file(part.source)
-        self.interfaces[at] = _INTERFACES[part.implementation]
+            raise self._wrong(f"the implementation of {at} is {implementation!r}; expected one of {known}")
+        fmu = package.file(source)
         try:
-            description = self._descriptions[at] = read_description(fmu)
+            component = self.components[at] = Component(fmu, None, _INTERFACES[implementation])
+            description = self._descriptions[at] = describe(fmu, component.sha256)
+            self._units = {**read_structure(fmu, component.sha256).units, **self._units}
         except ModelError as error:
-            raise self._wrong(f"{part.source}: {error}") from None
-        self._units = {**read_structure(fmu, file_hash(fmu)).units, **self._units}
-        variables = {v.name: v for v in description.info.variables}
-        for connector in part.connectors:
-            if connector.name not in variables:
-                title, near = _title((at, connector.name)), did_you_mean(connector.name, variables)
-                raise self._wrong(f"the FMU of {at} has no variable for the connector {title}; {near}")
-            self._check_connector(connector, variables[connector.name], at)
-        self._declare(part, at)
-        self._bind(part, at, package)
+            raise self._wrong(f"{source}: {error}") from None
+        self._declare(element, at, {v.name: v for v in description.info.variables})
+        self._bind(element, at, package)
 
-    def _check_connector(self, connector: Connector, variable: Variable, at: str) -> None:
-        title = f"the connector {_title((at, connector.name))}"
-        if variable.causality != connector.kind:
+    def _check_connector(self, title: str, kind: str, stated: str, unit: str, variable: Variable) -> None:
+        if variable.causality != kind:
             raise self._wrong(
-                f"{title} is of kind {connector.kind}, but the FMU's variable has the causality "
-                f"{variable.causality}; use the FMU's"
+                f"{title} is of kind {kind}, but the FMU's variable has the causality {variable.causality}; "
+                "use the FMU's"
             )
-        kind = "integer" if variable.kind == "enumeration" else variable.kind
-        if connector.type and _kind(connector.type) != kind:
+        if stated and _kind(stated) != ("integer" if variable.kind == "enumeration" else variable.kind):
             raise self._wrong(
-                f"{title} is of type {connector.type}, but the FMU's variable of type "
+                f"{title} is of type {stated}, but the FMU's variable of type "
                 f"{variable.type or variable.kind}; state the FMU's type"
             )
-        if connector.unit and variable.unit and connector.unit != variable.unit:
+        if unit and variable.unit and unit != variable.unit:
             raise self._wrong(
-                f"{title} is in {connector.unit}, but the FMU's variable in {variable.unit}; state the "
-                "FMU's unit"
+                f"{title} is in {unit}, but the FMU's variable in {variable.unit}; state the FMU's unit"
             )
 
-    def _wire(self, wire: Wire, system: Part, at: str) -> None:
+    def _wire(self, wire: Element, at: str, children: Sequence[str]) -> None:
         """Note which end feeds the other; an input connector is a source inside of its own system."""
-        shown = [f"{element}.{name}" if element else name for element, name in (wire.start, wire.end)]
+        change = transformation(wire)
+        ends = [(wire.get(f"{end}Element"), wire.attrib[f"{end}Connector"]) for end in ("start", "end")]
+        shown = [f"{element}.{name}" if element else name for element, name in ends]
         text = f"the connection {' - '.join(shown)}"
         sources: list[End] = []
         sinks: list[End] = []
-        for (element, name), title in zip((wire.start, wire.end), shown, strict=True):
+        for (element, name), title in zip(ends, shown, strict=True):
             path = at if element is None else f"{at}.{element}" if at else element
-            children = [child.name for child in system.parts]
             if element is not None and element not in children:
                 near = did_you_mean(element, children)
                 raise self._wrong(f"{text} names the unknown element {element!r}; {near}")
-            connector = self._connectors.get((path, name))
-            if connector is None:
+            if (path, name) not in self._connectors:
                 near = did_you_mean(name, (local for place, local in self._connectors if place == path))
                 raise self._wrong(f"{text} names the unknown connector {title!r}; {near}")
-            is_source = connector.kind in (_SINKS if element is None else _SOURCES)
+            is_source = self._connectors[path, name][0] in (_SINKS if element is None else _SOURCES)
             (sources if is_source else sinks).append((path, name))
         if len(sources) != 1:
             both = "outputs" if sources else "inputs"
             raise self._wrong(f"{text} joins two {both}; connect an output to an input")
         (source,), (sink,) = sources, sinks
-        if self._connectors[source].kind == "calculatedParameter":
+        if self._connectors[source][0] == "calculatedParameter":
             raise self._wrong(
                 f"{text} passes on a calculated parameter, which is not supported; set the parameter in a "
                 "parameter set"
@@ -280,37 +304,28 @@ class _Reader:
             raise self._wrong(
                 f"{_title(sink)} is fed by {known} and by {_title(source)}; remove one of the connections"
             )
-        self._steps[sink] = source, wire.transformation
+        self._steps[sink] = source, change
 
-    def _bind(self, part: Part, at: str, package: Package) -> None:
+    def _bind(self, element: Element, at: str, package: Package) -> None:
         """Add the values of an element's bindings; called from the inside out, so that outer ones win."""
-        for name, value in bound_values(part.bindings, package, self._units).items():
+        for name, value in bound_values(element, package).items():
             self._given[f"{at}.{name}" if at else name] = value
-
-    def _is_component(self, end: End) -> bool:
-        return end[0] in self.fmus
-
-    def _fed_inputs(self) -> Iterator[tuple[End, End, tuple[float, float]]]:
-        """Yield the inputs of components that are connected, where each begins, and the conversion."""
-        for end, connector in self._connectors.items():
-            if connector.kind == "input" and self._is_component(end) and end in self._steps:
-                yield end, *self._traced(end)
 
     def _traced(self, end: End) -> tuple[End, tuple[float, float]]:
         """Follow the connections back from a connector; return where they begin, and the conversion."""
         chain: list[tuple[End, Transformation]] = []
         at = end
         while at in self._steps:
-            source, transformation = self._steps[at]
-            chain.append((at, transformation))
+            source, change = self._steps[at]
+            chain.append((at, change))
             at = source
             if any(at == passed for passed, _ in chain):
                 circle = " -> ".join(_title(passed) for passed, _ in chain)
                 raise self._wrong(f"connectors feed each other in a circle: {circle}; remove one")
-        factor, offset, unit, before = 1.0, 0.0, self._unit(at), at
-        for target, transformation in reversed(chain):
-            wanted = self._unit(target)
-            if not transformation.suppress:
+        factor, offset, unit, before = 1.0, 0.0, self._connectors[at][1], at
+        for target, change in reversed(chain):
+            wanted = self._connectors[target][1]
+            if not change.suppress:
                 found = conversion(unit, wanted, (self._units, self._units))
                 if found is None:
                     raise self._wrong(
@@ -318,29 +333,55 @@ class _Reader:
                         "no conversion; define both units, or suppress the conversion"
                     )
                 factor, offset = found[0] * factor, found[0] * offset + found[1]
-            factor = transformation.factor * factor
-            offset = transformation.factor * offset + transformation.offset
+            factor = change.factor * factor
+            offset = change.factor * offset + change.offset
             unit, before = wanted or unit, target
         return at, (factor, offset)
 
-    def _unit(self, end: End) -> str:
-        connector = self._connectors[end]
-        if connector.unit or not self._is_component(end):
-            return connector.unit
-        return self._descriptions[end[0]].info[end[1]].unit
+    def _system_input(self, end: End, target: End, factor: float, offset: float) -> Variable:
+        first = self._descriptions[target[0]].info[target[1]]
+        limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
+        low, high = limits if factor > 0 else limits[::-1]
+        start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
+        unit = self._connectors[end][1] or first.unit
+        return replace(first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of="")
 
     def _targets(self, name: str) -> Iterator[End]:
         """Yield the variables that a name means: one of a component, or what a parameter connector feeds."""
-        for element in sorted(self.fmus, key=len, reverse=True):
+        for element in sorted(self.components, key=len, reverse=True):
             local = name.removeprefix(f"{element}.")
             if local != name and local in self._descriptions[element].slots:
                 yield element, local
                 return
         for end in self._steps:
-            if self._is_component(end) and self._connectors[end].kind == "parameter":
+            if end[0] in self.components and self._connectors[end][0] == "parameter":
                 source, found = self._traced(end)
                 if _title(source) == name and found == _UNCHANGED:
                     yield end
+
+    def _value(self, given: Given, variable: Variable) -> float | str:
+        """Return a value for a variable, in its unit."""
+        value, change = given.value, given.transformation
+        if isinstance(value, str) and not given.is_item:
+            if variable.kind != "string":
+                raise self._wrong(f"{value!r} is a text, but {variable.name!r} is of type {variable.kind}")
+            return value
+        if isinstance(value, str):
+            if value not in variable.literals:
+                near = did_you_mean(value, variable.literals)
+                raise self._wrong(f"{variable.name!r} has no item {value!r}; {near}")
+            return float(variable.literals[value])
+        if variable.kind == "string":
+            raise self._wrong(f"{value:g} is a number, but {variable.name!r} is a text")
+        if not change.suppress:
+            found = conversion(given.unit, variable.unit, (self._units, self._units))
+            if found is None:
+                raise self._wrong(
+                    f"the parameter {given.name} is in {given.unit}, {variable.name!r} in {variable.unit}, "
+                    "and the package defines no conversion; state the variable's unit"
+                )
+            value = found[0] * value + found[1]
+        return change.factor * value + change.offset
 
 
 def _kind(type_name: str) -> str:

@@ -13,39 +13,31 @@ from falsifier.fmu.process.network import SYSTEM, Link, Member, Place
 
 
 class Dependencies:
-    """What the components declare of their outputs and inputs.
-
-    Args:
-        members: the components.
-        structures: what their FMUs declare.
-    """
+    """What the FMUs of the components declare of their outputs and inputs."""
 
     def __init__(self, members: Sequence[Member], structures: Sequence[Structure]) -> None:
-        self._members, self._structures = members, structures
+        self._members = members
+        # The inputs, as the FMU names them, on which each output depends directly; None: it does not say.
+        self._inputs_of = [
+            {v.name: structure.inputs_of.get(_declared(m, v.name)) for v in m.description.info.outputs}
+            for m, structure in zip(members, structures, strict=True)
+        ]
 
     def is_declared(self, place: Place, output: str) -> bool:
         """Whether the component declares that its output depends directly on the input at this place."""
-        declared = self._inputs_of(place.member, output)
-        return declared is not None and self._declared(place.member, place.name) in declared
+        inputs = self._inputs_of[place.member][output] or ()
+        return _declared(self._members[place.member], place.name) in inputs
 
     def may_reach(self, place: Place, *, undeclared: bool) -> bool:
-        """Whether an output of the component depends directly on the input at this place.
-
-        Args:
-            place: the input.
-            undeclared: whether an output of which nothing is declared may depend on it.
-        """
-        outputs = [v.name for v in self._members[place.member].description.info.outputs]
+        """Whether an output depends directly on the input at this place; or may, as nothing is declared."""
+        outputs = self._inputs_of[place.member].items()
         return any(
-            self.is_declared(place, name) or (undeclared and self._inputs_of(place.member, name) is None)
-            for name in outputs
+            self.is_declared(place, name) or (undeclared and inputs is None) for name, inputs in outputs
         )
 
-    def _inputs_of(self, member: int, output: str) -> frozenset[str] | None:
-        return self._structures[member].inputs_of.get(self._declared(member, output))
 
-    def _declared(self, member: int, name: str) -> str:
-        return self._members[member].description.slots[name].declared or name
+def _declared(member: Member, name: str) -> str:
+    return member.description.slots[name].declared or name
 
 
 def direct_loop(links: Sequence[Link], dependencies: Dependencies) -> list[Place]:

@@ -73,7 +73,7 @@ class System(Isolated):
         object.__setattr__(self, "connections", connections)
         _check_coupling(self.coupling)
         object.__setattr__(self, "key", _key(self))
-        _network(self)
+        _order(self)
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -91,7 +91,7 @@ class System(Isolated):
     @property
     def network(self) -> Network:
         """The checked system: members, links and the order of stepping."""
-        return _network(self)
+        return self.order.network
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
@@ -142,18 +142,13 @@ def _key(system: System) -> str:
 
 @lru_cache(maxsize=64)
 def _order(system: System) -> Order:
+    connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
     return Order(
-        network=system.network,
+        network=make_network(system.name, system.parts, connections, system.coupling, system.frame),
         key=(system.key, system.logging, system.rights),
         logging=system.logging,
         rights=system.rights,
     )
-
-
-@lru_cache(maxsize=32)
-def _network(system: System) -> Network:
-    connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
-    return make_network(system.name, system.parts, connections, system.coupling, system.frame)
 
 
 def _check_coupling(coupling: Coupling) -> None:

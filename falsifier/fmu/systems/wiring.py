@@ -32,13 +32,6 @@ def make_network(
 ) -> Network:
     """Check a system and return it with all names resolved.
 
-    Args:
-        name: name of the system.
-        components: the FMUs by name.
-        connections: where the values of inputs come from, by input, as ``component.variable``.
-        coupling: how the components exchange values.
-        frame: what the system has as a whole.
-
     Raises:
         ModelError: if an FMU cannot be read.
         SpecError: naming both ends of a connection that does not fit, and the remedy.
@@ -122,11 +115,14 @@ class _Joiner:
                     "arrays of equal size, or single elements such as NAME[1]"
                 )
             for source, end in zip(sources, targets, strict=True):
-                self._claim(end, title)
-                self.links.append(self._link(source, end, connection))
-                note = self._unit_note(source, end, self.links[-1])
-                # A conversion that the user states needs no note.
-                if note and connection.factor is None and connection.offset is None:
+                # Whichever of its names is stated, an input has one source.
+                slot = self._members[end.member].description.slots[end.name]
+                known = self._fed.setdefault((end.member, slot.reference, slot.offset), title)
+                if known != title:
+                    raise SpecError(f"this input is already connected: {known}; remove one of the two")
+                link, note = self._link(source, end, connection)
+                self.links.append(link)
+                if note:
                     self.notes.append(f"{title}: {note}")
         except SpecError as error:
             raise SpecError(f"{title}: {error.message}", key="connections") from None
@@ -162,22 +158,16 @@ class _Joiner:
         longest = max(owners, key=lambda k: len(self._members[k].name))
         return longest, name[len(self._members[longest].name) + 1 :]
 
-    def _claim(self, target: Place, title: str) -> None:
-        """Check that an input, by whichever of its names, has one source."""
-        slot = self._members[target.member].description.slots[target.name]
-        known = self._fed.setdefault((target.member, slot.reference, slot.offset), title)
-        if known != title:
-            raise SpecError(f"this input is already connected: {known}; remove one of the two")
-
     def _variable(self, place: Place) -> Variable:
         if place.member == SYSTEM:
             return self._inputs[place.name]
         return self._members[place.member].description.info[place.name]
 
-    def _link(self, source: Place, target: Place, connection: Connection) -> Link:
+    def _link(self, source: Place, target: Place, connection: Connection) -> tuple[Link, str]:
+        """Return the link of two scalars, and what the user should know of its units."""
         a, b = self._variable(source), self._variable(target)
         _check_types(a, b)
-        factor, offset = self._conversion(source, target, connection)
+        factor, offset, note = self._conversion(source, target, connection)
         if (factor, offset) != (1.0, 0.0) and b.kind != "real":
             raise SpecError(f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
@@ -185,36 +175,33 @@ class _Joiner:
         if connection.extrapolation == "linear" and not b.is_continuous:
             raise SpecError('only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
-        return Link(source, target, factor, offset, start, extrapolation == "linear" and b.is_continuous)
+        is_linear = extrapolation == "linear" and b.is_continuous
+        return Link(source, target, factor, offset, start, is_linear), note
 
-    def _conversion(self, source: Place, target: Place, connection: Connection) -> tuple[float, float]:
+    def _conversion(self, source: Place, target: Place, connection: Connection) -> tuple[float, float, str]:
+        """Return factor and offset, and what is done with units unless the user has stated a conversion."""
         if connection.factor is not None or connection.offset is not None:
             factor = 1.0 if connection.factor is None else finite("factor", connection.factor)
             if factor == 0.0:
                 raise SpecError("factor = 0 passes nothing on; state another, or remove it and fix the input")
-            return factor, finite("offset", connection.offset or 0.0)
-        a, b = self._variable(source), self._variable(target)
+            return factor, finite("offset", connection.offset or 0.0), ""
+        a, b = self._variable(source).unit, self._variable(target).unit
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
-        found = conversion(a.unit, b.unit, known)
+        found = conversion(a, b, known)
         if found is None:
             raise SpecError(
-                f"the output is in {a.unit}, the input in {b.unit}, and neither FMU defines how to convert "
+                f"the output is in {a}, the input in {b}, and neither FMU defines how to convert "
                 f"one to the other; connect like units, or state the conversion: "
                 f'{{ from = "{connection.source}", factor = NUMBER, offset = NUMBER }}'
             )
-        return found
-
-    def _unit_note(self, source: Place, target: Place, link: Link) -> str:
-        """Say how units are converted, or that one is missing; empty if neither."""
-        a, b = self._variable(source).unit, self._variable(target).unit
-        if (link.factor, link.offset) != (1.0, 0.0):
-            shown = f" {link.offset:+.6g}" if link.offset else ""
-            return f"converted from {a} to {b}: * {link.factor:.6g}{shown}"
+        if found != (1.0, 0.0):
+            shown = f" {found[1]:+.6g}" if found[1] else ""
+            return *found, f"converted from {a} to {b}: * {found[0]:.6g}{shown}"
         if bool(a) == bool(b):
-            return ""
+            return *found, ""
         silent, other = ("input", f"output is in {a}") if a else ("output", f"input is in {b}")
-        return f"passes unchanged; the {silent} states no unit, the {other}"
+        return *found, f"passes unchanged; the {silent} states no unit, the {other}"
 
 
 def _check_types(a: Variable, b: Variable) -> None:

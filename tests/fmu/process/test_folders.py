@@ -46,11 +46,11 @@ def test_a_lock_without_folder_is_swept_when_it_is_old(temporary: Path) -> None:
 
 def test_of_much_output_the_end_is_taken() -> None:
     output = Output()
-    os.write(output.fileno(), b"first\n" + b"x" * 100_000 + b"\nlast\n")
+    os.write(output.file.fileno(), b"first\n" + b"x" * 100_000 + b"\nlast\n")
     lines = output.take()
     assert lines[-1] == "last"
     assert "first" not in lines
-    output.close()
+    output.file.close()
 
 
 def test_no_process_can_make_it_longer_or_shorter() -> None:
@@ -58,22 +58,22 @@ def test_no_process_can_make_it_longer_or_shorter() -> None:
     written = 0
     with pytest.raises(PermissionError):
         while True:
-            written += os.write(output.fileno(), b"x" * 99_999)
+            written += os.write(output.file.fileno(), b"x" * 99_999)
     assert written == _MOST_BYTES
     for size in (0, 2 * _MOST_BYTES):
         with pytest.raises(PermissionError):
-            os.ftruncate(output.fileno(), size)
+            os.ftruncate(output.file.fileno(), size)
     assert output.take()[-1] == _DROPPED
-    os.write(output.fileno(), b"again\n")
+    os.write(output.file.fileno(), b"again\n")
     assert output.take() == ("again",)
-    output.close()
+    output.file.close()
 
 
 @pytest.mark.parametrize("position", [1, _MOST_BYTES, 1 << 60])
 def test_a_moved_position_does_no_harm(position: int) -> None:
     output = Output()
-    os.lseek(output.fileno(), position, os.SEEK_SET)
+    os.lseek(output.file.fileno(), position, os.SEEK_SET)
     assert sum(map(len, output.take())) < _MOST_BYTES
-    os.write(output.fileno(), b"again\n")
+    os.write(output.file.fileno(), b"again\n")
     assert output.take() == ("again",)
-    output.close()
+    output.file.close()

@@ -105,8 +105,8 @@ def test_messages_of_failed_and_of_successful_simulations_are_kept(misdeeds: Fmu
 def test_a_worker_that_dies_between_simulations_is_replaced_without_blame(misdeeds: FmuModel) -> None:
     run(misdeeds, ("y",))
     run(misdeeds, ("y",))
-    os.kill(worker(misdeeds).pid, signal.SIGKILL)
-    patience.wait_until(lambda: not worker(misdeeds)._started.program.is_alive)
+    os.kill(worker(misdeeds).program.pid, signal.SIGKILL)
+    patience.wait_until(lambda: not worker(misdeeds).program.is_alive)
     assert run(misdeeds, ("y",))["y"][-1] == 10
 
 
@@ -116,7 +116,7 @@ def test_each_fmu_has_a_worker_of_its_own_without_secrets(
     monkeypatch.setenv("SOME_API_KEY", "hidden")
     other = isolated("Ball_2")
     assert len(run(misdeeds, ("y",))) == len(run(other, ("h",))) == 11
-    pids = {worker(model).pid for model in (misdeeds, other)}
+    pids = {worker(model).program.pid for model in (misdeeds, other)}
     assert len(pids) == 2
     if sys.platform == "linux":
         assert all("hidden" not in Path(f"/proc/{pid}/environ").read_text() for pid in pids)
@@ -128,7 +128,7 @@ from falsifier.fmu.process.registry import REGISTRY
 (runner,) = REGISTRY._runners.values()
 import threading
 threading.Timer(0.3, os.kill, (os.getpid(), 9)).start()
-print(runner._worker.pid, flush=True)
+print(runner._worker.program.pid, flush=True)
 go(2)
 """
     with script(body, TMPDIR=str(tmp_path)) as process:
@@ -221,7 +221,7 @@ def test_workers_are_replaced_before_they_have_made_too_many_instances() -> None
     for _ in range(_MOST_INSTANCES + 20):
         assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
         found = fixtures.runner(model)._worker
-        pids |= {found.pid} if found else set()
+        pids |= {found.program.pid} if found else set()
     assert len(pids) == 2
 
 
@@ -230,10 +230,10 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
     model = isolated(name)
     run(model, ("y",), stop=0.2)
     run(model, ("y",), stop=0.2)  # takes note of the self-test
-    pid = worker(model).pid
+    pid = worker(model).program.pid
     for _ in range(5 * _MOST_INSTANCES):
         assert run(model, ("y",), stop=0.2)["y"].tolist() == [0, 1, 2]
-    assert worker(model).pid == pid
+    assert worker(model).program.pid == pid
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: s
     for _ in range(6):
         found.append(run(model, ("y",), signals=signals)["y"].tolist())
         runner = fixtures.runner(model)
-        pids |= {runner._worker.pid} if runner._worker else set()
+        pids |= {runner._worker.program.pid} if runner._worker else set()
     assert found == [found[0]] * 6 and found[0][-1] > 0
-    assert runner._experience.reuse == reuse
+    assert runner.reuse == reuse
     assert reuse != "library" or len(pids) == 1, "even a library that is loaded again costs no process"

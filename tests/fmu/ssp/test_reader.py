@@ -10,6 +10,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package
 from falsifier.fmu.ssp import reader as ssp
+from tests.fmu.fixtures import path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import run, sampled_loop
 
@@ -182,6 +183,17 @@ def test_a_wrong_package_is_one_clear_line(message: str, tmp_path: Path) -> None
     assert message in str(wrong.value) and "\n" not in str(wrong.value)
     assert str(wrong.value).startswith(str(file))
     assert getattr(wrong.value, "exit_code", None) == 2
+
+
+def test_an_fmu_with_wrong_units_is_a_wrong_package(tmp_path: Path) -> None:
+    odd = tmp_path / "Odd.fmu"
+    with zipfile.ZipFile(path("Plant_2")) as known, zipfile.ZipFile(odd, "w") as copy:
+        for name in known.namelist():
+            copy.writestr(name, known.read(name).replace(b'<BaseUnit m="1"/>', b'<BaseUnit m="one"/>'))
+    more: dict[str, str | bytes] = {"resources/Odd.fmu": odd.read_bytes()}
+    file = write(tmp_path / "odd.ssp", plant("Plant_2", "Odd"), more=more)
+    with pytest.raises(SpecError, match=r"odd\.ssp: resources/Odd\.fmu: .*units or dependencies"):
+        read_package(file)
 
 
 def test_descriptions_that_grow_like_powers_are_refused(
