@@ -84,7 +84,7 @@ if TYPE_CHECKING:
         read_info,
         read_package,
     )
-    from falsifier.llm.connect import connect
+    from falsifier.llm.client import connect
     from falsifier.llm.messages import Chat, Exchange
     from falsifier.llm.prompts import VARIANTS
     from falsifier.llm.scripted import ScriptedChat
@@ -129,7 +129,7 @@ _NAMES = {
     "falsifier.evaluation.confirm": "Confirmation confirm",
     "falsifier.evaluation.evaluate": "Evaluation evaluate monitor_for simulate",
     "falsifier.fmu": "Component Connection Coupling FmuModel Frame System read_info read_package",
-    "falsifier.llm.connect": "connect",
+    "falsifier.llm.client": "connect",
     "falsifier.llm.messages": "Chat Exchange",
     "falsifier.llm.prompts": "VARIANTS",
     "falsifier.llm.scripted": "ScriptedChat",

@@ -184,7 +184,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         ChatError: for an unknown provider, an option that it does not have, or a missing key.
         ModelError: if an FMU cannot be used.
     """
-    from falsifier.llm.connect import preflight
+    from falsifier.llm.client import preflight
     from falsifier.llm.model_file import is_model_file, served
 
     runs = tuple(request.named().values())

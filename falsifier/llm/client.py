@@ -1,6 +1,7 @@
-"""An LLM behind litellm: asked in the strictest way that its server accepts, again after passing failures.
+"""The chat with an LLM behind litellm: made from its name, after its key and its options were checked.
 
-Valid replies are kept on disk, keyed by the content of the request.
+It asks in the strictest way that the server accepts, and again after passing failures. Valid replies are kept
+on disk, keyed by the content of the request.
 """
 
 import json
@@ -20,7 +21,7 @@ from pydantic import ValidationError
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
-from falsifier.errors import ChatError
+from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.failures import (
     FormatUnsupportedError,
     TransientChatError,
@@ -29,6 +30,8 @@ from falsifier.llm.failures import (
 )
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
+    check_name,
+    check_options,
     completed,
     dropped_parameters,
     listed_price,
@@ -37,6 +40,7 @@ from falsifier.llm.litellm_adapter import (
 from falsifier.llm.messages import (
     MODES,
     UNREADABLE,
+    Chat,
     ChatReply,
     ChatRequest,
     Message,
@@ -44,7 +48,8 @@ from falsifier.llm.messages import (
     Usage,
     cleaned,
 )
-from falsifier.llm.providers import find_key, known
+from falsifier.llm.model_file import check_model_file, is_model_file, served
+from falsifier.llm.providers import check_address, find_key, first_mode, known
 from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, lost_usage, usage_of
 
@@ -65,23 +70,15 @@ _LONGEST_TIMEOUT = 2e6
 
 @dataclass
 class LiteLLMChat:
-    """An LLM of any provider that litellm supports.
+    """An LLM of any provider that litellm supports; ``connect`` says what most of its attributes mean.
 
     It is asked by JSON Schema, else for any JSON object, else in words only; what worked is remembered. The
     next way is tried if the server rejects one, or repeatedly cannot parse what it makes the LLM write.
 
     Attributes:
-        llm: litellm's name, e.g. ``openai/gpt-5-mini``.
-        effort: reasoning effort, ``low``, ``medium`` or ``high``; None: the LLM's default.
-        api_base: address of the server; None: the provider's own.
-        options: further parameters of litellm's ``completion``, passed unchanged.
-        timeout: seconds to wait for a complete reply.
-        price: price stated by the user; None: litellm's table.
         mode: how the next reply that follows a schema is asked for.
         content: what the server serves, if it was started for a model file; records then say this instead
             of the server's address, which is another one each time.
-        attempts: maximum number of requests per reply if failures are temporary.
-        cache: directory of valid replies, one file each, created with the first one; None: none are kept.
     """
 
     llm: str
@@ -213,7 +210,7 @@ class LiteLLMChat:
         def ask() -> ChatReply:
             response = completed(
                 self.llm,
-                messages=[sent_message(m, marks=known(self.llm).marks) for m in request.messages],
+                messages=[_sent(m, marks=known(self.llm).marks) for m in request.messages],
                 api_base=self.api_base,
                 timeout=timeout,
                 **{"api_key": key, **arguments},
@@ -304,13 +301,70 @@ class LiteLLMChat:
         return {**effective, "dropped": sorted(omitted)} if omitted else effective
 
 
-def sent_message(message: Message, *, marks: bool = False) -> dict[str, Any]:
-    """Message with OpenAI's field names.
+def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, Any] | None = None) -> None:
+    """Check an LLM's name, address, key and options without sending anything.
+
+    Raises:
+        ChatError: saying what to set or change.
+    """
+    if is_model_file(llm):
+        check_model_file(llm)
+        if api_base is not None:
+            raise ChatSetupError(f"--llm {llm}: a model file has a server of its own; drop --api-base")
+        return
+    check_name(llm)
+    check_address(llm, api_base)
+    find_key(llm, api_base=api_base)
+    check_options(llm, options or {}, api_base=api_base)
+
+
+def connect(
+    llm: str,
+    *,
+    effort: str | None = None,
+    api_base: str | None = None,
+    options: Mapping[str, Any] | None = None,
+    price: Price | None = None,
+    timeout: float = DEFAULT_TIMEOUT,
+    attempts: int = DEFAULT_ATTEMPTS,
+    cache: Path | None = None,
+) -> Chat:
+    """Make a chat with an LLM; nothing is sent yet. The server of a model file is started.
 
     Args:
-        message: what is sent.
-        marks: whether to mark what the next question will begin with, too.
+        llm: PROVIDER/MODEL as litellm names it, or the path of a model file (GGUF).
+        effort: reasoning effort: ``none``, ``minimal``, ``low``, ``medium`` or ``high``; what the LLM does
+            not take is left out, and the record says so.
+        api_base: address of the server, if it is not the provider's own.
+        options: further parameters of litellm's ``completion``.
+        price: what the LLM costs; None: litellm's table.
+        timeout: seconds to wait for one reply.
+        attempts: maximum number of requests per reply if failures are temporary.
+        cache: directory of valid replies, one file each, created with the first one; None: none are kept.
+
+    Raises:
+        ChatError: for an unknown provider, an unknown option, a missing key, or an address with a password.
     """
+    preflight(llm, api_base=api_base, options=options)
+    own = served(llm) if is_model_file(llm) else None
+    if own is not None:
+        llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
+    return LiteLLMChat(
+        llm=llm,
+        effort=effort,
+        api_base=api_base,
+        options=dict(options or {}),
+        timeout=timeout,
+        price=price,
+        mode=first_mode(llm),
+        content="" if own is None else own.content,
+        attempts=attempts,
+        cache=cache,
+    )
+
+
+def _sent(message: Message, *, marks: bool) -> dict[str, Any]:
+    """Message with OpenAI's field names; marked or not is what the next question will begin with, too."""
     sent: dict[str, Any] = {"role": message.role, "content": message.content}
     if marks and message.stable:
         kept, rest = message.content[: message.stable], message.content[message.stable :]

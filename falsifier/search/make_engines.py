@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from falsifier.context.values import Context
+from falsifier.core.files import cache_directory
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError
@@ -109,8 +110,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         SpecError: if the cost is limited although the price is unknown.
         ChatError: for an unknown provider or a missing key.
     """
-    from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT
-    from falsifier.llm.connect import connect, default_cache_directory
+    from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, connect
     from falsifier.llm.usage import Price
 
     chat = connect(
@@ -121,7 +121,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         price=Price(*llm.price) if llm.price else None,
         timeout=llm.timeout or DEFAULT_TIMEOUT,
         attempts=attempts or DEFAULT_ATTEMPTS,
-        cache=default_cache_directory() if llm.cache else None,
+        cache=cache_directory() / "replies" if llm.cache else None,
     )
     if max_cost is not None and price_of(llm) is None:
         raise SpecError(

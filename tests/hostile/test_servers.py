@@ -10,8 +10,7 @@ import pytest
 
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError
-from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.connect import connect
+from falsifier.llm.client import LiteLLMChat, connect
 from falsifier.llm.messages import ChatRequest, Message
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
-from falsifier.llm.connect import connect, preflight
+from falsifier.llm.client import connect, preflight
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
