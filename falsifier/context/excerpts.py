@@ -9,12 +9,10 @@ from pathlib import PurePosixPath
 from falsifier.context.simulink import Diagram, names_text, structure_text
 from falsifier.context.simulink.comparisons import diagram_thresholds
 from falsifier.context.simulink.diagram import upstream
-from falsifier.context.sources import Source, constants_of, read_source, without_annotations
+from falsifier.context.sources import Source, constants_of, without_annotations
 from falsifier.context.thresholds import Threshold, thresholds
 from falsifier.core.words import counted
 
-_C = (".c", ".h", ".cpp", ".hpp")
-_MODELICA = (".mo",)
 _HTML = (".html", ".htm", ".xhtml")
 # What a page does not show, with its tags; where a head ends that stays open. Every pattern takes what it has
 # looked at, so that time grows with the length of a page.
@@ -55,14 +53,6 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     return Readable(forms, (*_modes(diagram), *diagram_thresholds(diagram, only)))
 
 
-def source_of(text: str, shown: str) -> Source | None:
-    """Return what a source says, by the ending of its name; None if it is no source, or too long."""
-    suffix = PurePosixPath(shown).suffix.lower()
-    if suffix not in (*_MODELICA, *_C):
-        return None
-    return read_source(text, shown, is_modelica=suffix in _MODELICA)
-
-
 def of_source(
     source: Source,
     library: Sequence[Source],
@@ -79,13 +69,15 @@ def of_source(
         is_named: whether the user named this file; other sources are told only if they set one of ``seeds``.
     """
     short = ("size only", counted(source.text.count("\n") + 1, "line"))
-    if not is_named and {name.rpartition(".")[2] for name in seeds}.isdisjoint(source.others):
+    variables = {each.name for each in source.assigned if not each.is_constant}
+    if not is_named and variables.isdisjoint(name.rpartition(".")[2] for name in seeds):
         return Readable((short,))
     constants = constants_of(source, library)
     is_dotted = source.is_modelica
     limits = tuple(thresholds(source.text, constants, source.shown, is_dotted=is_dotted, has_lines=True))
     compared = [f"{t.text}  [{t.place}]" for t in limits]
-    stated = [f"{name} = {constants[name]}" for name in source.constants if constants.get(name)]
+    declared = dict.fromkeys(each.name for each in source.assigned if each.is_constant)
+    stated = [f"{name} = {constants[name]}" for name in declared if constants.get(name)]
     whole = without_annotations(source.text) if source.is_modelica else source.text
     forms = (
         ("whole", whole.strip()),

@@ -8,11 +8,11 @@ from itertools import accumulate
 from pathlib import Path
 from types import MappingProxyType
 
-from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text, source_of
+from falsifier.context.excerpts import Readable, of_diagram, of_source, of_text
 from falsifier.context.files import NAME_THEM, Sentry, inside, text_of
 from falsifier.context.simulink import Diagram, read_diagram
 from falsifier.context.simulink.sections import read_parts
-from falsifier.context.sources import Source
+from falsifier.context.sources import Source, read_source
 from falsifier.context.thresholds import Threshold
 from falsifier.context.values import SIMULINK, Compared, Context, Crossing, Excerpt
 from falsifier.core.words import counted
@@ -89,7 +89,7 @@ def gather(
                 continue
             if sentry is not None:
                 sentry.look(text, name, name, NAME_THEM)
-            read = source_of(text, name) or text
+            read = read_source(text, name) or text
             found.append(_File(name, name, sha256(content).hexdigest(), read, is_named=False))
     library = [file.content for file in found if isinstance(file.content, Source)]
 
@@ -147,7 +147,7 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
             sentry.look(packed.decode("utf-8", "replace"), f"{name}: {part}", name, _LEAVE_OUT)
     elif sentry is not None:
         sentry.look(text, name, name, _LEAVE_OUT)
-    read = read_diagram(path) if is_diagram else source_of(text, path.name) or text
+    read = read_diagram(path) if is_diagram else read_source(text, path.name) or text
     return _File(name, path.name, sha256(content).hexdigest(), read, is_named=True)
 
 

@@ -5,70 +5,70 @@ structure they belong to, and both branches of ``#if`` count.
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import NamedTuple
 
 from falsifier.context.thresholds import CLOSING, OPENING, Token, statements, tokens_of
 
 # Patterns take what they have looked at, so that time grows with the length of a file.
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)[ \t]+(.*)", re.DOTALL)
 _COMMENT = re.compile(r"//[^\n]*+|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_C, _MODELICA = (".c", ".h", ".cpp", ".hpp"), (".mo",)
 _UNCHANGING = frozenset(("parameter", "constant", "const"))
 _MAX_CHARACTERS = 4_000_000  # far more than a model of 10,000 lines has
 _MAX_VALUE = 400  # characters of a value
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """One file.
+class Assigned(NamedTuple):
+    """A value that a file gives to a name: of ``a.b`` or ``a->b`` to its last part.
 
     Attributes:
-        text: its text.
-        shown: what messages call it.
-        is_modelica: whether it is Modelica, and not C.
-        constants: values of its macros, constants and parameters by name, as written; empty if one is long.
-        others: values that it gives to names without declaring them as constants. In Modelica these may be
-            modifiers of constants, such as ``Base(limit = 8)``.
+        name: what is set, equated, declared with a value, modified or defined.
+        value: as written; empty if it is long.
+        is_constant: whether it declares a macro, constant or parameter. What does not, may in Modelica modify
+            one: ``Base(limit = 8)``.
     """
+
+    name: str
+    value: str
+    is_constant: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The text of one file, what messages call it, whether it is Modelica (or C), and what it sets, in order."""
 
     text: str
     shown: str
     is_modelica: bool
-    constants: Mapping[str, Sequence[str]]
-    others: Mapping[str, Sequence[str]]
+    assigned: tuple[Assigned, ...]
 
 
-def read_source(text: str, shown: str, *, is_modelica: bool) -> Source | None:
-    """Return what a file says; None if it is too long to be read."""
-    if len(text) > _MAX_CHARACTERS:
+def read_source(text: str, shown: str) -> Source | None:
+    """Return what a source says, by the ending of its name; None if it is no source, or too long."""
+    suffix = PurePosixPath(shown).suffix.lower()
+    if suffix not in (*_MODELICA, *_C) or len(text) > _MAX_CHARACTERS:
         return None
-    constants: dict[str, list[str]] = {}
-    others: dict[str, list[str]] = {}
-    for tokens in statements(text):
-        for name, value, is_constant in _assignments(text, tokens, is_modelica=is_modelica):
-            stated = " ".join(_COMMENT.sub(" ", value).split())
-            (constants if is_constant else others).setdefault(name, []).append(stated)
-    return Source(text, shown, is_modelica, constants, others)
+    is_modelica = suffix in _MODELICA
+    found = (a for tokens in statements(text) for a in _assignments(text, tokens, is_modelica=is_modelica))
+    return Source(text, shown, is_modelica, tuple(found))
 
 
 def constants_of(source: Source, library: Sequence[Source]) -> dict[str, str]:
     """Return values of the constants that a file may use; ``5 or 9`` if there are two.
 
-    Args:
-        source: the file.
-        library: all files: those of the same language may define its constants, or change them.
+    Other files of the same language may define its constants, or change them.
     """
     alike = [each for each in library if each.is_modelica == source.is_modelica and each is not source]
-    found: dict[str, list[str]] = {}
-    for file in (source, *alike):
-        for name, values in file.constants.items():
-            found.setdefault(name, []).extend(values)
-    for file in (source, *alike):
-        for name in found.keys() & file.others.keys():
-            if source.is_modelica:  # which modifier holds is not told apart
-                found[name] += file.others[name]
-            else:  # a variable of the same name
-                del found[name]
+    assigned = [each for file in (source, *alike) for each in file.assigned]
+    found: dict[str, list[str]] = {each.name: [] for each in assigned if each.is_constant}
+    for name, value, is_constant in sorted(assigned, key=lambda each: not each.is_constant):
+        if is_constant or source.is_modelica:  # which modifier holds is not told apart
+            found.get(name, []).append(value)
+        else:  # a variable of the same name
+            found.pop(name, None)
     return {name: " or ".join(dict.fromkeys(filter(None, values))) for name, values in found.items()}
 
 
@@ -86,11 +86,7 @@ def without_annotations(text: str) -> str:
     return told + (text[end:] if begun is None else text[end:begun].rstrip())
 
 
-def _assignments(text: str, tokens: Sequence[Token], *, is_modelica: bool) -> Iterator[tuple[str, str, bool]]:
-    """Return what a statement sets, equates, declares with a value, modifies or defines.
-
-    Of each: the name, of ``a.b`` or ``a->b`` its last part; the value; and whether it declares a constant.
-    """
+def _assignments(text: str, tokens: Sequence[Token], *, is_modelica: bool) -> Iterator[Assigned]:
     begins: dict[int, int] = {}  # of brackets, by where they end
     opened: list[int] = []
     is_constant = False
@@ -107,13 +103,16 @@ def _assignments(text: str, tokens: Sequence[Token], *, is_modelica: bool) -> It
             return
         elif token.kind == "directive":
             if defined := _DEFINE.match(_COMMENT.sub(" ", token.text)):
-                yield defined[1], defined[2].replace("\\\n", " "), True
+                yield Assigned(
+                    defined[1], " ".join(defined[2].replace("\\\n", " ").split()), is_constant=True
+                )
         elif token.text in ("=", ":="):
             last = begins.get(i - 1, i) - 1  # before indices and modifiers
             if last >= 0 and tokens[last].text == "der" and last + 2 < i:
                 last += 2
             if last >= 0 and tokens[last].kind == "name":
-                yield tokens[last].text.strip("'"), _value(text, tokens, i), is_constant and not opened
+                value = " ".join(_COMMENT.sub(" ", _value(text, tokens, i)).split())
+                yield Assigned(tokens[last].text.strip("'"), value, is_constant and not opened)
 
 
 def _value(text: str, tokens: Sequence[Token], sign: int) -> str:

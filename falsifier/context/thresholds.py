@@ -35,16 +35,9 @@ _TOKEN = re.compile(
 
 
 class Token(NamedTuple):
-    """One word, number, text, sign or line of C's preprocessor.
+    """One word, number, text, sign or line of C's preprocessor, and where it stands in its file."""
 
-    Attributes:
-        kind: ``name``, ``number``, ``text``, ``sign`` or ``directive``.
-        text: as written.
-        start: its first character, from 0.
-        end: the character behind it.
-    """
-
-    kind: str
+    kind: str  # name, number, text, sign or directive
     text: str
     start: int
     end: int

@@ -94,28 +94,15 @@ class ReplyForm:
         Raises:
             RejectedReplyError: if none is valid; states what is wrong with each.
         """
-        found = self.read_each(text, origin=origin)
-        candidates = [one for one in found if isinstance(one, Candidate)]
-        if not candidates:
-            numbered = len(found) > 1
-            raise RejectedReplyError(
-                "; ".join(f"candidate {i}: {one}" if numbered else str(one) for i, one in enumerate(found, 1))
-            )
-        return candidates
-
-    def read_each(self, text: str, *, origin: str = "") -> list[Candidate | RejectedReplyError]:
-        """Read the candidates of a reply in order; an invalid one is replaced by an error with its defect.
-
-        Raises:
-            RejectedReplyError: if the reply contains no candidate, valid or not.
-        """
-        each: list[Candidate | RejectedReplyError] = []
-        for found in candidates_in(text):
+        written, valid, defects = candidates_in(text), list[Candidate](), list[str]()
+        for number, found in enumerate(written, start=1):
             try:
-                each.append(self._candidate(written_candidate(found), origin))
+                valid.append(self._candidate(written_candidate(found), origin))
             except RejectedReplyError as rejection:
-                each.append(rejection)
-        return each
+                defects.append(f"candidate {number}: {rejection}" if len(written) > 1 else str(rejection))
+        if not valid:
+            raise RejectedReplyError("; ".join(defects))
+        return valid
 
     def _candidate(self, written: WrittenCandidate, origin: str) -> Candidate:
         if written.point is not None:

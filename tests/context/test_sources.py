@@ -3,8 +3,8 @@
 import pytest
 
 from falsifier.context import sources
-from falsifier.context.excerpts import Readable, of_source, of_text, source_of
-from falsifier.context.sources import Source
+from falsifier.context.excerpts import Readable, of_source, of_text
+from falsifier.context.sources import Source, read_source
 from falsifier.context.thresholds import thresholds, tokens_of
 
 MODEL = """model M
@@ -19,7 +19,7 @@ PAGE = """<html><head><title>no</title><style>p {}</style></head><body><h1>1 Lim
 
 
 def source(text: str, shown: str) -> Source:
-    found = source_of(text, shown)
+    found = read_source(text, shown)
     assert found is not None
     return found
 
@@ -157,7 +157,8 @@ def test_conditions_of_modelica_whatever_class_they_belong_to() -> None:
         ("u > limit (limit = 2 * 3 or 7)", ["u"]), ("u > 4", ["u"]), ("M.w > 8.5", ["M.w"])
     ]  # fmt: skip
     assert levels(read(text, "a.mo")) == [4.0, 7.0, 8.5]
-    assert {"x", "mode", "y"} <= source(text, "a.mo").others.keys()
+    assigned = source(text, "a.mo").assigned
+    assert {"x", "mode", "y"} <= {each.name for each in assigned if not each.is_constant}
 
 
 @pytest.mark.parametrize(
@@ -219,7 +220,7 @@ def test_a_source_inside_an_fmu_is_told_only_if_it_sets_a_signal() -> None:
 
 def test_a_source_that_is_too_long_is_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sources, "_MAX_CHARACTERS", 10)
-    assert source_of("void f(void) { speed = u > 3; }", "a.c") is None
+    assert read_source("void f(void) { speed = u > 3; }", "a.c") is None
 
 
 def test_pages_lose_their_tags() -> None:

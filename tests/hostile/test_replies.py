@@ -74,11 +74,10 @@ def test_the_time_to_read_a_reply_grows_with_its_length(reply: str, size: int) -
     text = LONG[reply](size)
     started = time.thread_time()
     try:
-        found = FORM.read_each(text)
+        FORM.read(text)
     except RejectedReplyError as rejection:
-        found = [rejection]
+        assert len(str(rejection)) < 1300
     assert time.thread_time() - started < CPU_SECONDS
-    assert all(len(str(one)) < 1000 for one in found if isinstance(one, RejectedReplyError))
 
 
 def test_a_reply_longer_than_the_limit_is_rejected_and_not_recorded_in_full() -> None:

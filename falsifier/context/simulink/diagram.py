@@ -43,26 +43,15 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """One end of a line.
-
-    Attributes:
-        block: name of the block.
-        port: number of the port, or ``enable``, ``trigger``, ``state``, ...
-    """
+    """One end of a line."""
 
     block: str
-    port: str
+    port: str  # its number, or enable, trigger, state, ...
 
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """A line from one output to any number of inputs.
-
-    Attributes:
-        source: where it begins; None if it is not connected.
-        targets: where it ends.
-        name: name of the signal; empty if it has none.
-    """
+    """A line from one output, None if it is not connected, to any number of inputs."""
 
     source: End | None
     targets: tuple[End, ...]
@@ -71,12 +60,7 @@ class Wire:
 
 @dataclass(frozen=True, slots=True)
 class BlockSystem:
-    """Blocks and the lines between them.
-
-    Attributes:
-        blocks: the blocks, in the order of the file.
-        wires: the lines.
-    """
+    """Blocks in the order of the file, and the lines between them."""
 
     blocks: tuple[Block, ...] = ()
     wires: tuple[Wire, ...] = ()
@@ -120,31 +104,19 @@ class State:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One transition of a chart.
+    """One transition of a chart, from a state or junction to another."""
 
-    Attributes:
-        source: the state or junction where it begins; empty for a default transition.
-        target: where it ends.
-        label: event, condition and actions, as written.
-    """
-
-    source: str
+    source: str  # empty for a default transition
     target: str
-    label: str = ""
+    label: str = ""  # event, condition and actions, as written
 
 
 @dataclass(frozen=True, slots=True)
 class ChartData:
-    """One variable of a chart.
-
-    Attributes:
-        name: its name.
-        scope: ``input``, ``output``, ``local``, ``parameter``, ``constant``, ...
-        initial: its initial value; empty if it is not stated.
-    """
+    """One variable of a chart."""
 
     name: str
-    scope: str
+    scope: str  # input, output, local, parameter, constant, ...
     initial: str = ""
 
 

@@ -8,8 +8,7 @@ from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End,
 from falsifier.context.simulink.parameters import meaningful
 from falsifier.context.simulink.sections import (
     Node,
-    as_tree,
-    is_text_package,
+    Package,
     parse_mdl,
     read_parts,
     text_parts,
@@ -29,17 +28,12 @@ def read_diagram(path: Path) -> Diagram:
         ModelError: if a ``.slx`` file is not a zip archive, or a dangerous one.
     """
     try:
-        return diagram_of(_tree(path), str(path))
+        return _diagram(_tree(path), str(path))
     except RecursionError:
         raise SpecError(f"{path}: its systems are nested too deep to be read") from None
 
 
-def diagram_of(tree: Node, shown: str) -> Diagram:
-    """Return the diagram that a file's sections describe.
-
-    Raises:
-        SpecError: if there is no model or library among them.
-    """
+def _diagram(tree: Node, shown: str) -> Diagram:
     top = tree.first("Model") or tree.first("Library") or tree.first("Subsystem")
     if top is None:
         kinds = ", ".join(dict.fromkeys(child.kind for child in tree.children)) or "nothing"
@@ -59,7 +53,7 @@ def diagram_of(tree: Node, shown: str) -> Diagram:
 
 def _tree(path: Path) -> Node:
     if path.suffix.lower() == ".slx":
-        return as_tree(read_parts(path), str(path))
+        return Package(read_parts(path), str(path)).tree()
     try:
         size = path.stat().st_size
         if size > _MAX_TEXT_BYTES:
@@ -73,8 +67,8 @@ def _tree(path: Path) -> Node:
         raise SpecError(f"{path}: cannot be read ({error.strerror or error})") from None
     if "\0" in text:
         raise SpecError(f"{path}: expected text, found binary data; save the model as .mdl or .slx again")
-    if is_text_package(text):
-        return as_tree(text_parts(text), str(path))
+    if parts := text_parts(text):
+        return Package(parts, str(path)).tree()
     return parse_mdl(text, str(path))
 
 
@@ -93,15 +87,10 @@ def _settings(tree: Node, top: Node) -> Iterator[tuple[str, str]]:
 
 @dataclass(frozen=True, slots=True)
 class _Systems:
-    """Makes blocks and lines from sections.
+    """Makes blocks and lines from sections."""
 
-    Attributes:
-        defaults: values of all blocks of a type, by type.
-        shown: what errors call the file.
-    """
-
-    defaults: Mapping[str, Mapping[str, str]]
-    shown: str
+    defaults: Mapping[str, Mapping[str, str]]  # values of all blocks of a type, by type
+    shown: str  # what errors call the file
 
     def system(self, node: Node, path: str = "") -> BlockSystem:
         nodes = [block for block in node.children if block.kind in ("Block", "Reference")]

@@ -110,16 +110,14 @@ def parse_mdl(text: str, shown: str) -> Node:
     return Node(kind, values, tuple(children))
 
 
-def is_text_package(text: str) -> bool:
-    """Whether a ``.mdl`` file contains the parts of a package, as newer versions write it."""
-    return _PACKAGE in text
-
-
 def text_parts(text: str) -> dict[str, bytes]:
-    """Return the parts of a package that is written as text, by name; binary parts are left out."""
+    """Return the parts of a package as newer versions write it into a ``.mdl`` file, by name.
+
+    Empty if it is no package; binary parts are left out.
+    """
     parts: dict[str, list[str]] = {}
     inside: list[str] | None = None
-    for line in text[text.index(_PACKAGE) :].splitlines():
+    for line in text.partition(_PACKAGE)[2].splitlines():
         if line.startswith(_PART):
             name, _, encoding = line[len(_PART) :].strip().partition(" ")
             inside = [] if encoding.strip() else parts.setdefault(name.lstrip("/"), [])
@@ -159,21 +157,8 @@ def read_parts(path: Path) -> dict[str, bytes]:
     return parts
 
 
-def as_tree(parts: Mapping[str, bytes], shown: str) -> Node:
-    """Return the sections of a package, arranged as in a ``.mdl`` file.
-
-    Args:
-        parts: contents of the parts by name.
-        shown: what errors call the file.
-
-    Raises:
-        SpecError: naming the part that is missing or cannot be read.
-    """
-    return _Package(parts, shown).tree()
-
-
-class _Package:
-    """The parts of a package, by their names in small letters."""
+class Package:
+    """The parts of a package, by their names in small letters, and what errors call the file."""
 
     def __init__(self, parts: Mapping[str, bytes], shown: str) -> None:
         self._parts = {name.lower(): text for name, text in parts.items()}
@@ -182,7 +167,11 @@ class _Package:
         self._sections = self._references = 0
 
     def tree(self) -> Node:
-        """Return the sections of the model, then those of parts that nothing refers to."""
+        """Return the sections of the model as in a ``.mdl`` file, then those of parts that nothing refers to.
+
+        Raises:
+            SpecError: naming the part that is missing or cannot be read.
+        """
         found = [*self._root(_DIAGRAM).children]
         beside = [name for name in (_DEFAULTS, _STATEFLOW) if name in self._parts]
         for name in (*beside, *sorted(name for name in self._parts if name.startswith(_SETTINGS))):

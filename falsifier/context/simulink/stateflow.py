@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from falsifier.context.simulink.diagram import Chart, ChartData, State, Transition
 from falsifier.context.simulink.sections import Node
@@ -13,19 +13,12 @@ _SCOPE = re.compile(r"(?P<scope>\w+?)(_DATA)?$")
 _INTEGER = re.compile(r"-?\d+")
 
 
-@dataclass(frozen=True, slots=True)
-class _Item:
-    """A state, transition, junction or variable with the section that it is in.
-
-    Attributes:
-        node: its own section.
-        key: its number within the chart.
-        parent: number of the state around it; empty if there is none.
-    """
+class _Item(NamedTuple):
+    """A state, transition, junction or variable, and its number within the chart."""
 
     node: Node
     key: str
-    parent: str
+    parent: str  # number of the state around it; empty if there is none
 
 
 def read_charts(tree: Node) -> Iterator[Chart]:
