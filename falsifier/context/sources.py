@@ -38,7 +38,7 @@ class Assigned(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The text of one file, what messages call it, whether it is Modelica (or C), and what it sets, in order."""
+    """One file: its text, what messages call it, its language (Modelica or C), and what it sets."""
 
     text: str
     shown: str
@@ -103,16 +103,19 @@ def _assignments(text: str, tokens: Sequence[Token], *, is_modelica: bool) -> It
             return
         elif token.kind == "directive":
             if defined := _DEFINE.match(_COMMENT.sub(" ", token.text)):
-                yield Assigned(
-                    defined[1], " ".join(defined[2].replace("\\\n", " ").split()), is_constant=True
-                )
+                yield Assigned(defined[1], _stated(defined[2]), is_constant=True)
         elif token.text in ("=", ":="):
             last = begins.get(i - 1, i) - 1  # before indices and modifiers
             if last >= 0 and tokens[last].text == "der" and last + 2 < i:
                 last += 2
             if last >= 0 and tokens[last].kind == "name":
-                value = " ".join(_COMMENT.sub(" ", _value(text, tokens, i)).split())
+                value = _stated(_value(text, tokens, i))
                 yield Assigned(tokens[last].text.strip("'"), value, is_constant and not opened)
+
+
+def _stated(value: str) -> str:
+    """Return a value in one line, without comments."""
+    return " ".join(_COMMENT.sub(" ", value.replace("\\\n", " ")).split())
 
 
 def _value(text: str, tokens: Sequence[Token], sign: int) -> str:
