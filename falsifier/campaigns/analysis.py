@@ -8,10 +8,18 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.published import COLUMNS, Published, Score, read_published
 from falsifier.campaigns.runs import Run, columns, frame, load, load_run
 from falsifier.campaigns.statistics import Statistics, group, statistics
-from falsifier.campaigns.tables import Table, ablation_table, llms_table, main_table
+from falsifier.campaigns.tables import (
+    COLUMNS,
+    Published,
+    Score,
+    Table,
+    ablation_table,
+    llms_table,
+    main_table,
+    read_published,
+)
 from falsifier.record.summary import Summary
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The competition's validation format: counterexamples as rows of a CSV file, and their re-simulation.
+"""ARCH-COMP: its requirements, and counterexamples as rows of a CSV file, and their re-simulation.
 
 Columns and rules are those of the ARCH-COMP falsification category, as written by its participants' exporters
 and read by FalStar's validator (``Validation.scala``): ``input`` is the matrix ``[t0 u1 u2; t1 u1 u2; ...]``,
@@ -9,7 +9,7 @@ its robustness is below the requirement's tolerance.
 
 import csv
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -20,21 +20,26 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from falsifier.campaigns.published import PROTOCOL_SIMULATIONS, bundled_target
 from falsifier.campaigns.runs import Run, load
+from falsifier.campaigns.tables import read_published
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
-from falsifier.errors import FalsifierError, SpecError, rejected
+from falsifier.errors import FalsifierError, SpecError, did_you_mean, rejected
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.loading import load_problem
+from falsifier.problem.loading import find_spec, load_problem
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.problem.spec import read_spec
 from falsifier.record.journal import read_journal, recorded_candidates
 
 Matrix = NDArray[np.float64]
-Finder = Callable[[str, str, float | None], Problem]
 
+SUITES = ("arch-comp",)
+# The competition's protocol: simulations per run, and the parameterization that published results have.
+PROTOCOL_SIMULATIONS = 1500
+PROTOCOL_PARAMETERIZATION: Parameterization = "fixed"
 COLUMNS = (
     "system",
     "property",
@@ -77,6 +82,35 @@ _DENSE_STEP = 0.05
 _LONGEST_SHOWN = 60
 # Share of a range by which a value may lie outside it because of rounding when it was printed.
 _ROUNDING = 1e-6
+
+
+def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]:
+    """Requirements of a suite, with the parameterization that published results have.
+
+    Args:
+        name: ``arch-comp``: the requirements in ``published.toml``, in that order.
+        profile: profile of the specs; requirements whose spec does not offer it are omitted.
+
+    Raises:
+        SpecError: for an unknown name.
+    """
+    if name not in SUITES:
+        raise SpecError(f"unknown suite {name!r}; {did_you_mean(name, SUITES)}")
+    targets = [_bundled_target(requirement) for requirement in read_published().columns["best"]]
+    return tuple(
+        ProblemSource(target=target, profile=profile, parameterization=PROTOCOL_PARAMETERIZATION)
+        for target in targets
+        if profile is None or profile in read_spec(find_spec(target)[0]).profiles
+    )
+
+
+def _bundled_target(requirement: str) -> str:
+    """Target of a bundled requirement including its spec, such as ``NN:NN``: ``NN`` alone is the whole spec.
+
+    Raises:
+        SpecError: if there is none of that name.
+    """
+    return f"{find_spec(requirement)[0].stem}:{requirement}"
 
 
 def _our_name(property_: str) -> str:
@@ -171,17 +205,9 @@ def read_rows(path: Path) -> list[Row]:
         return [_row(number, cells, path) for number, cells in enumerate(table, start=1)]
 
 
-def validate(
-    rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS, find: Finder | None = None
-) -> list[Revalidated]:
-    """Re-simulate all claimed counterexamples.
-
-    Args:
-        rows: rows of a file.
-        budget: maximum number of simulations; a claim that used more is rejected.
-        find: returns the problem for a requirement, an instance and a stop time; None: the bundled ones.
-    """
-    return [_checked(row, budget, find or bundled_problem) for row in rows if row.falsified]
+def validate(rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS) -> list[Revalidated]:
+    """Re-simulate all claimed counterexamples; a claim of more simulations than the budget is rejected."""
+    return [_checked(row, budget) for row in rows if row.falsified]
 
 
 def bundled_problem(requirement: str, instance: str, stop_time: float | None) -> Problem:
@@ -191,7 +217,7 @@ def bundled_problem(requirement: str, instance: str, stop_time: float | None) ->
         SpecError: if there is none of that name, or the stop time is too short for the requirement.
     """
     try:
-        target = bundled_target(requirement)
+        target = _bundled_target(requirement)
     except SpecError:  # its text lists all names, which would be repeated in each row
         raise SpecError(
             f"no bundled requirement {requirement!r}; falsifier check {quote(requirement)} lists them"
@@ -255,14 +281,14 @@ def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
         raise SpecError(f"row {number}: column {first['loc'][0]}: {told}", file=str(path)) from None
 
 
-def _checked(row: Row, budget: int, find: Finder) -> Revalidated:
+def _checked(row: Row, budget: int) -> Revalidated:
     def result(reason: str, robustness: float | None = None, *, holds: bool = False) -> Revalidated:
         return Revalidated(row, holds, robustness, reason)
 
     if row.simulations > budget:
         return result(f"used {row.simulations} simulations, more than the limit of {budget}")
     try:
-        problem = find(row.requirement, row.instance, row.stop_time)
+        problem = bundled_problem(row.requirement, row.instance, row.stop_time)
         candidate = _candidate(row, problem)
     except (FalsifierError, ValueError) as error:
         return result(str(error))

@@ -16,8 +16,8 @@ import click
 from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, cross, run_campaign, suite
 from falsifier.campaigns import resume_campaign as _resume
 from falsifier.campaigns.analysis import load, read_published
+from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import check_new, is_campaign
-from falsifier.campaigns.published import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.request import Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json

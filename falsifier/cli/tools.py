@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from falsifier.campaigns.archcomp import Revalidated, read_rows
+from falsifier.campaigns.archcomp import PROTOCOL_SIMULATIONS, Revalidated, read_rows
 from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
-from falsifier.campaigns.published import PROTOCOL_SIMULATIONS
 from falsifier.cli.command import command
 from falsifier.cli.inspect import one_fmu
 from falsifier.cli.options import PATH, budget_option, directory_argument, json_option, out_option

@@ -12,9 +12,14 @@ from tests import problems
 HEADER = ",".join(COLUMNS)
 
 
-def find(requirement: str, instance: str, stop_time: float | None) -> Problem:
-    """The problems of these tests by the names of their requirements."""
-    return {"HARD": problems.hard, "CC1": problems.easy, "AT51": problems.easy}[requirement]()
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small problems in place of the bundled ones, by the names of their requirements."""
+
+    def found(requirement: str, instance: str, stop_time: float | None) -> Problem:
+        return {"HARD": problems.hard, "CC1": problems.easy, "AT51": problems.easy}[requirement]()
+
+    monkeypatch.setattr("falsifier.campaigns.archcomp.bundled_problem", found)
 
 
 def rows(tmp_path: Path, *lines: str) -> Path:
@@ -23,6 +28,7 @@ def rows(tmp_path: Path, *lines: str) -> Path:
     return path
 
 
+@pytest.mark.usefixtures("small")
 def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_path: Path) -> None:
     path = tmp_path / "claims.csv"
     path.write_text(export(campaign), encoding="utf-8")
@@ -30,7 +36,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
         cells = list(csv.DictReader(file))
     assert [c["falsified"] for c in cells] == ["yes"] * 4 + ["no"] * 4
     assert {c["input"] for c in cells[4:]} == {"[]"}
-    findings = validate(read_rows(path), find=find)
+    findings = validate(read_rows(path))
     assert [f.holds for f in findings] == [True] * 4
     for finding in findings:
         assert finding.robustness == pytest.approx(finding.row.robustness, abs=1e-6)
@@ -38,6 +44,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
         assert steps == pytest.approx(0.05)
 
 
+@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize(
     ("line", "holds", "reason"),
     [
@@ -54,15 +61,16 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
     ],
 )
 def test_claims_are_judged_by_the_rules(tmp_path: Path, line: str, holds: bool, reason: str) -> None:
-    (finding,) = validate(read_rows(rows(tmp_path, line)), find=find)
+    (finding,) = validate(read_rows(rows(tmp_path, line)))
     assert finding.holds == holds
     assert reason in finding.reason
 
 
+@pytest.mark.usefixtures("small")
 def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_path: Path) -> None:
     coarse, dense = '"[0 1; 1 -1]"', '"[0 1; 0.5 1; 0.9 -1]"'
     first, second = validate(
-        read_rows(rows(tmp_path, *(f"S,HARD,1,{m},[],yes,3,1,1,-0.4,10" for m in (coarse, dense)))), find=find
+        read_rows(rows(tmp_path, *(f"S,HARD,1,{m},[],yes,3,1,1,-0.4,10" for m in (coarse, dense))))
     )
     # One second of full input, then the opposite: x(1) = 1 - 0.9**10; the dense one falls from 0.5 s on.
     assert first.robustness == pytest.approx(0.6 - (1 - 0.9**10))

@@ -4,7 +4,7 @@ import pytest
 
 from falsifier.campaigns import suite
 from falsifier.campaigns.analysis import Score, read_published
-from falsifier.campaigns.published import is_tied, rank
+from falsifier.campaigns.tables import is_tied, rank
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source
 
