@@ -75,14 +75,9 @@ class RangeCoverage:
         return int((self.parts > 0).sum())
 
     @property
-    def edges(self) -> list[tuple[float, float]]:
-        """Lower and upper end of each part; both are equal if a part is one whole number."""
-        return edges_of(self.searched)
-
-    @property
     def gaps(self) -> tuple[tuple[float, float], ...]:
         """Ranges of values that were not tried."""
-        edges = self.edges
+        edges = edges_of(self.searched)
         missing = np.flatnonzero(self.parts == 0)
         groups = np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1) if missing.size else []
         return tuple((edges[group[0]][0], edges[group[-1]][1]) for group in groups)
@@ -333,7 +328,7 @@ def _allowed(r: InputRecord) -> list[int]:
 
 
 def edges_of(r: InputRecord) -> list[tuple[float, float]]:
-    """Return the ends of each part of a range; a part of a short list of numbers is one number."""
+    """Return both ends of each part of a range; they are equal if a part is one whole number of a few."""
     if r.kind != "real" and (numbers := _allowed(r)):
         return [(float(n), float(n)) for n in numbers]
     if r.low == r.high:

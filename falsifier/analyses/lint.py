@@ -52,14 +52,12 @@ class LintFinding:
     advice: str
 
 
-def lint(
-    target: str | ProblemSource, *, profile: str | None = None, simulations: int = SIMULATIONS
-) -> list[LintFinding]:
+def lint(target: str | ProblemSource, *, simulations: int = SIMULATIONS) -> list[LintFinding]:
     """Return what is wrong with the requirements of a spec; empty if nothing was found.
 
     Args:
-        target: a spec, one of its requirements or a bundled name; or a problem's source.
-        profile: name of a profile of the spec.
+        target: a spec, one of its requirements or a bundled name; or a problem's source, which may name a
+            profile.
         simulations: simulations of the measured check of whether inputs move the requirements' signals; 0:
             only what the FMU declares counts.
 
@@ -69,7 +67,7 @@ def lint(
     """
     findings: list[LintFinding] = []
     problems: list[Problem] = []
-    stated = target if isinstance(target, ProblemSource) else ProblemSource(target=target, profile=profile)
+    stated = target if isinstance(target, ProblemSource) else ProblemSource(target=target)
     for source in [stated] if stated.stl is not None else sources_of(stated):
         try:
             problems.append(load_source(source))

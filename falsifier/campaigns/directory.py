@@ -20,7 +20,6 @@ from falsifier.errors import JournalError
 from falsifier.record.files import locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
-from falsifier.search.request import RunRequest
 
 CAMPAIGN = "campaign.json"
 _LOCK = "lock"
@@ -34,11 +33,6 @@ class CampaignRecord(Surroundings):
     request: CampaignRequest
     hashes: dict[str, str] = Field(description="SHA-256 of all FMUs and specs, by path.")
     sum: str = Field("", description="Checksum of the file up to here.")
-
-    @property
-    def runs(self) -> dict[str, RunRequest]:
-        """Runs by the name of their directory."""
-        return self.request.named()
 
 
 def is_campaign(directory: Path) -> bool:
@@ -87,7 +81,7 @@ def run_directories(directory: Path) -> list[Path]:
         JournalError: if the directory contains neither a campaign nor a run.
     """
     if is_campaign(directory):
-        named = read_campaign(directory).runs
+        named = read_campaign(directory).request.named()
         return [p for n in named if holds_run(p := run_directory(directory, n))]
     if holds_run(directory):
         return [directory]

@@ -91,7 +91,7 @@ class Follower:
 def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
     """Yield a follower for each run of a campaign, or for each run directory."""
     if is_campaign(directory):
-        for name, request in read_campaign(directory).runs.items():
+        for name, request in read_campaign(directory).request.named().items():
             run = RunProgress(
                 name=name,
                 requirement=request.problems[0].name,

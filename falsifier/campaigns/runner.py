@@ -103,7 +103,7 @@ def resume_campaign(
     jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
-        problems = _load(record.runs.values())
+        problems = _load(record.request.runs)
         check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
             record = record.model_copy(
@@ -151,10 +151,11 @@ def _work(
             _record_failure(place, task, failure)
         keep_recorded(place)
 
+    requests = record.request.named()
     tasks, hashes = [], {source: file_hashes(problem) for source, problem in problems.items()}
     for run in follower.look().runs:
         if not run.finished:
-            request = record.runs[run.name]
+            request = requests[run.name]
             source = request.problems[0]
             tasks.append(RunTask(run.name, request, problems[source], hashes[source], directory.absolute()))
         elif run.falsified:  # its counterexample is missing if the process was killed just after it ended

@@ -46,14 +46,9 @@ class Run(Summary):
         return source is not None and source.stl is not None and source.stl_name == STL_NAME
 
     @property
-    def shared(self) -> bool:
-        """Whether several requirements shared this search."""
-        return self.method.together
-
-    @property
     def counterexample_file(self) -> Path:
         """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
-        return self.directory / file_of(self.manifest.requirement.name if self.shared else "")
+        return self.directory / file_of(self.manifest.requirement.name if self.method.together else "")
 
     @property
     def seed(self) -> int:

@@ -47,7 +47,7 @@ def repair(*, directory: Path) -> None:
 
 def _repair_campaign(directory: Path) -> list[str]:
     findings: list[str] = []
-    for name in read_campaign(directory).runs:
+    for name in read_campaign(directory).request.named():
         place = run_directory(directory, name)
         if not place.is_dir():
             continue

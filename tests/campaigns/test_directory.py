@@ -19,7 +19,7 @@ def test_only_runs_that_have_begun_are_listed(campaign: Path, tmp_path: Path) ->
     record = read_campaign(campaign)
     write_campaign(tmp_path, record)
     assert run_directories(tmp_path) == []
-    second = list(record.runs)[1]
+    second = list(record.request.named())[1]
     place = run_directory(tmp_path, second)
     place.mkdir(parents=True)
     (place / "manifest.json").write_bytes((run_directory(campaign, second) / "manifest.json").read_bytes())

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage, labels_of
+from falsifier.analyses.coverage import (
+    Coverage,
+    OutputCoverage,
+    PairCoverage,
+    RangeCoverage,
+    edges_of,
+    labels_of,
+)
 from falsifier.core.words import counted
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, whole_ticks
@@ -111,7 +118,7 @@ def _heat(ax: "Axes", xs: NDArray[np.float64], ys: NDArray[np.float64], counts: 
 
 def _ends(r: RangeCoverage) -> NDArray[np.float64]:
     """Return the ends of the parts, shape (parts + 1,); whole numbers stand in the middle of theirs."""
-    edges = np.array(r.edges)
+    edges = np.array(edges_of(r.searched))
     if len(edges) == 1 or edges[0, 0] == edges[0, 1]:
         return np.array([*(edges[:, 0] - 0.5), edges[-1, 1] + 0.5])
     return np.array([*edges[:, 0], edges[-1, 1]])

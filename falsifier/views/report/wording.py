@@ -169,13 +169,13 @@ def advice(shown: Shown) -> str:
     run = shown.run
     if not run.falsified or (shown.is_shrunk and shown.explanation):
         return ""
-    place = str(run.counterexample_file if run.shared else run.directory)
+    place = str(run.counterexample_file if run.method.together else run.directory)
     return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
 
 
 def replay_command(run: Run, *, shrunk: bool = False) -> str:
     """Shell command that replays a run's counterexample, or what it was shrunk to."""
-    place = run.counterexample_file if run.shared else run.directory
+    place = run.counterexample_file if run.method.together else run.directory
     if shrunk:
         place = shrunk_file(run.counterexample_file)
     return shlex.join(["falsifier", "replay", str(place)])
@@ -185,7 +185,7 @@ def commands(shown: Shown) -> list[Fact]:
     """Return the commands that replay a counterexample, and repeat the run that is shown."""
     run = shown.run
     replayed = [("replay it", replay_command(run, shrunk=shown.is_shrunk))] if run.falsified else []
-    return [*replayed, ("repeat the run", run_command(run.manifest.request, shared=run.shared))]
+    return [*replayed, ("repeat the run", run_command(run.manifest.request, shared=run.method.together))]
 
 
 def run_command(request: RunRequest, *, shared: bool = False) -> str:
