@@ -158,18 +158,11 @@ class Row(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class Revalidated:
-    """Result of re-simulating one claimed counterexample.
-
-    Attributes:
-        row: the claim.
-        holds: whether the claim is accepted.
-        robustness: robustness of the re-simulation; None if there was none.
-        reason: the result in words.
-    """
+    """Result of re-simulating one claimed counterexample: whether the claim is accepted, and why."""
 
     row: Row
     holds: bool
-    robustness: float | None
+    robustness: float | None  # None if there was no simulation
     reason: str
 
 

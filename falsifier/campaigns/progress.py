@@ -20,16 +20,9 @@ from falsifier.search.budget import Spent
 
 @dataclass(kw_only=True)
 class RunProgress(Summary):
-    """Progress of one requirement in one run, which need not have started.
+    """Progress of one requirement in one run, which need not have started."""
 
-    Attributes:
-        name: name of the run's directory.
-        requirement: name of the requirement.
-        method: how it searches.
-        seed: seed of its engine.
-    """
-
-    name: str
+    name: str  # of the run's directory
     requirement: str
     method: Method
     seed: int
@@ -37,11 +30,7 @@ class RunProgress(Summary):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of a campaign, or of a part of it.
-
-    Attributes:
-        runs: all runs in the campaign's order.
-    """
+    """Progress of a campaign, or of a part of it: of all runs in the campaign's order."""
 
     runs: tuple[RunProgress, ...]
 

@@ -39,15 +39,10 @@ _PATIENCE = 10.0
 
 @dataclass(frozen=True, slots=True)
 class CampaignEnd:
-    """How work on a campaign ended.
-
-    Attributes:
-        progress: progress of all runs.
-        reason: why it stopped before all runs were finished; empty if it did not.
-    """
+    """How work on a campaign ended."""
 
     progress: Progress
-    reason: str
+    reason: str  # why it stopped before all runs were finished; empty if it did not
 
 
 def run_campaign(

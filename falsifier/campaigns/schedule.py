@@ -24,18 +24,13 @@ _PATIENCE = 10.0
 class RunTask:
     """One run to carry out.
 
-    Attributes:
-        name: name of the run.
-        request: what to run.
-        problem: what is searched, as it was when the campaign was started: its spec may change meanwhile.
-        hashes: SHA-256 of its files then, by path.
-        campaign: directory of the campaign.
+    What is searched is as it was when the campaign was started: its spec may change meanwhile.
     """
 
     name: str
     request: RunRequest
     problem: Problem
-    hashes: dict[str, str]
+    hashes: dict[str, str]  # SHA-256 of its files, by path
     campaign: Path
 
 
@@ -57,14 +52,10 @@ def run_task(task: RunTask) -> None:
 
 
 class Schedule:
-    """Gives runs to workers, one at a time to each.
+    """Gives runs to workers, which are pools of one process each, one at a time.
 
     A run whose process dies is tried once more, after the others: where memory is short, the system may have
     killed the process for what another one used.
-
-    Args:
-        tasks: runs to carry out.
-        workers: pools of one process each.
     """
 
     def __init__(self, tasks: Iterable[RunTask], workers: Sequence[LastingExecutor]) -> None:

@@ -60,13 +60,9 @@ def of_source(
     *,
     is_named: bool = True,
 ) -> Readable:
-    """Return the forms of a source.
+    """Return the forms of a source; constants of one may be declared in another one of the library.
 
-    Args:
-        source: the source.
-        library: all sources that were named: constants of one may be declared in another.
-        seeds: the requirement's signals.
-        is_named: whether the user named this file; other sources are told only if they set one of ``seeds``.
+    A source that the user did not name is told only if it sets one of the requirement's signals, ``seeds``.
     """
     short = ("size only", counted(source.text.count("\n") + 1, "line"))
     variables = {each.name for each in source.assigned if not each.is_constant}
@@ -89,13 +85,7 @@ def of_source(
 
 
 def of_text(text: str, shown: str, signals: Collection[str]) -> Readable:
-    """Return the forms of a document: of HTML without its tags.
-
-    Args:
-        text: its content.
-        shown: its path.
-        signals: all signals of the model.
-    """
+    """Return the forms of a document, of HTML without its tags; ``signals`` are all those of the model."""
     if PurePosixPath(shown).suffix.lower() in _HTML:
         text = _without_tags(text)
     lines = [line.rstrip() for line in text.splitlines()]

@@ -30,21 +30,13 @@ _LEAVE_OUT = "remove it, or leave the file out"
 
 @dataclass(frozen=True, slots=True)
 class _File:
-    """One file as it was read.
+    """One file as it was read."""
 
-    Attributes:
-        path: as it was named.
-        name: as it is told. Only the name of a file: folders often have names of people and customers.
-        sha256: of its content.
-        content: its text, or what a diagram or source says.
-        is_named: whether the user named it; it lies inside an FMU otherwise.
-    """
-
-    path: str
-    name: str
+    path: str  # as it was named
+    name: str  # as it is told: without folders, which often have names of people and customers
     sha256: str
     content: str | Diagram | Source
-    is_named: bool
+    is_named: bool  # whether the user named it; it lies inside an FMU otherwise
 
 
 # Files with what they contain.

@@ -44,12 +44,7 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Crossing:
-    """A value of an input or parameter at which a comparison in a file changes.
-
-    Attributes:
-        signal: its name in the model.
-        value: the value, in its unit.
-    """
+    """A value of an input or parameter, in its unit, at which a comparison in a file changes."""
 
     signal: str
     value: float
@@ -78,17 +73,11 @@ class Context:
 
 @dataclass(frozen=True, slots=True)
 class Named:
-    """What a user named as context; nothing of it has been read.
-
-    Attributes:
-        files: paths of files.
-        fmu: whether to look inside the model's FMUs.
-        checked: files with a line that looks like a secret and is none.
-    """
+    """What a user named as context; nothing of it has been read."""
 
     files: tuple[str, ...] = ()
-    fmu: bool = False
-    checked: tuple[str, ...] = ()
+    fmu: bool = False  # whether to look inside the model's FMUs
+    checked: tuple[str, ...] = ()  # files with a line that looks like a secret and is none
 
     def __bool__(self) -> bool:
         return bool(self.files) or self.fmu or bool(self.checked)

@@ -27,13 +27,7 @@ _HOW = {
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """What was found of one feature.
-
-    Attributes:
-        name: what was tried.
-        works: whether a run can count on it.
-        said: what was found, and what it means.
-    """
+    """What was found of one feature, and what it means: whether a run can count on it."""
 
     name: str
     works: bool

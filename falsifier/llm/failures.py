@@ -147,14 +147,9 @@ def classify(
     secrets: Iterable[str],
     options: Iterable[str] = (),
 ) -> ChatError:
-    """Translate an exception raised by a request into an error of this package, without secrets.
+    """Translate what the client library raised into an error of this package, without secrets.
 
-    Args:
-        error: what the client library raised.
-        llm: name of the LLM.
-        api_base: address of the server, if stated.
-        secrets: texts to remove from the message.
-        options: names of the options that the user passes on.
+    The ``options`` are those that the user passes on, by name.
     """
     provider, address = known(llm), server_address(llm, api_base)
     where = f"{llm} at {redact(api_base, secrets)}: " if api_base else f"{llm}: "

@@ -155,13 +155,9 @@ class Exchange(_Value):
 def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
     """Return a reply without secrets and without what a terminal would act on, and not longer than the limit.
 
-    Args:
-        reply: as it came.
-        secrets: secrets in addition to those in the environment: an LLM or a server may repeat what it was
-            sent.
+    An LLM or a server may repeat what it was sent; secrets of the environment need not be named.
     """
     secrets = tuple(secrets)
-
     texts = {"text": reply.text, "reasoning": reply.reasoning, "finish_reason": reply.finish_reason}
     return reply.model_copy(
         update={k: redact_held(printable(sent[:LONGEST_REPLY]), secrets) for k, sent in texts.items()}

@@ -304,11 +304,7 @@ def _unreadable(body: bytes) -> str:
 
 
 def guarded_client(*, verify: Any = True) -> httpx.Client:
-    """Return an HTTP client whose requests are limited within ``within``; it follows no redirect.
-
-    Args:
-        verify: how certificates are checked, as httpx takes it.
-    """
+    """Return an HTTP client whose requests are limited within ``within``; it follows no redirect."""
     # A server's cookies would be sent to it with later requests, of other runs too.
     none = CookieJar(policy=DefaultCookiePolicy(allowed_domains=()))
     # It finds the proxies of the environment, which a client with a transport of its own does not look for.

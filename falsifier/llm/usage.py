@@ -108,7 +108,7 @@ def usage_of(
     )
 
 
-def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, timed_out: int = 1) -> Usage:
+def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, timed_out: int) -> Usage:
     """Usage of a request that brought nothing: the provider charges at least for what was sent."""
     sent = _sent(request, llm)
     cost = None if price is None else price.cost(sent, 0)
@@ -136,12 +136,7 @@ def _sent(request: ChatRequest, llm: str) -> int:
 
 
 def count_tokens(text: str, llm: str = "") -> int:
-    """Count the tokens of a text.
-
-    Args:
-        text: what is sent or received.
-        llm: name of the LLM; empty: one that groups up to three digits.
-    """
+    """Count the tokens of a text; if no LLM is named, for one that groups up to three digits."""
     encoding = _encoding()
     if encoding is None:
         return ceil(len(text) / _CHARACTERS_PER_TOKEN)

@@ -27,12 +27,7 @@ _CAST = re.compile(r"(?:u?int(?:8|16|32|64)|single|double|boolean)\s*\(([^()]*)\
 
 
 def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = None) -> Iterator[Threshold]:
-    """Return the comparisons with constants.
-
-    Args:
-        diagram: the model.
-        only: paths of the blocks to look at; None: all.
-    """
+    """Return the comparisons with constants in blocks of these paths; None: in all."""
     fed: dict[BlockPath, Mapping[str, str]] = {}  # what leads to the inports of each subsystem and chart
     ports = {*diagram.root.ports("Inport"), *diagram.root.ports("Outport")}
     for path, system in diagram.root.walk():
@@ -77,9 +72,7 @@ def _chart_thresholds(chart: Chart, fed: Mapping[str, str], shown: str) -> Itera
 def _sources(system: BlockSystem, fed: Mapping[str, str]) -> Mapping[str, Mapping[str, str]]:
     """For each block, what leads to each input: a constant's value, or the name of a signal or block.
 
-    Args:
-        system: blocks and lines.
-        fed: what leads to its inports from outside.
+    Inports stand for what is ``fed`` to them from outside.
     """
     values = {b.name: _uncast(b.parameter("Value")) for b in system.blocks if b.type == "Constant"}
     inports, outports = set(system.ports("Inport")), set(system.ports("Outport"))

@@ -89,17 +89,11 @@ class BlockSystem:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """One state, function or box of a chart.
+    """One state, function or box of a chart."""
 
-    Attributes:
-        name: its name, with those of the states around it: ``On.Slow``.
-        actions: what it does on entry, during and on exit; of a function, its body.
-        is_parallel: whether it is active beside its neighbours.
-    """
-
-    name: str
-    actions: str = ""
-    is_parallel: bool = False
+    name: str  # with those of the states around it: On.Slow
+    actions: str = ""  # what it does on entry, during and on exit; of a function, its body
+    is_parallel: bool = False  # whether it is active beside its neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,41 +116,24 @@ class ChartData:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """A state chart or MATLAB function.
+    """A state chart or MATLAB function."""
 
-    Attributes:
-        name: path of its block.
-        states: its states, outer ones first.
-        transitions: its transitions.
-        data: its variables.
-        script: the code of a MATLAB function; empty for a chart.
-        sample_time: its sample time; empty if it is inherited.
-    """
-
-    name: str
-    states: tuple[State, ...] = ()
+    name: str  # path of its block
+    states: tuple[State, ...] = ()  # outer ones first
     transitions: tuple[Transition, ...] = ()
     data: tuple[ChartData, ...] = ()
-    script: str = ""
-    sample_time: str = ""
+    script: str = ""  # the code of a MATLAB function; empty for a chart
+    sample_time: str = ""  # empty if it is inherited
 
 
 @dataclass(frozen=True, slots=True)
 class Diagram:
-    """A model or library.
+    """A model or library."""
 
-    Attributes:
-        name: its name; empty if the file does not state it.
-        root: the outermost system.
-        charts: state charts and MATLAB functions.
-        settings: solver, step and stop time, as far as they are stated.
-        is_library: whether it is a library.
-    """
-
-    name: str
-    root: BlockSystem
+    name: str  # empty if the file does not state it
+    root: BlockSystem  # the outermost system
     charts: tuple[Chart, ...] = ()
-    settings: tuple[tuple[str, str], ...] = ()
+    settings: tuple[tuple[str, str], ...] = ()  # solver, step and stop time, as far as they are stated
     is_library: bool = False
 
 
@@ -168,12 +145,8 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] |
     subsystem, every block to what enables or triggers its system, and a From block to the Goto blocks of its
     tag anywhere in the model.
 
-    Args:
-        diagram: the model.
-        signals: names as the requirement has them; ``controller.u`` also names ``u``.
-
-    Returns:
-        Paths of blocks; None if no signal was found, so that nothing can be left out.
+    Of the requirement's names, ``controller.u`` also names ``u``. None is returned if no signal was found, so
+    that nothing can be left out.
     """
     sources = _sources(diagram)
     wanted = {name.rpartition(".")[2].strip("'") for name in signals} | set(signals)

@@ -56,10 +56,7 @@ def meaningful(
 ) -> tuple[tuple[str, str], ...]:
     """Return the parameters of a block that carry meaning, as pairs of name and value.
 
-    Args:
-        kind: the block's type.
-        stated: what the file states of the block.
-        defaults: what it states of all blocks of this type.
+    The ``defaults`` are what the file states of all blocks of this type.
     """
     if kind in _LISTED:
         everything = {**stated, **defaults, **stated}  # what is stated comes first, and counts

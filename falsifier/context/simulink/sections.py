@@ -35,15 +35,9 @@ _MAX_REFERENCES = 20_000
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One section of a Simulink file, such as a block.
+    """One section of a Simulink file, such as a block, with its parameters and the sections within it."""
 
-    Attributes:
-        kind: what it is: ``Block``, ``Line``, ``state``, ...
-        values: its parameters by name, as text.
-        children: the sections within it, in order.
-    """
-
-    kind: str
+    kind: str  # Block, Line, state, ...
     values: Mapping[str, str] = field(default_factory=dict)
     children: tuple["Node", ...] = ()
 

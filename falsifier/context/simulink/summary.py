@@ -21,9 +21,7 @@ def names_text(diagram: Diagram) -> str:
 def structure_text(diagram: Diagram, only: Collection[BlockPath] | None = None) -> str:
     """Return the structure of a diagram: what each block is, its parameters, and what leads to it.
 
-    Args:
-        diagram: the model.
-        only: paths of the blocks to tell; None: all.
+    Only the blocks of these paths are told; None: all.
     """
     settings = "; ".join(f"{name} {value}" for name, value in diagram.settings)
     kind = "Library" if diagram.is_library else "Model"

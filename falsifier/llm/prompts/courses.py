@@ -114,19 +114,11 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 class Swing(NamedTuple):
-    """An interval in which a signal oscillates too fast for single points.
-
-    Attributes:
-        start: in s.
-        end: in s.
-        periods: in s, at the beginning and at the end.
-        lower: breakpoints of the envelope below.
-        upper: breakpoints of the envelope above.
-    """
+    """An interval in s in which a signal oscillates too fast for single points, between two envelopes."""
 
     start: float
     end: float
-    periods: tuple[float, float]
+    periods: tuple[float, float]  # in s, at the beginning and at the end
     lower: Points
     upper: Points
 

@@ -28,15 +28,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Disguise:
-    """A view with neutral names, and the mapping back.
-
-    Attributes:
-        real: the original view.
-        names: neutral names by real name.
-    """
+    """A view with neutral names, and the mapping back."""
 
     real: View
-    names: Mapping[str, str]
+    names: Mapping[str, str]  # neutral names by real name
 
     @classmethod
     def of(cls, view: View) -> "Disguise":

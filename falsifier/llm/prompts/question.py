@@ -78,25 +78,15 @@ _FULL, _SHORT, _LINE = range(3)
 
 @dataclass(slots=True)
 class _Sample:
-    """One sample as it is told, more or less of it.
+    """One sample as it is told, more or less of it."""
 
-    Attributes:
-        number: its place among all samples, from 1.
-        texts: what is told of it, by depth.
-        tokens: of each of these.
-        depth: which of them is told.
-        robustness: its robustness; None: there is no verdict.
-        progress: how far its recorded signals got.
-        is_first: whether it was the first to reach something.
-    """
-
-    number: int
-    texts: tuple[str, str, str]
-    tokens: tuple[int, ...]
-    depth: int
-    robustness: float | None
+    number: int  # its place among all samples, from 1
+    texts: tuple[str, str, str]  # what is told of it, by depth
+    tokens: tuple[int, ...]  # of each of these
+    depth: int  # which of them is told
+    robustness: float | None  # None: there is no verdict
     progress: Progress = field(default_factory=Progress)
-    is_first: bool = False
+    is_first: bool = False  # whether it was the first to reach something
 
 
 class Questions:

@@ -23,15 +23,7 @@ from falsifier.stl.formula import Temporal
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A problem without its model.
-
-    Attributes:
-        info: the model's names, units and descriptions.
-        requirement: the requirement to violate.
-        space: search space.
-        experiment: stop time and output grid.
-        context: what the files say that the user named.
-    """
+    """A problem without its model, but with its names, and with what the files say that the user named."""
 
     info: ModelInfo
     requirement: Requirement
@@ -114,12 +106,7 @@ Part = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A named set of parts.
-
-    Attributes:
-        name: name on the command line and in spec files.
-        parts: what the prompt contains.
-    """
+    """What a prompt contains, by a name that the command line and specs take."""
 
     name: str
     parts: frozenset[Part]
@@ -150,11 +137,7 @@ VARIANTS = _variants()
 
 
 def variant_named(name: str | None, *, has_context: bool = False) -> Variant:
-    """Variant of this name, in any case; None: the default one.
-
-    Args:
-        name: the name.
-        has_context: whether files are named, which makes the default the variant that tells them.
+    """Variant of this name, in any case; None: the default one, or with named files the one that tells them.
 
     Raises:
         SpecError: for an unknown name.
