@@ -30,15 +30,10 @@ _LONGEST_NAME = 200
 
 @dataclass(frozen=True, slots=True)
 class Readable:
-    """What a file contains.
+    """What a file contains: the ways to tell it, by name, and what it says of signals."""
 
-    Attributes:
-        forms: names and texts of the ways to tell it, the fullest first; the last one is always short.
-        found: thresholds in what the requirement depends on, and what else is said of signals.
-    """
-
-    forms: tuple[tuple[str, str], ...]
-    found: tuple[Threshold, ...] = ()
+    forms: tuple[tuple[str, str], ...]  # the fullest first; the last one is always short
+    found: tuple[Threshold, ...] = ()  # in what the requirement depends on
 
 
 def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:

@@ -95,11 +95,7 @@ def _decoded(content: bytes, encoding: str) -> str | None:
 
 
 class Sentry:
-    """Looks at every text of a file before it is told, and notes what the user allowed.
-
-    Attributes:
-        notes: what was allowed, one sentence per text.
-    """
+    """Looks at every text of a file before it is told, and notes what the user allowed."""
 
     def __init__(self, checked: Collection[str]) -> None:
         self._checked = frozenset(checked)
@@ -107,13 +103,9 @@ class Sentry:
         self._unused = set(checked)
 
     def look(self, text: str, shown: str, file: str, otherwise: str) -> None:
-        """Refuse a text that looks like a secret.
+        """Refuse a text, to be told or part of what is, that looks like a secret.
 
-        Args:
-            text: what is to be told, or what that is made of.
-            shown: the place, for messages.
-            file: the file, by the name that a user would give.
-            otherwise: what to do if it is a secret.
+        Messages tell the place as ``shown`` and what to do ``otherwise``; a user allows the ``file``.
 
         Raises:
             SpecError: naming file and line, never the line's text.

@@ -47,18 +47,14 @@ class Token(NamedTuple):
 class Threshold:
     """One comparison with a constant.
 
-    Attributes:
-        names: variables in it that are not constants.
-        text: the comparison as written, with the values of named constants: ``u > limit (limit = 9.5)``.
-        levels: if one variable is compared with nothing but a number or constant, that number: two numbers
-            of a constant that has two values.
-        place: file and line, or block.
+    It has levels if one variable is compared with nothing but a number or a constant: that number, or two of
+    a constant that has two values.
     """
 
-    names: frozenset[str]
-    text: str
+    names: frozenset[str]  # variables that are not constants
+    text: str  # as written, with the values of named constants: u > limit (limit = 9.5)
     levels: tuple[float, ...]
-    place: str
+    place: str  # file and line, or block
 
 
 def thresholds(

@@ -12,34 +12,21 @@ INSIDE, NOTHING, CHECKED = "fmu", "none", "checked:"
 
 @dataclass(frozen=True, slots=True)
 class Excerpt:
-    """What is told of one file.
+    """What is told of one file."""
 
-    Attributes:
-        path: the file as it was named; of one inside an FMU, ``my.fmu: sources/model.c``.
-        name: the file as it is told: without the folders of this machine.
-        sha256: hash of the file's content.
-        form: what is told of it, in words: ``whole``, ``structure``, ...
-        text: what is told.
-    """
-
-    path: str
-    name: str
+    path: str  # as it was named; of one inside an FMU, my.fmu: sources/model.c
+    name: str  # as it is told: without the folders of this machine
     sha256: str
-    form: str
+    form: str  # what is told of it, in words: whole, structure, ...
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One comparison with a constant, or what else the files say of a signal in one line.
+    """One comparison with a constant, or what else the files say of a signal in one line."""
 
-    Attributes:
-        signals: the model's signals in it, by their names there; empty if it is about other variables.
-        text: the comparison, with the values of named constants.
-    """
-
-    signals: tuple[str, ...]
-    text: str
+    signals: tuple[str, ...]  # by their names in the model; empty if it is about other variables
+    text: str  # with the values of named constants
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,19 +39,12 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What the named files say of a model.
-
-    Attributes:
-        excerpts: what is told of each file.
-        comparisons: thresholds, signals of the model first.
-        crossings: values of inputs and parameters at which a comparison changes; engines may try these.
-        notes: what a user should know of the reading: files left out, lines allowed. Not told.
-    """
+    """What the named files say of a model."""
 
     excerpts: tuple[Excerpt, ...] = ()
-    comparisons: tuple[Compared, ...] = ()
-    crossings: tuple[Crossing, ...] = ()
-    notes: tuple[str, ...] = ()
+    comparisons: tuple[Compared, ...] = ()  # those of signals of the model first
+    crossings: tuple[Crossing, ...] = ()  # engines may try these
+    notes: tuple[str, ...] = ()  # not told, but for the user: files left out, lines allowed
 
     def of(self, signal: str) -> tuple[str, ...]:
         """Return what is known of one signal of the model."""

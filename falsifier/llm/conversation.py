@@ -52,12 +52,8 @@ def converse(
 ) -> T:
     """Ask, and after an invalid reply ask again, stating what was wrong.
 
-    Args:
-        chat: chat to ask.
-        request: the question.
-        read: turns a reply's text into a value, or raises RejectedReplyError.
-        on_exchange: called with every question and reply, including rejected ones.
-        reasks: how often to ask again after a rejected reply.
+    ``read`` turns a reply's text into a value, or raises RejectedReplyError. ``on_exchange`` is called with
+    every question and its reply, including rejected ones.
 
     Raises:
         NoValidReplyError: if no reply was valid.

@@ -51,22 +51,13 @@ _THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
 class TransientChatError(ChatError):
-    """A temporary failure: rate limit, timeout, lost connection, overloaded server.
-
-    Attributes:
-        retry_after: seconds that the server asked to wait, or None.
-        patience: maximum number of requests worth sending; None: no limit of its own.
-    """
+    """A temporary failure: rate limit, timeout, lost connection, overloaded server."""
 
     def __init__(
-        self,
-        message: str,
-        *,
-        retry_after: float | None = None,
-        patience: int | None = None,
+        self, message: str, *, retry_after: float | None = None, patience: int | None = None
     ) -> None:
-        self.retry_after = retry_after
-        self.patience = patience
+        self.retry_after = retry_after  # in s, as the server asked to wait
+        self.patience = patience  # maximum number of requests worth sending; None: no limit of its own
         super().__init__(message)
 
 

@@ -67,14 +67,11 @@ class Usage(_Value):
 
     def __add__(self, other: "Usage") -> "Usage":
         costs = (self.cost, other.cost)
+        counts = Usage.model_fields.keys() - {"cost", "estimated"}
         return Usage(
-            prompt_tokens=self.prompt_tokens + other.prompt_tokens,
-            completion_tokens=self.completion_tokens + other.completion_tokens,
-            cached_tokens=self.cached_tokens + other.cached_tokens,
-            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
+            **{name: getattr(self, name) + getattr(other, name) for name in counts},
             cost=None if None in costs else sum(cost or 0.0 for cost in costs),
             estimated=self.estimated or other.estimated,
-            timed_out=self.timed_out + other.timed_out,
         )
 
 

@@ -36,17 +36,11 @@ _SHOWN_LINES = 3
 
 @dataclass(frozen=True, slots=True)
 class ServedModel:
-    """A model file and the server that serves it.
+    """A model file and the server that serves it."""
 
-    Attributes:
-        name: name of the language model, as the client library calls it.
-        address: address of the server.
-        content: size of the file and hash of its beginning, which identify what answers.
-    """
-
-    name: str
+    name: str  # as the client library calls it
     address: str
-    content: str
+    content: str  # size of the file and hash of its beginning, which identify what answers
 
 
 def is_model_file(llm: str) -> bool:

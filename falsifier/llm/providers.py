@@ -14,30 +14,18 @@ from falsifier.llm.messages import Mode
 
 @dataclass(frozen=True, slots=True)
 class Provider:
-    """One provider; the first part of an LLM's name identifies it.
+    """One provider; the first part of an LLM's name identifies it."""
 
-    Attributes:
-        keys: environment variables that may contain its key, the usual one first; empty: none is needed.
-        local: runs on the user's own machine, so a price of zero is correct.
-        address: default address of its server, for messages.
-        start: command that starts its server, for messages.
-        openai_client: served through the OpenAI client, which silently retries by default.
-        defaults: parameters that are sent unless the user states them.
-        effort: how reasoning effort is passed: ``native``, or ``allowed`` if the client library passes it
-            only on an explicit list.
-        marks: whether it keeps only what is marked of a prompt.
-        limits: whether schemas may state numbers of items and ranges of numbers.
-    """
-
+    # Environment variables that may contain its key, the usual one first; empty: none is needed.
     keys: tuple[str, ...] = ()
-    local: bool = False
-    address: str = ""
-    start: str = ""
-    openai_client: bool = False
-    defaults: Mapping[str, Any] = field(default_factory=dict)
-    effort: Literal["native", "allowed"] = "native"
-    marks: bool = False
-    limits: bool = False
+    local: bool = False  # runs on the user's own machine, so a price of zero is correct
+    address: str = ""  # default address of its server, for messages
+    start: str = ""  # command that starts its server, for messages
+    openai_client: bool = False  # served through the OpenAI client, which silently retries by default
+    defaults: Mapping[str, Any] = field(default_factory=dict)  # sent unless the user states them
+    effort: Literal["native", "allowed"] = "native"  # allowed: litellm passes it only on an explicit list
+    marks: bool = False  # whether it keeps only what is marked of a prompt
+    limits: bool = False  # whether schemas may state numbers of items and ranges of numbers
 
 
 # Ollama silently cuts off the beginning of a prompt that exceeds its context. Its default context is shorter

@@ -12,29 +12,17 @@ BlockPath = tuple[str, ...]
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One block.
+    """One block."""
 
-    Attributes:
-        type: its type, such as ``Gain``.
-        name: its name within its system, in one line.
-        parameters: names and values of the parameters that carry meaning, as text.
-        reference: the library block or model that it stands for; empty if none. It is not followed.
-        number: of an inport or outport, its position from 1; otherwise 0.
-        system: what is within a subsystem; None if nothing is, and for charts, which are told apart.
-        is_chart: whether a state chart or a MATLAB function is within.
-        inputs: of a chart, the names of its inputs.
-        is_off: whether it is commented out.
-    """
-
-    type: str
-    name: str
-    parameters: tuple[tuple[str, str], ...] = ()
-    reference: str = ""
-    number: int = 0
-    system: "BlockSystem | None" = None
-    is_chart: bool = False
-    inputs: tuple[str, ...] = ()
-    is_off: bool = False
+    type: str  # such as Gain
+    name: str  # within its system, in one line
+    parameters: tuple[tuple[str, str], ...] = ()  # those that carry meaning, with their values
+    reference: str = ""  # the library block or model that it stands for, which is not followed
+    number: int = 0  # of an inport or outport, its position from 1
+    system: "BlockSystem | None" = None  # within a subsystem; None for charts, which are told apart
+    is_chart: bool = False  # whether a state chart or a MATLAB function is within
+    inputs: tuple[str, ...] = ()  # of a chart, their names
+    is_off: bool = False  # whether it is commented out
 
     def parameter(self, name: str) -> str:
         """Return the value of a parameter; empty if it is not stated."""

@@ -21,12 +21,7 @@ _MOST_NEW = 8
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What the recorded signals of one sample did.
-
-    Attributes:
-        stages: values of discrete signals, and their changes.
-        ranges: smallest and largest value of the other signals, by name.
-    """
+    """What the recorded signals of one sample did: stages of the discrete ones, ranges of the others."""
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
