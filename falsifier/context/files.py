@@ -103,9 +103,10 @@ class Sentry:
         self._unused = set(checked)
 
     def look(self, text: str, shown: str, file: str, otherwise: str) -> None:
-        """Refuse a text, to be told or part of what is, that looks like a secret.
+        """Refuse a text that is to be told, or that this is made of, if it looks like a secret.
 
-        Messages tell the place as ``shown`` and what to do ``otherwise``; a user allows the ``file``.
+        Messages tell the place as ``shown``, the ``file`` by the name with which a user may allow it, and
+        what to do ``otherwise``.
 
         Raises:
             SpecError: naming file and line, never the line's text.

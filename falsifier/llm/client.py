@@ -364,7 +364,7 @@ def connect(
 
 
 def _sent(message: Message, *, marks: bool) -> dict[str, Any]:
-    """Message with OpenAI's field names; marked or not is what the next question will begin with, too."""
+    """Message with OpenAI's field names; with marks, what the next question will begin with is marked."""
     sent: dict[str, Any] = {"role": message.role, "content": message.content}
     if marks and message.stable:
         kept, rest = message.content[: message.stable], message.content[message.stable :]
