@@ -11,8 +11,7 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
-from falsifier.counterexamples.store import load as load_counterexample
+from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
