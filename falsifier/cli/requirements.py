@@ -100,16 +100,7 @@ def _lines(finding: LintFinding) -> list[str]:
 @connection_options
 @click.option("--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec.")
 @out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
-@json_option
-def formalize(
-    *,
-    target: str,
-    sentence: str,
-    choose: int | None,
-    out: Path | None,
-    as_json: bool,
-    **options: Any,
-) -> None:
+def formalize(*, target: str, sentence: str, choose: int | None, out: Path | None, **options: Any) -> None:
     """Turn a requirement in words into formulas, and write the chosen one into a spec.
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
@@ -118,7 +109,7 @@ def formalize(
     """
     from falsifier.problem.templates import TEMPLATES
     from falsifier.problem.writing import subject_of
-    from falsifier.views.analyses_text import formalized_json, formalized_text
+    from falsifier.views.analyses_text import formalized_text
 
     settings = llm_settings(options)
     if settings is None:
@@ -131,10 +122,6 @@ def formalize(
     from falsifier.analyses.formalize import formalize as ask
 
     found = ask(target, sentence, settings)
-    if as_json:
-        written = None if choose is None else _write(found, choose, out)
-        say(as_shown("", formalized_json(found) | {"written": written}, as_json=True))
-        return
     say(formalized_text(found))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")

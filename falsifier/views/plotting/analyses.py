@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +22,6 @@ _NEVER, _TRIED = "#f2b8b0", "#9dbbe0"
 # A figure has at most this many panels of each kind: inputs, parameters, pairs, outputs.
 _PANELS = 8
 _COLUMNS = 4
-# Shades of each of the two colours of a map.
-_SHADES = 128
 
 
 def plot_coverage(found: Coverage, title: str = "") -> "Figure":
@@ -161,8 +159,11 @@ def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
 
 
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
+    from matplotlib.colors import CenteredNorm
+
     first, second = (found.coordinates[i] for i in found.axes)
-    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", **_scale(found))
+    # Centred, so that red, for violations, begins at 0.
+    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", cmap="RdBu", norm=CenteredNorm())
     low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
     if low < 0 <= high:
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
@@ -173,19 +174,3 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     bar = ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")
     ticks = sorted({min(low, 0.0), 0.0, max(high, 0.0)})
     bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-
-
-def _scale(found: RobustnessMap) -> dict[str, Any]:
-    """Return a colour scale that contains 0, where red, for violations, ends and blue begins."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
-
-    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
-    reds = colormaps["Reds_r"](np.linspace(0.1, 0.75, _SHADES))
-    blues = colormaps["Blues"](np.linspace(0.15, 0.8, _SHADES))
-    if low >= 0:
-        return {"cmap": ListedColormap(blues), "norm": Normalize(0.0, high or 1.0)}
-    if high < 0:
-        return {"cmap": ListedColormap(reds), "norm": Normalize(low, 0.0)}
-    both = ListedColormap(np.vstack([reds, blues]))
-    return {"cmap": both, "norm": TwoSlopeNorm(0.0, low, high or -low)}
