@@ -8,7 +8,7 @@ from falsifier.campaigns import Progress, RunProgress
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.terminal import error_console, moving, unbroken
+from falsifier.views.terminal import error_console, live_line, unbroken
 
 Show = Callable[[Progress], None]
 Write = Callable[[str], None]
@@ -30,12 +30,8 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     elif not console.is_terminal:
         yield unbroken(Scoreboard(write))
     else:
-        from rich.live import Live
-        from rich.text import Text
-
-        live = Live(console=console, refresh_per_second=4, transient=True)
-        with moving(live):
-            yield unbroken(Scoreboard(write, lambda text: live.update(Text(one_line(text)))))
+        with live_line(console) as update:
+            yield unbroken(Scoreboard(write, update))
 
 
 class Scoreboard:

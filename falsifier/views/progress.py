@@ -1,8 +1,7 @@
 """The display of a running search: live on a terminal or in a notebook, plain lines otherwise."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,7 +24,7 @@ from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
-from falsifier.views.terminal import error_console, moving, unbroken
+from falsifier.views.terminal import error_console, live_line, unbroken
 from falsifier.views.text import outcome_text
 
 if TYPE_CHECKING:
@@ -44,8 +43,14 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if quiet:
         yield lambda event: None
     elif console.is_terminal and not console.is_jupyter:
-        with _live_display(console) as display:
-            yield display
+        with live_line(console) as update:
+            line = _Line(lambda line: update(f"{line.title}: {line.text}"), _writer(console))
+
+            def tell(_name: str, reached: float, stop_time: float) -> None:
+                update(f"{line.title}: simulated {reached:.4g} of {stop_time:g} s")
+
+            with watching(tell):
+                yield unbroken(line)
     else:
         yield progress()
 
@@ -57,121 +62,85 @@ def progress() -> Listener:
     """
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
-        return _NotebookDisplay()
-    news = News()
+        return _Line(_show_in_notebook, keep=lambda _: None)  # there is no place for more lines
+    news, write = News(), _writer(console)
 
     def show(event: Event) -> None:
         for line in news.lines(event):
-            console.print(one_line(line), highlight=False, markup=False, soft_wrap=True)
+            write(line)
 
     return unbroken(show)
 
 
-@contextmanager
-def _live_display(console: "Console") -> Iterator[Listener]:
-    """Show a bar with the best robustness so far, and above it what is to be kept."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-        console=console,
-        transient=True,
-    )
-    state, news = _State(), News()
-    with moving(bar):
-        task = bar.add_task("starting", total=None, note="")
-
-        def show(event: Event) -> None:
-            for line in news.kept(event):
-                bar.console.print(one_line(line), highlight=False, markup=False)
-            if state.follow(event, news):
-                bar.update(
-                    task, description=state.title, total=state.total, completed=state.done, note=state.note
-                )
-
-        def tell(_name: str, reached: float, stop_time: float) -> None:
-            bar.update(task, note=f"simulated {reached:.4g} of {stop_time:g} s")
-
-        with watching(tell):
-            yield unbroken(show)
+def _writer(console: "Console") -> Callable[[str], None]:
+    return lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
 
 
-class _NotebookDisplay:
-    """Shows a run as one line below the cell and updates it in place.
+def _show_in_notebook(line: "_Line") -> None:
+    """Show a run below the cell and update it in place.
 
     It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
     """
+    from IPython.display import HTML, display
 
-    def __init__(self) -> None:
-        self._handle: Any = None
-        self._state, self._news = _State(), News()
-
-    def __call__(self, event: Event) -> None:
-        """Update the line."""
-        if isinstance(event, RunStarted):
-            self._handle, self._state, self._news = None, _State(), News()
-        tuple(self._news.kept(event))  # there is no place for it
-        if not self._state.follow(event, self._news):
-            return
-        from IPython.display import HTML, display
-
-        state = self._state
-        bar = el("progress", value=state.done, max=state.total) if state.total else ""
-        count = counted(state.total or state.done, "simulation")
-        of = f" {state.done} of {count}. " if state.total else f" {count}. "
-        line = HTML(join(el("code", state.title), " ", bar, of, state.note))  # type: ignore[no-untyped-call]
-        if self._handle is None:
-            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            self._handle.update(line)
+    bar = el("progress", value=line.done, max=line.total) if line.total else ""
+    shown = HTML(join(el("code", line.title), " ", bar, f" {line.text}"))  # type: ignore[no-untyped-call]
+    if line.handle is None:
+        line.handle = display(shown, display_id=True)  # type: ignore[no-untyped-call]
+    else:
+        line.handle.update(shown)
 
 
-@dataclass(slots=True)
-class _State:
-    """What one line says of a run.
+class _Line:
+    """One line on a run that is replaced as it goes on.
 
     Attributes:
         title: the requirements and the engine.
         total: maximum number of simulations; None without a limit.
         done: number of simulations so far.
-        note: the latest news.
+        handle: where it is shown in a notebook.
     """
 
-    title: str = ""
-    total: int | None = None
-    done: int = 0
-    note: str = ""
+    def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None]) -> None:
+        self._show, self._keep = show, keep
+        self._begin("", None)
 
-    def follow(self, event: Event, news: "News") -> bool:
-        """Return whether an event has changed it."""
+    def _begin(self, title: str, total: int | None) -> None:
+        self.title, self.total, self.done = title, total, 0
+        self.handle: Any = None
+        self._news, self._seconds, self._note = News(), 0.0, ""
+
+    @property
+    def text(self) -> str:
+        """How far it is, and the latest news."""
+        of = f"{self.done} of " if self.total else ""
+        count = counted(self.total or self.done, "simulation")
+        left = self._seconds / self.done * (self.total - self.done) if self.total and self.done else 0.0
+        rest = f", about {_duration(left)} left" if left >= 1 else ""
+        return f"{of}{count}{rest}. {self._note}"
+
+    def __call__(self, event: Event) -> None:
+        """Show what an event has changed."""
+        if isinstance(event, RunStarted):
+            names = ", ".join(problem.name for problem in event.problems)
+            self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget.simulations)
+        for line in self._news.kept(event):
+            self._keep(line)
         match event:
             case RunStarted():
-                names = ", ".join(problem.name for problem in event.problems)
-                self.title, self.total = one_line(f"{names}, {event.engines[0]}"), event.budget.simulations
-            case Evaluated():
-                self.done = event.spent.simulations
-                self.note = news.better(event) or self.note or "no successful simulation yet"
+                pass
+            case Evaluated(spent=spent):
+                self.done, self._seconds = spent.simulations, spent.seconds
+                self._note = self._news.better(event) or self._note or "no successful simulation yet"
             case Exchanged():
-                self.note = f"LLM replied, {event.spent.tokens} tokens so far"
+                self._note = f"LLM replied, {event.spent.tokens} tokens so far"
             case Confirmed():
-                self.note = f"violation {event.confirmation.outcome}"
+                self._note = f"violation {event.confirmation.outcome}"
             case RunEnded():
-                self.note = f"{event.status}; {self.note}"
+                self._note = f"{event.status}; {self._note}"
             case _:
-                return False
-        return True
+                return
+        self._show(self)
 
 
 class News:
