@@ -7,7 +7,7 @@ from typing import Literal
 
 from falsifier.core.literals import plain
 
-_VOID = frozenset({"br", "hr", "img", "link", "meta"})
+_VOID = frozenset({"br", "hr", "img", "input", "link", "meta"})
 # Notebook front ends align table cells to the right by default.
 _LEFT = "text-align: left"
 

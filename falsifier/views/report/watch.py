@@ -4,16 +4,14 @@
 
     asyncio.run(serve(Path("runs/nightly"), announce=print))
 
-The page is served on this machine only. It asks for its content again and again; each answer reads on in the
-journals for a moment only, so that the page of a long run opens at once and completes itself.
+The page is served on this machine only, and runs no script: the browser loads it again and again. Each answer
+reads on in the journals for a moment only, so that the page of a long run opens at once and completes itself.
 """
 
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
-from hashlib import sha256
-from importlib.resources import files
 from pathlib import Path
 from secrets import compare_digest, token_urlsafe
 from time import monotonic
@@ -44,6 +42,8 @@ if TYPE_CHECKING:
 # Time in s that the first answer may spend on reading, and each later one: a journal of 100,000 evaluations
 # takes some ten, and the figures of an answer one.
 _READING, _READING_ON = 0.3, 2.0
+# Time in s after which the browser loads the page of a running search again, and one that is not read yet.
+_PERIOD, _PERIOD_BEHIND = 5, 1
 # Maximum number of candidates kept of a run, evenly spaced, to show what was tried.
 _MOST_KEPT = 300
 # Maximum number of rows of a campaign's table; running ones first.
@@ -101,20 +101,21 @@ class Watch:
     def __init__(self, directory: Path, token: str = "") -> None:
         self.directory = directory
         self.token = token
-        self._watched: dict[Path, _Watched] = {}
+        self._watched: _Watched | None = None  # one run at a time is in memory
         run_directories(directory)  # raises if there is nothing to watch
         self._follower = Follower(directory) if is_campaign(directory) else None
 
-    def look(self, chosen: str = "") -> tuple[str, bool]:
-        """Return the content of the page, and whether more is to be read.
+    def look(self, chosen: str = "") -> tuple[str, int | None]:
+        """Return the content of the page, and the time in s after which there is more; None if nothing comes.
 
         Args:
             chosen: name of the folder of a run; without one, the first that is running.
         """
         places = {place.name: place for place in run_directories(self.directory)}
         parts, rows = [], list[RunProgress]()
+        working = is_worked_on(self.directory)
         if self._follower is not None:
-            progress, working = self._follower.look(), is_worked_on(self.directory)
+            progress = self._follower.look()
             rows = list(progress.runs)
             parts.append(el("p", overall_line(progress, stopped=not working), class_="result"))
         if chosen not in places:
@@ -124,29 +125,27 @@ class Watch:
             parts.append(_choice(places, rows, chosen))
         behind = False
         if chosen:
-            place = places[chosen]
             seconds = _READING_ON
-            if place not in self._watched:
+            if self._watched is None or self._watched.run.directory != places[chosen]:
                 seconds = _READING
-                run = RunFollower(place, unread_runs(place))
-                self._watched = {place: _Watched(run)}  # one at a time is in memory
-            watched = self._watched[place]
+                self._watched = _Watched(RunFollower(places[chosen], unread_runs(places[chosen])))
+            watched = self._watched
             watched.read(monotonic() + seconds)
-            behind = watched.is_behind
-            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.run.summaries)]
-        return join(*parts), behind
+            behind, working = watched.is_behind, working or is_worked_on(places[chosen])
+            state = "reading the journal" if behind else "running" if working else "not running"
+            parts.append(el("p", f"{chosen}: {state}.", class_="result"))
+            if working:
+                still = el("a", "keep it as it is", href=f"?run={chosen}&still")
+                parts.append(el("p", "The page is loaded again and again; to read on, ", still, "."))
+            if working and self.token:
+                token = el("input", type="hidden", name="token", value=self.token)
+                parts.append(el("form", token, el("button", "Stop"), method="post", action="stop"))
+            parts += [_run_html(run, watched) for run in watched.run.summaries]
+        return join(*parts), _PERIOD_BEHIND if behind else _PERIOD if working else None
 
     def stop(self) -> None:
         """Ask the process that works here to stop as after Ctrl-C: it looks for this file."""
         (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
-
-    def _state(self, watched: _Watched) -> Html:
-        working = is_worked_on(self.directory) or is_worked_on(watched.run.directory)
-        text = "reading the journal" if watched.is_behind else "running" if working else "not running"
-        button = (
-            el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
-        )
-        return el("p", f"{watched.run.directory.name}: {text}. ", button, class_="result", id="state")
 
 
 def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
@@ -200,13 +199,6 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     return card_html(section_of(run.requirement, {run.method.label: [run]}, shown), more=more)
 
 
-def page(title: str) -> str:
-    """Return the page, whose script fetches its content."""
-    script = files("falsifier.views.report").joinpath("watch.js").read_text(encoding="utf-8")
-    header = el("header", el("h1", title))
-    return document(f"falsifier: {title}", header, el("main", "Reading ...", id="live"), script=script)
-
-
 def application(watch: Watch) -> "Application":
     """Return the pages as an application of aiohttp."""
     from aiohttp import web
@@ -222,27 +214,24 @@ def application(watch: Watch) -> "Application":
         answer: StreamResponse = await handler(request)
         return answer
 
-    async def whole(_: "Request") -> "Response":
-        return web.Response(text=page(name), content_type="text/html")
-
-    async def live(request: "Request") -> "StreamResponse":
+    async def page(request: "Request") -> "Response":
         async with lock:  # figures are drawn one at a time, beside the loop that answers
-            text, behind = await asyncio.to_thread(watch.look, request.query.get("run", ""))
-        tag = sha256(text.encode()).hexdigest()
-        headers = {"ETag": tag, "Cache-Control": "no-store"} | ({"X-Unread": "1"} if behind else {})
-        if request.headers.get("If-None-Match") == tag:
-            return web.Response(status=304, headers=headers)
-        return web.Response(text=text, content_type="text/html", headers=headers)
+            text, again = await asyncio.to_thread(watch.look, request.query.get("run", ""))
+        headers = {"Cache-Control": "no-store"}
+        if again is not None and "still" not in request.query:
+            headers["Refresh"] = str(again)
+        shown = document(f"falsifier: {name}", el("header", el("h1", name)), el("main", Html(text)))
+        return web.Response(text=shown, content_type="text/html", headers=headers)
 
     async def stop(request: "Request") -> "Response":
-        if not watch.token or not compare_digest(request.headers.get("X-Token", ""), watch.token):
+        token = str((await request.post()).get("token", ""))
+        if not watch.token or not compare_digest(token.encode(), watch.token.encode()):
             raise web.HTTPForbidden(text="stopping was not allowed: falsifier watch --page --allow-stop")
         watch.stop()
-        return web.Response(text="stopping")
+        raise web.HTTPSeeOther("/")
 
     made = web.Application(middlewares=[from_here])
-    made.router.add_get("/", whole)
-    made.router.add_get("/live", live)
+    made.router.add_get("/", page)
     made.router.add_post("/stop", stop)
     return made
 
