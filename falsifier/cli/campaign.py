@@ -36,6 +36,7 @@ from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
+    changes_in,
     directory_argument,
     engine_option,
     jobs_option,
@@ -43,7 +44,6 @@ from falsifier.cli.options import (
     limit_options,
     out_option,
     parameterization_option,
-    policy_changes,
     policy_options,
     quiet_option,
     seed_option,
@@ -144,7 +144,7 @@ def bench(
         else [s for target in targets for s in sources_of(ProblemSource(target=target, profile=profile))]
     )
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
-    changes = {"changes": policy_changes(options)}
+    changes = {"changes": changes_in(options)}
     problems = [
         source.model_copy(update=changes | {"parameterization": kind, "context": (*source.context, *context)})
         for source in problems

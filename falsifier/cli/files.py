@@ -19,12 +19,8 @@ PICTURES = (".svg", ".png", ".pdf")
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
     """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
 
-    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it.
-
-    Args:
-        confirmation: the violation.
-        directory: where to write.
-        name: name of the JSON file; the picture has the same name, with the extension .png.
+    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it. It
+    has the name of the JSON file, with the extension .png.
 
     Raises:
         OSError: if the JSON file cannot be written.
@@ -35,12 +31,7 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
 
 
 def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
-    """Check that writing a file destroys nothing but an earlier output of the same kind.
-
-    Args:
-        path: where to write.
-        beginnings: how outputs of this kind begin.
-        kept: a file that must stay.
+    """Check that writing a file destroys no ``kept`` one, and only what has a beginning of its kind.
 
     Raises:
         SpecError: if something else is there.

@@ -12,7 +12,7 @@ import click
 
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import in_existing_folder
-from falsifier.cli.options import PATH, json_option, out_option, policy_changes, policy_options
+from falsifier.cli.options import PATH, changes_in, json_option, out_option, policy_options
 from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
@@ -60,7 +60,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
         diagram = read_diagram(fmu)
         say(as_shown(simulink_text(diagram), asdict(diagram), as_json=as_json))
         return
-    source, changes = _named(fmu), policy_changes(options)
+    source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
     found = replace(found, notes=(*found.notes, _rights_note(*rights)))

@@ -150,10 +150,7 @@ def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
 def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIMULATIONS) -> "Budget":
     """Take the values of budget_option and limit_options out of a command's keyword arguments.
 
-    Args:
-        options: the arguments.
-        asks: whether a language model is named.
-        usual: maximum number of simulations if none is given.
+    Without a maximum number of simulations, the usual one applies; ``asks``: a language model is named.
 
     Raises:
         click.UsageError: if a language model is limited that is not named.
@@ -169,9 +166,7 @@ def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIM
 def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
     """Refuse context that nothing reads.
 
-    Args:
-        named: values of ``--context``.
-        engines: engines without a language model, None for the default one; empty if one is asked.
+    Engines are those without a language model, None for the default one; none if a language model is asked.
 
     Raises:
         click.UsageError: naming the option.

@@ -11,12 +11,11 @@ from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.options import (
-    Parameterized,
     budget_option,
     json_option,
     out_option,
     parameterization_option,
-    source_of,
+    problem_source,
     stl_option,
     target_argument,
 )
@@ -44,9 +43,7 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
     note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares",
 )
 @json_option
-def check(
-    *, target: str, parameterization: Parameterized, stl: str | None, budget: int, as_json: bool
-) -> None:
+def check(*, budget: int, as_json: bool, **options: Any) -> None:
     """Check a spec file, and find requirements that say nothing.
 
     First, keys, signals, ranges and formulas are checked. Then it looks for parts that cannot fail or hold,
@@ -55,7 +52,8 @@ def check(
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = source_of(target, parameterization, stl=stl)
+    source = problem_source(options)
+    target = source.target
     if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
         raise SpecError(
             f"{target}: no requirement to check; add --stl 'G[0,10] (SIGNAL <= 1)', or give a spec "

@@ -19,12 +19,7 @@ _SHOWN = 8
 
 
 def coverage_text(found: Coverage, name: str) -> str:
-    """Format coverage as tables: what was searched, what of it was not tried, what the system did.
-
-    Args:
-        found: what was tried.
-        name: of the requirement or the run.
-    """
+    """Format coverage as tables: what was searched, what of it was not tried, what the system did."""
     count = sum(failure.count for failure in found.failures)
     failed = f", and {counted(count, 'failed one')}" if count else ""
     lines = [f"{name}: what {counted(found.simulations, 'simulation')} tried{failed}"]

@@ -16,12 +16,9 @@ _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
 def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
-    """Show the exchanges of a recorded run; empty if it asked nothing.
+    """Show the latest turns in which a requirement's engine asked, and how many are left out.
 
-    Args:
-        directory: run directory.
-        requirement: name of the requirement whose engine asked.
-        most: maximum number of turns to show, the latest; the text says what is left out.
+    Empty if the recorded run asked nothing.
     """
     asked = [one for one in iterations(read_journal(directory), requirement) if one.exchanges]
     parts, before = [], tuple[Message, ...]()

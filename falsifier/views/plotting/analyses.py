@@ -28,10 +28,6 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     """Plot what was tried of inputs over time, of parameters and of pairs, and the band of each output.
 
     Of each kind, the first eight are drawn; the pairs are the least tried ones.
-
-    Args:
-        found: what was tried.
-        title: title of the figure.
     """
     from matplotlib.figure import Figure
 

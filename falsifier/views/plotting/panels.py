@@ -89,16 +89,8 @@ def panels(
 ) -> list[Panel]:
     """Make the panels of one simulation: one per compared quantity, then one per searched input.
 
-    Those of a system are grouped by component, after quantities of several components.
-
-    Args:
-        formula: the requirement.
-        trajectory: what was simulated.
-        candidate: the inputs.
-        inputs: the searched inputs.
-        verdict: robustness, and what decided it.
-        labels: names of the numbers of signals that are not real, by signal.
-        components: names of the components of a system.
+    Those of a system are grouped by component, after quantities of several components. Labels are names of
+    the numbers of signals that are not real, by signal.
     """
     compared: dict[str, _Judged] = {}
     for predicate, window in judged_windows(formula):

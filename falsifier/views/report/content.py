@@ -172,13 +172,7 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
 
 
 def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
-    """Return what is said of a requirement.
-
-    Args:
-        name: name of the requirement.
-        by_method: its runs by method.
-        shown: their counterexamples or, if there are none, the best simulation.
-    """
+    """Return what is said of a requirement; shown: counterexamples or, without any, the best simulation."""
     runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     heading = requirement.formula if runs[0].is_ad_hoc else name

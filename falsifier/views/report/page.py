@@ -126,13 +126,7 @@ def facts_html(facts: Iterable[Fact]) -> Html:
 
 
 def card_html(section: Section, *, title: str = "", more: Sequence[str] = ()) -> Html:
-    """Show the verdict on a requirement: what was found, or what was tried.
-
-    Args:
-        section: the requirement.
-        title: heading of the card; without one, that of the requirement.
-        more: what stands below.
-    """
+    """Show the verdict on a requirement: what was found, or what was tried, and below it what is more."""
     status = section.status
     found = _found(section.shown[0]) if section.shown else []
     if status != "violated":

@@ -108,8 +108,7 @@ class Watch:
     def look(self, chosen: str = "") -> tuple[str, int | None]:
         """Return the content of the page, and the time in s after which there is more; None if nothing comes.
 
-        Args:
-            chosen: name of the folder of a run; without one, the first that is running.
+        Without the name of the folder of a run, the first that is running is shown.
         """
         places = {place.name: place for place in run_directories(self.directory)}
         parts, rows = [], list[RunProgress]()
@@ -239,10 +238,7 @@ def application(watch: Watch) -> "Application":
 async def serve(directory: Path, *, announce: Callable[[str], None], allow_stop: bool = False) -> None:
     """Serve the page of a directory on 127.0.0.1 until this is cancelled.
 
-    Args:
-        directory: a run, a campaign, or a folder of runs.
-        announce: called with the page's address, which has a free port.
-        allow_stop: whether the page has a button that stops the run or campaign.
+    The address, which has a free port, is announced. With allow_stop, the page has a button.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.

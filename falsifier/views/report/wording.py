@@ -76,12 +76,7 @@ def result_text(section: Section) -> str:
 
 
 def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
-    """Return what broke; without a violation, how near it came.
-
-    Args:
-        verdict: robustness, and what decided it.
-        units: units of the signals, by name.
-    """
+    """Return what broke; without a violation, how near it came."""
     return broken_facts(verdict) or margin_facts(verdict, units)
 
 
