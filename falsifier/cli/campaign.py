@@ -184,7 +184,13 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     can also be opened after the run has ended.
     """
     if page:
-        _serve(directory, allow_stop=allow_stop)
+        import asyncio
+
+        from falsifier.views.report.watch import serve
+
+        page_of = serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop)
+        with suppress(KeyboardInterrupt):
+            asyncio.run(page_of)
         return
     refuse("applies to --page only", allow_stop=allow_stop)
     follower = Follower(directory)
@@ -199,16 +205,6 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
-
-
-def _serve(directory: Path, *, allow_stop: bool) -> None:
-    """Serve the page until the user ends it."""
-    import asyncio
-
-    from falsifier.views.report.watch import serve
-
-    with suppress(KeyboardInterrupt):
-        asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop))
 
 
 def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:

@@ -230,21 +230,20 @@ def _shrink(
 def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
     from falsifier.counterexamples.export.tables import input_table, write_csv
 
-    files = [write_csv(input_table(problem, evaluation.candidate), file, problem.model)]
-    picture = draw_evaluation(problem, evaluation, file.with_suffix(".png"))
-    return files if picture is None else [*files, picture]
+    written = write_csv(input_table(problem, evaluation.candidate), file, problem.model)
+    return [written, *draw_evaluation(problem, evaluation, file.with_suffix(".png"))]
 
 
 def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
     """Tell what broke, and what resetting each input alone comes to."""
     from falsifier.counterexamples.explain import explain
 
-    picture = None
+    pictures: list[Path] = []
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         explanation = explain(problem, evaluation)
         if case.is_miss:
-            picture = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
+            pictures = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
     with suppress(OSError):  # it is printed anyway
         write_whole(beside(case.file, EXPLANATION), f"{explanation.text}\n")
     content = {
@@ -252,9 +251,9 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
         "text": explanation.text,
         "effects": [asdict(effect) for effect in explanation.effects],
         "about": str(case.place),
-        "picture": picture and str(picture),
+        "picture": next(map(str, pictures), None),
     }
-    drawn = [] if picture is None else [f"picture: {picture}"]
+    drawn = [f"picture: {picture}" for picture in pictures]
     return [*_about(case, problem, run), explanation.text, *drawn], content
 
 

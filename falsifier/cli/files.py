@@ -26,8 +26,8 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
         OSError: if the JSON file cannot be written.
     """
     data = save(to_store(confirmation), directory / name)
-    picture = draw_evaluation(confirmation.problem, confirmation.evaluation, data.with_suffix(".png"))
-    return [data] if picture is None else [data, picture]
+    picture = data.with_suffix(".png")
+    return [data, *draw_evaluation(confirmation.problem, confirmation.evaluation, picture)]
 
 
 def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
@@ -70,17 +70,17 @@ def in_existing_folder(path: Path) -> Path:
     return path
 
 
-def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:
+def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> list[Path]:
     """Write the picture of an evaluation with its trajectory; see ``draw``."""
     from falsifier.views.plotting import plot_evaluation
 
     return draw(lambda: plot_evaluation(problem, evaluation), picture)
 
 
-def draw(plot: Callable[[], Any], picture: Path) -> Path | None:
+def draw(plot: Callable[[], Any], picture: Path) -> list[Path]:
     """Write what ``plot`` returns, a figure; return its path.
 
-    None if it cannot be drawn or written, which is said on stderr.
+    No path if it cannot be drawn or written, which is said on stderr.
     """
     from falsifier.views.plotting import save_figure
 
@@ -88,5 +88,5 @@ def draw(plot: Callable[[], Any], picture: Path) -> Path | None:
         save_figure(plot(), picture)
     except Exception as error:  # whatever a drawing library thinks of values and names that others chose
         warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
-        return None
-    return picture
+        return []
+    return [picture]

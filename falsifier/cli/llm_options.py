@@ -64,25 +64,24 @@ def variant_option(*, multiple: bool = False) -> Decorator:
     )
 
 
-api_base_option = click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
-
-
 anonymous_option = click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")
-
-
-llm_option_option = click.option(
-    "--llm-option",
-    "llm_options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
-    "tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. Repeatable.",
-)
 
 
 def connection_options(command: Function) -> Function:
     """Add how to reach a language model, and what it costs."""
-    return add(command, api_base_option, llm_option_option)
+    return add(
+        command,
+        click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
+        click.option(
+            "--llm-option",
+            "llm_options",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per "
+            "million tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. "
+            "Repeatable.",
+        ),
+    )
 
 
 def asking_options(command: Function) -> Function:

@@ -57,26 +57,19 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
     known = 0
     while known < min(len(before), len(exchange.messages)) and before[known] == exchange.messages[known]:
         known += 1
-    prompt = [
-        el("p", f"{counted(known, 'message')} as in the question before", class_="note")
-        if known
-        else Html(""),
-        *(join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]),
-    ]
     usage, reply = exchange.usage, exchange.reply
-    return join(
-        el(
-            "details",
-            el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}"),
-            *prompt,
-            class_="prompt",
-        ),
+    prompt = [el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}")]
+    if known:
+        prompt.append(el("p", f"{counted(known, 'message')} as in the question before", class_="note"))
+    prompt += [join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]]
+    parts = [
+        el("details", *prompt, class_="prompt"),
         el("p", f"Reply of {exchange.llm}: {counted(usage.completion_tokens, 'token')}"),
         _text(reply.text.strip() if reply else "(none)"),
-        el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem)
-        if exchange.problem
-        else Html(""),
-    )
+    ]
+    if exchange.problem:
+        parts.append(el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem))
+    return join(*parts)
 
 
 def _text(text: str) -> Html:

@@ -167,6 +167,4 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
         ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
     ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
-    bar = ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")
-    ticks = sorted({min(low, 0.0), 0.0, max(high, 0.0)})
-    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
+    ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")

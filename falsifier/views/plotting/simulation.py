@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# In inches; and the number of characters of a title's line.
-_PANEL_HEIGHT, _INPUT_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
+# In inches, low for what is compared with nothing; and the number of characters of a title's line.
+_PANEL_HEIGHT, _LOW_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
 # A margin below this share of a panel's height is enlarged, with this share of the simulated time around it.
 _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
@@ -103,7 +103,7 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
     """
     from matplotlib.figure import Figure
 
-    heights = [_PANEL_HEIGHT if panel.limits is None else _INPUT_HEIGHT for panel in drawn]
+    heights = [_PANEL_HEIGHT if panel.bounds else _LOW_HEIGHT for panel in drawn]
     height = sum(heights) + _LINE_HEIGHT * (title.count("\n") + 1)
     figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
@@ -265,14 +265,9 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
 
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
     """Plot signals over time, those named or else all, one small panel per signal."""
-    from matplotlib.figure import Figure
-
-    names = trajectory.names if names is None else names
-    figure = Figure(figsize=(8, 0.6 + 1.1 * len(names)), layout="constrained")
-    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, name in zip(axes, names, strict=True):
-        unit = trajectory.units.get(name, "")
-        ax.plot(trajectory.times, trajectory[name], linewidth=1.2, color=OUTPUT)
-        ax.set_ylabel(caption(f"{name} [{unit}]" if unit else name))
-    axes[-1].set_xlabel("time [s]")
-    return figure
+    shown = [
+        Panel(f"{name} [{unit}]" if unit else name, trajectory.times, trajectory[name])
+        for name in (trajectory.names if names is None else names)
+        for unit in [trajectory.units.get(name, "")]
+    ]
+    return plot_panels(shown, None)

@@ -28,13 +28,9 @@ class Shown:
     """A run's counterexample, shrunk if it was, or its best simulation.
 
     Attributes:
-        run: the run.
-        candidate: what was simulated.
         verdict: robustness, and what decided it; None if it could not be judged.
-        units: units of the signals, by name.
         panels: what to draw; empty if the trajectory was not kept.
         confirmed: why a counterexample counts.
-        is_shrunk: whether it is the shrunk counterexample.
         is_lost: whether a trajectory was kept, but its file is damaged or missing.
     """
 
@@ -69,9 +65,7 @@ class Section:
     """The part of a report about one requirement.
 
     Attributes:
-        name: name of the requirement.
         heading: the name; of a formula without a name, the formula.
-        formula: text of the formula.
         sentence: what it means.
         by_method: its runs by method.
         shown: counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of
@@ -107,9 +101,7 @@ class Side:
 
     Attributes:
         title: name of the directory.
-        runs: all runs that have started.
         table: statistics of the protocol; None if no method has several runs.
-        sections: one per requirement.
     """
 
     title: str

@@ -9,7 +9,7 @@ reads on in the journals for a moment only, so that the page of a long run opens
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -28,10 +28,9 @@ from falsifier.llm.messages import Exchange
 from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
 from falsifier.record.summary import RunFollower
-from falsifier.stl.margins import signed
-from falsifier.views.campaign_progress import overall_line
+from falsifier.views.campaign_progress import overall_line, run_line
 from falsifier.views.exchanges import exchange_html
-from falsifier.views.html import Html, el, join, table
+from falsifier.views.html import Html, el, join
 from falsifier.views.report.content import section_of, shown_of
 from falsifier.views.report.page import card_html, document, drawn, facts_html
 from falsifier.views.text import llm_use, seconds_text
@@ -46,7 +45,7 @@ _READING, _READING_ON = 0.3, 2.0
 _PERIOD, _PERIOD_BEHIND = 5, 1
 # Maximum number of candidates kept of a run, evenly spaced, to show what was tried.
 _MOST_KEPT = 300
-# Maximum number of rows of a campaign's table; running ones first.
+# Maximum number of runs of a campaign to choose from.
 _MOST_RUNS = 200
 
 
@@ -121,7 +120,7 @@ class Watch:
             running = [run.name for run in rows if run.status == "running" and run.name in places]
             chosen = next(iter([*running, *places]), "")
         if len(places) > 1 or rows:
-            parts.append(_choice(places, rows, chosen))
+            parts.append(_choice(places.keys(), rows))
         behind = False
         if chosen:
             seconds = _READING_ON
@@ -147,27 +146,15 @@ class Watch:
         (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
 
 
-def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
-    """The runs to choose from; of a campaign with what came of them so far."""
-    if not rows:
-        links = [el("li", el("a", name, href=f"?run={name}")) for name in places]
-        return el("nav", el("ul", *links), aria_label="Runs")
-    order = sorted(rows, key=lambda run: (run.status != "running", run.finished))
-    cells = [
-        (
-            el("a", run.requirement, href=f"?run={run.name}") if run.name in places else run.requirement,
-            f"{run.method.label}, seed {run.seed}",
-            f"{run.status}{' (shown below)' if run.name == chosen else ''}",
-            run.spent.simulations_text,
-            "" if run.best_robustness is None else signed(run.best_robustness, 4),
-        )
-        for run in order[:_MOST_RUNS]
-    ]
-    header = ("requirement", "run", "status", "simulations", "best robustness")
+def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
+    """The runs to choose from, those of a campaign with what came of them so far, running ones first."""
+    order = sorted(rows, key=lambda run: (run.status != "running", run.finished))[:_MOST_RUNS]
+    told = {run.name: run_line(run) for run in order} or {name: name for name in places}
+    runs = [el("a", text, href=f"?run={name}") if name in places else text for name, text in told.items()]
     return el(
         "details",
-        el("summary", f"All {counted(len(rows), 'run')}"),
-        table(header, cells, label="Runs"),
+        el("summary", f"All {counted(len(rows or places), 'run')}"),
+        el("ul", *(el("li", run) for run in runs)),
         open="",
     )
 
