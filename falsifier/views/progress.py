@@ -12,6 +12,7 @@ from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.events import (
+    Asked,
     Confirmed,
     Evaluated,
     Event,
@@ -62,11 +63,14 @@ def progress() -> Listener:
     """
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
-        return _Line(_show_in_notebook, keep=lambda _: None)  # there is no place for more lines
+        return _Line(_show_in_notebook, keep=None)  # there is no place for more lines
     news, write = News(), _writer(console)
 
     def show(event: Event) -> None:
-        for line in news.lines(event):
+        told = news.lines(event)
+        if isinstance(event, Evaluated):
+            told += news.pace(event.spent, told=bool(told))
+        for line in told:
             write(line)
 
     return unbroken(show)
@@ -92,7 +96,7 @@ def _show_in_notebook(line: "_Line") -> None:
 
 
 class _Line:
-    """One line on a run that is replaced as it goes on.
+    """One line on a run that is replaced as it goes on, below the news, or with the latest of them.
 
     Attributes:
         title: the requirements and the engine.
@@ -101,14 +105,14 @@ class _Line:
         handle: where it is shown in a notebook.
     """
 
-    def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None]) -> None:
-        self._show, self._keep = show, keep
+    def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None] | None) -> None:
+        self._show, self._keep, self._news = show, keep, News()
         self._begin("", None)
 
     def _begin(self, title: str, total: int | None) -> None:
         self.title, self.total, self.done = title, total, 0
         self.handle: Any = None
-        self._news, self._seconds, self._note = News(), 0.0, ""
+        self._seconds, self._note = 0.0, ""
 
     @property
     def text(self) -> str:
@@ -124,22 +128,20 @@ class _Line:
         if isinstance(event, RunStarted):
             names = ", ".join(problem.name for problem in event.problems)
             self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget.simulations)
-        for line in self._news.kept(event):
-            self._keep(line)
+        for line in self._news.lines(event):
+            if self._keep is None:
+                self._note = line
+            else:
+                self._keep(line)
         match event:
-            case RunStarted():
-                pass
+            case Asked():
+                return
             case Evaluated(spent=spent):
                 self.done, self._seconds = spent.simulations, spent.seconds
-                self._note = self._news.better(event) or self._note or "no successful simulation yet"
-            case Exchanged():
-                self._note = f"LLM replied, {event.spent.tokens} tokens so far"
-            case Confirmed():
-                self._note = f"violation {event.confirmation.outcome}"
+            case Exchanged(spent=spent):
+                self._note = f"LLM replied, {spent.tokens} tokens so far"
             case RunEnded():
                 self._note = f"{event.status}; {self._note}"
-            case _:
-                return
         self._show(self)
 
 
@@ -152,46 +154,35 @@ class News:
         self._least: dict[str, float] = {}
         self._since = Spent()
 
-    def lines(self, event: Event) -> Iterator[str]:
-        """Yield all that is new: what is kept, improvements, causes of failures, or at times the pace."""
+    def lines(self, event: Event) -> list[str]:
+        """Return all that is new: choices, improvements, causes of failures, warnings and confirmations."""
         match event:
             case RunStarted():
+                self._started, self._told, self._least, self._since = event, set(), {}, Spent()
                 known = counted(event.replayed, "evaluation")
                 replayed = f", {known} from the journal" if event.replayed else ""
-                yield from (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
-                yield f"engine {event.engines[0]}{replayed}"
-                yield from self.kept(event)
-            case Evaluated():
-                ended, told = event.evaluation, list[str]()
+                formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
+                return [*formulas, f"engine {event.engines[0]}{replayed}", *_choices(event)]
+            case Evaluated(evaluation=ended, spent=spent):
+                told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
                     told.append(f"simulation {event.index + 1} {outcome_text(ended)}")
-                told += self.kept(event)
-                if better := self.better(event):
-                    told.append(f"simulation {event.index + 1}: {better}")
-                yield from told
-                yield from self._pace(event.spent, told=bool(told))
-            case _:
-                yield from self.kept(event)
-
-    def kept(self, event: Event) -> Iterator[str]:
-        """Yield what should stay on the screen: choices, levels, warnings and confirmations."""
-        match event:
-            case RunStarted():
-                self._started, self._since = event, Spent()
-                yield from _choices(event)
-            case Evaluated(spent=spent) if spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed:
-                if self._is_new("mostly failed"):
-                    yield (
+                many = spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed
+                if many and self._is_new("mostly failed"):
+                    told.append(
                         f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run "
                         "counts as failed if more than half do"
                     )
+                if better := self._better(event):
+                    told.append(f"simulation {event.index + 1}: {better}")
+                return told
             case Confirmed(confirmation=found):
                 # Several requirements may share the search, so it is named.
-                yield f"{found.problem.name}: violation {found.outcome}: {found.reason}"
+                return [f"{found.problem.name}: violation {found.outcome}: {found.reason}"]
             case _:
-                pass
+                return []
 
-    def better(self, event: Evaluated) -> str:
+    def _better(self, event: Evaluated) -> str:
         """Tell the smallest robustness if it has changed, of several requirements by name; else nothing."""
         told = []
         for name, seen in event.judged.items():
@@ -210,7 +201,7 @@ class News:
         self._told.add(key)
         return is_new
 
-    def _pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
+    def pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
         """Tell how fast the search is and what is left of it, if nothing else was told for a while."""
         quiet = spent.seconds - self._since.seconds
         if told or quiet < max(_QUIET, _QUIET_SHARE * spent.seconds):
