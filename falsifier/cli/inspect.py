@@ -1,7 +1,6 @@
 """``falsifier info`` and ``falsifier init``: what an FMU holds, and a spec for it."""
 
 import shlex
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from os.path import relpath
@@ -63,7 +62,11 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
-    found = replace(found, notes=(*found.notes, _rights_note(*rights)))
+    try:
+        note = rights_text(*rights)
+    except (MachineError, ModelError) as error:  # the description can be shown all the same
+        note = f"FMUs cannot be simulated now: {error}"
+    found = replace(found, notes=(*found.notes, note))
     say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
     if checked and not as_json:
         _print_convergence(source, found, *rights)
@@ -175,14 +178,6 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     if step == experiment.output_interval:
         return f"this step {kept}"
     return f"step_size = {step:g} {kept}; set it in [model]"
-
-
-def _rights_note(allow: Sequence[str], deny: Sequence[str]) -> str:
-    """Return what the FMU may do; its description can be shown where no FMU can be run."""
-    try:
-        return rights_text(allow, deny)
-    except (MachineError, ModelError) as error:
-        return f"FMUs cannot be simulated now: {error}"
 
 
 def _named(given: Path) -> "Path | System":

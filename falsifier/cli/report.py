@@ -54,10 +54,10 @@ def report(
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
+        warn(f"{arch_comp} written")
     if csv_file is not None:
         csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
-    for written in filter(None, (arch_comp, csv_file)):
-        warn(f"{written} written")
+        warn(f"{csv_file} written")
     if markdown and out is None:
         say(markdown_report(*directories), nl=False)
         return

@@ -25,8 +25,7 @@ def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
     for one in asked[-most:]:
         parts.append(_iteration(one, before))
         before = one.exchanges[-1].messages
-    missing = len(asked) - len(parts)
-    if missing:
+    if missing := len(asked) - len(parts):
         said = f"The first {counted(missing, 'question')} are not shown; the question before sample N: "
         command = el("code", f"falsifier llm prompt {shlex.quote(str(directory))} --at N")
         parts.insert(0, el("p", said, command, class_="note"))

@@ -130,7 +130,12 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     centre, colour = ("counterexample", VIOLATED) if found.original < 0 else ("nearest miss", OUTPUT)
-    _plot_sizes(left, found)
+    violates = found.robustness < 0
+    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
+        if mask.any():
+            left.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
+    left.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    left.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
     left.plot(0.0, found.original, "o", color=colour, label=centre)
     left.legend()
     if len(found.grid) > 1:
@@ -143,15 +148,6 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         right.set(xlabel=caption(coordinate.label), ylabel="robustness")
     figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure
-
-
-def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
-    violates = found.robustness < 0
-    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
-        if mask.any():
-            ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
-    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
-    ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
 
 
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:

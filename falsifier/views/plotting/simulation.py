@@ -83,7 +83,6 @@ def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verd
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
     labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
-    labels |= {r.name: labels_of(r.kind, r.items) for r in problem.space.inputs if r.kind != "real"}
     drawn = panels(
         problem.requirement.formula,
         evaluation.trajectory,

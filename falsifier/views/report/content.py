@@ -224,7 +224,6 @@ def _drawn(
     described, drawn = run.manifest, list[Panel]()
     if trajectory is not None:
         labels = {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
-        labels |= {r.name: labels_of(r.kind, r.items) for r in described.inputs if r.kind != "real"}
         formula, components = parse(described.requirement.formula), described.components
         drawn = panels(formula, trajectory, candidate, described.inputs, verdict, labels, components)
     return Shown(

@@ -56,12 +56,10 @@ class _Watched:
     run: RunFollower[Run]
     candidates: dict[int, dict[str, Any]] = field(default_factory=dict)
     exchange: Exchange | None = None
-    is_behind: bool = False
     _every: int = 1
 
-    def read(self, until: float) -> None:
-        """Read on until there is nothing new, or the clock (in s) says that it is enough."""
-        self.is_behind = False
+    def read(self, until: float) -> bool:
+        """Read on until the clock (in s) says that it is enough; return whether there may be more."""
         for record in self.run.read():
             if isinstance(record, AskedRecord):
                 self.candidates |= dict(enumerate(record.candidates, start=record.first))
@@ -69,8 +67,8 @@ class _Watched:
             elif isinstance(record, ExchangeRecord):
                 self.exchange = record.exchange
             if monotonic() > until:
-                self.is_behind = True
-                return
+                return True
+        return False
 
     def _thin(self) -> None:
         """Keep the candidates that are still to be simulated or to be shown, and of the others every n-th."""
@@ -78,12 +76,9 @@ class _Watched:
             return
         self._every *= 2
         needed = {run.shown for run in self.run.summaries}
-        first = max(self.candidates) - _MOST_KEPT // 2
-        self.candidates = {
-            index: candidate
-            for index, candidate in self.candidates.items()
-            if index % self._every == 0 or index in needed or index > first
-        }
+        needed |= set(range(max(self.candidates) - _MOST_KEPT // 2, max(self.candidates) + 1))
+        kept = [index for index in self.candidates if index % self._every == 0 or index in needed]
+        self.candidates = {index: self.candidates[index] for index in kept}
 
 
 class Watch:
@@ -128,8 +123,8 @@ class Watch:
                 seconds = _READING
                 self._watched = _Watched(RunFollower(places[chosen], unread_runs(places[chosen])))
             watched = self._watched
-            watched.read(monotonic() + seconds)
-            behind, working = watched.is_behind, working or is_worked_on(places[chosen])
+            behind = watched.read(monotonic() + seconds)
+            working = working or is_worked_on(places[chosen])
             state = "reading the journal" if behind else "running" if working else "not running"
             parts.append(el("p", f"{chosen}: {state}.", class_="result"))
             if working:
