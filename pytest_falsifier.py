@@ -236,10 +236,10 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
 
 def _command(item: pytest.Item, checked: "Checked") -> str:
     """Command that replays the counterexample; if the problem was made in Python, the test itself."""
-    from falsifier.counterexamples.store import load
+    from falsifier.counterexamples.store import load_counterexample
 
     assert checked.file is not None
-    loadable = load(checked.file).problem is not None
+    loadable = load_counterexample(checked.file).problem is not None
     return f"falsifier replay {_short(checked.file)}" if loadable else f"pytest '{item.nodeid}'"
 
 

@@ -42,76 +42,115 @@ if sys.platform == "win32":
         "where FMUs for Windows run through Wine"
     )
 
+# Written X as X, which tells type checkers that it is public.
 if TYPE_CHECKING:
-    from falsifier.analyses.assess import Assurance, Searched, assess
-    from falsifier.analyses.coverage import Coverage, coverage
-    from falsifier.analyses.formalize import Difference, Formalized, Reading, formalize
-    from falsifier.analyses.lint import LintFinding, lint
-    from falsifier.analyses.margin import Margin, margin
+    from falsifier.analyses.assess import Assurance as Assurance, Searched as Searched, assess as assess
+    from falsifier.analyses.coverage import Coverage as Coverage, coverage as coverage
+    from falsifier.analyses.formalize import (
+        Difference as Difference,
+        Formalized as Formalized,
+        Reading as Reading,
+        formalize as formalize,
+    )
+    from falsifier.analyses.lint import LintFinding as LintFinding, lint as lint
+    from falsifier.analyses.margin import Margin as Margin, margin as margin
     from falsifier.campaigns import (
-        CampaignRequest,
-        Method,
-        analysis,
-        cross,
-        resume_campaign,
-        run_campaign,
-        suite,
+        CampaignRequest as CampaignRequest,
+        Method as Method,
+        analysis as analysis,
+        cross as cross,
+        resume_campaign as resume_campaign,
+        run_campaign as run_campaign,
+        suite as suite,
     )
-    from falsifier.core.candidate import Candidate
-    from falsifier.core.model import Experiment, FunctionModel, Model, ModelInfo, Variable
-    from falsifier.core.signals import Signal
-    from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
-    from falsifier.core.trajectory import Trajectory
-    from falsifier.counterexamples.explain import Explanation, explain
-    from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
-    from falsifier.counterexamples.shrink import Shrunk, shrink
-    from falsifier.counterexamples.store import Replayed, StoredCounterexample, replay
-    from falsifier.counterexamples.store import load as load_counterexample
-    from falsifier.engines import DEFAULT_ENGINE, ENGINES, make_engine
-    from falsifier.engines.briefing import preview
-    from falsifier.engines.llm import LLMEngine
-    from falsifier.engines.protocol import AsksLLM, Engine
-    from falsifier.errors import FalsifierError
-    from falsifier.evaluation.confirm import Confirmation, confirm
-    from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for, simulate
+    from falsifier.core.candidate import Candidate as Candidate
+    from falsifier.core.model import (
+        Experiment as Experiment,
+        FunctionModel as FunctionModel,
+        Model as Model,
+        ModelInfo as ModelInfo,
+        Variable as Variable,
+    )
+    from falsifier.core.signals import Signal as Signal
+    from falsifier.core.space import (
+        Freedom as Freedom,
+        InputRange as InputRange,
+        ParameterRange as ParameterRange,
+        SearchSpace as SearchSpace,
+    )
+    from falsifier.core.trajectory import Trajectory as Trajectory
+    from falsifier.counterexamples.explain import Explanation as Explanation, explain as explain
+    from falsifier.counterexamples.robustness_map import (
+        RobustnessMap as RobustnessMap,
+        robustness_map as robustness_map,
+    )
+    from falsifier.counterexamples.shrink import Shrunk as Shrunk, shrink as shrink
+    from falsifier.counterexamples.store import (
+        Replayed as Replayed,
+        StoredCounterexample as StoredCounterexample,
+        load_counterexample as load_counterexample,
+        replay as replay,
+    )
+    from falsifier.engines import (
+        DEFAULT_ENGINE as DEFAULT_ENGINE,
+        ENGINES as ENGINES,
+        make_engine as make_engine,
+    )
+    from falsifier.engines.briefing import preview as preview
+    from falsifier.engines.llm import LLMEngine as LLMEngine
+    from falsifier.engines.protocol import AsksLLM as AsksLLM, Engine as Engine
+    from falsifier.errors import FalsifierError as FalsifierError
+    from falsifier.evaluation.confirm import Confirmation as Confirmation, confirm as confirm
+    from falsifier.evaluation.evaluate import (
+        Evaluation as Evaluation,
+        evaluate as evaluate,
+        monitor_for as monitor_for,
+        simulate as simulate,
+    )
     from falsifier.fmu import (
-        Component,
-        Connection,
-        Coupling,
-        FmuModel,
-        Frame,
-        System,
-        read_info,
-        read_package,
+        Component as Component,
+        Connection as Connection,
+        Coupling as Coupling,
+        FmuModel as FmuModel,
+        Frame as Frame,
+        System as System,
+        read_info as read_info,
+        read_package as read_package,
     )
-    from falsifier.llm.client import connect
-    from falsifier.llm.messages import Chat, Exchange
-    from falsifier.llm.prompts import VARIANTS
-    from falsifier.llm.scripted import ScriptedChat
-    from falsifier.problem.loading import load_problem, load_problems
-    from falsifier.problem.problem import Problem
-    from falsifier.problem.requirement import Requirement
-    from falsifier.problem.source import ProblemSource
-    from falsifier.record.run import falsify, resume
-    from falsifier.search import events
-    from falsifier.search.budget import Budget, Spent
-    from falsifier.search.events import Event, Listener
-    from falsifier.search.request import LLMSettings
-    from falsifier.search.result import Result
-    from falsifier.stl import Breach, Diagnosis, Formula, Monitor, Verdict, parse
-    from falsifier.views import plotting
-    from falsifier.views.plotting import Figure as Figure
-    from falsifier.views.plotting import plot
-    from falsifier.views.progress import progress
+    from falsifier.llm.client import connect as connect
+    from falsifier.llm.messages import Chat as Chat, Exchange as Exchange
+    from falsifier.llm.prompts import VARIANTS as VARIANTS
+    from falsifier.llm.scripted import ScriptedChat as ScriptedChat
+    from falsifier.problem.loading import load_problem as load_problem, load_problems as load_problems
+    from falsifier.problem.problem import Problem as Problem
+    from falsifier.problem.requirement import Requirement as Requirement
+    from falsifier.problem.source import ProblemSource as ProblemSource
+    from falsifier.record.run import falsify as falsify, resume as resume
+    from falsifier.search import events as events
+    from falsifier.search.budget import Budget as Budget, Spent as Spent
+    from falsifier.search.events import Event as Event, Listener as Listener
+    from falsifier.search.request import LLMSettings as LLMSettings
+    from falsifier.search.result import Result as Result
+    from falsifier.stl import (
+        Breach as Breach,
+        Diagnosis as Diagnosis,
+        Formula as Formula,
+        Monitor as Monitor,
+        Verdict as Verdict,
+        parse as parse,
+    )
+    from falsifier.views import plotting as plotting
+    from falsifier.views.plotting import Figure as Figure, plot as plot
+    from falsifier.views.progress import progress as progress
 
-# Where the public names are found; one that has another name there is written PUBLIC:OTHER.
+# Where the public names are found.
 _NAMES = {
     "falsifier.analyses.assess": "Assurance Searched assess",
     "falsifier.analyses.coverage": "Coverage coverage",
     "falsifier.analyses.formalize": "Difference Formalized Reading formalize",
     "falsifier.analyses.lint": "LintFinding lint",
     "falsifier.analyses.margin": "Margin margin",
-    "falsifier.campaigns": "CampaignRequest Method cross resume_campaign run_campaign suite",
+    "falsifier.campaigns": "CampaignRequest Method analysis cross resume_campaign run_campaign suite",
     "falsifier.core.candidate": "Candidate",
     "falsifier.core.model": "Experiment FunctionModel Model ModelInfo Variable",
     "falsifier.core.signals": "Signal",
@@ -120,7 +159,7 @@ _NAMES = {
     "falsifier.counterexamples.explain": "Explanation explain",
     "falsifier.counterexamples.robustness_map": "RobustnessMap robustness_map",
     "falsifier.counterexamples.shrink": "Shrunk shrink",
-    "falsifier.counterexamples.store": "Replayed StoredCounterexample load_counterexample:load replay",
+    "falsifier.counterexamples.store": "Replayed StoredCounterexample load_counterexample replay",
     "falsifier.engines": "DEFAULT_ENGINE ENGINES make_engine",
     "falsifier.engines.briefing": "preview",
     "falsifier.engines.llm": "LLMEngine",
@@ -138,143 +177,31 @@ _NAMES = {
     "falsifier.problem.requirement": "Requirement",
     "falsifier.problem.source": "ProblemSource",
     "falsifier.record.run": "falsify resume",
+    "falsifier.search": "events",
     "falsifier.search.budget": "Budget Spent",
     "falsifier.search.events": "Event Listener",
     "falsifier.search.request": "LLMSettings",
     "falsifier.search.result": "Result",
     "falsifier.stl": "Breach Diagnosis Formula Monitor Verdict parse",
+    "falsifier.views": "plotting",
     "falsifier.views.plotting": "plot",
     "falsifier.views.progress": "progress",
 }
-_EXPORTS = {
-    public: (module, other or public)
-    for module, names in _NAMES.items()
-    for public, _, other in (name.partition(":") for name in names.split())
-}
-_MODULES = {
-    "analysis": "falsifier.campaigns.analysis",
-    "events": "falsifier.search.events",
-    "plotting": "falsifier.views.plotting",
-}
+_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
-__all__ = [
-    "DEFAULT_ENGINE",
-    "ENGINES",
-    "VARIANTS",
-    "AsksLLM",
-    "Assurance",
-    "Breach",
-    "Budget",
-    "CampaignRequest",
-    "Candidate",
-    "Chat",
-    "Component",
-    "Confirmation",
-    "Connection",
-    "Coupling",
-    "Coverage",
-    "Diagnosis",
-    "Difference",
-    "Engine",
-    "Evaluation",
-    "Event",
-    "Exchange",
-    "Experiment",
-    "Explanation",
-    "FalsifierError",
-    "FmuModel",
-    "Formalized",
-    "Formula",
-    "Frame",
-    "Freedom",
-    "FunctionModel",
-    "InputRange",
-    "LLMEngine",
-    "LLMSettings",
-    "LintFinding",
-    "Listener",
-    "Margin",
-    "Method",
-    "Model",
-    "ModelInfo",
-    "Monitor",
-    "ParameterRange",
-    "Problem",
-    "ProblemSource",
-    "Reading",
-    "Replayed",
-    "Requirement",
-    "Result",
-    "RobustnessMap",
-    "ScriptedChat",
-    "SearchSpace",
-    "Searched",
-    "Shrunk",
-    "Signal",
-    "Spent",
-    "StoredCounterexample",
-    "System",
-    "Trajectory",
-    "Variable",
-    "Verdict",
-    "__version__",
-    "analysis",
-    "assess",
-    "confirm",
-    "connect",
-    "coverage",
-    "cross",
-    "evaluate",
-    "events",
-    "explain",
-    "falsify",
-    "formalize",
-    "lint",
-    "load_counterexample",
-    "load_problem",
-    "load_problems",
-    "make_engine",
-    "margin",
-    "monitor_for",
-    "parse",
-    "plot",
-    "plotting",
-    "preview",
-    "progress",
-    "read_info",
-    "read_package",
-    "replay",
-    "resume",
-    "resume_campaign",
-    "robustness_map",
-    "run_campaign",
-    "shrink",
-    "simulate",
-    "suite",
-]
-
-
-def _register_formatters() -> None:
-    """Let IPython show the values of this package as tables and figures."""
-    from falsifier.views.notebook import register
-
-    register()
-
-
-if "IPython" in sys.modules:
-    _register_formatters()
+if "IPython" in sys.modules:  # lets it show the values of this package as tables and figures
+    import_module("falsifier.views.notebook").register()
 
 if not TYPE_CHECKING:
+    __all__ = ["__version__", *_PLACES]
 
     def __getattr__(name: str) -> object:
         """Import a public name from its module on first use, so that ``import falsifier`` stays cheap."""
-        if name in _MODULES:
-            return import_module(_MODULES[name])
-        if name in _EXPORTS:
-            module, original = _EXPORTS[name]
-            return getattr(import_module(module), original)
-        raise AttributeError(f"module 'falsifier' has no attribute {name!r}")
+        if name not in _PLACES:
+            raise AttributeError(f"module 'falsifier' has no attribute {name!r}")
+        module = import_module(_PLACES[name])
+        return getattr(module, name) if hasattr(module, name) else import_module(f"{module.__name__}.{name}")
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(["__version__", *_PLACES])

@@ -36,6 +36,7 @@ from falsifier.cli.options import (
     DEFAULT_PARAMETERIZATION,
     Parameterized,
     budget_option,
+    changes_in,
     directory_argument,
     engine_option,
     jobs_option,
@@ -43,7 +44,6 @@ from falsifier.cli.options import (
     limit_options,
     out_option,
     parameterization_option,
-    policy_changes,
     policy_options,
     quiet_option,
     seed_option,
@@ -144,7 +144,7 @@ def bench(
         else [s for target in targets for s in sources_of(ProblemSource(target=target, profile=profile))]
     )
     check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
-    changes = {"changes": policy_changes(options)}
+    changes = {"changes": changes_in(options)}
     problems = [
         source.model_copy(update=changes | {"parameterization": kind, "context": (*source.context, *context)})
         for source in problems
@@ -184,7 +184,13 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     can also be opened after the run has ended.
     """
     if page:
-        _serve(directory, allow_stop=allow_stop)
+        import asyncio
+
+        from falsifier.views.report.watch import serve
+
+        page_of = serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop)
+        with suppress(KeyboardInterrupt):
+            asyncio.run(page_of)
         return
     refuse("applies to --page only", allow_stop=allow_stop)
     follower = Follower(directory)
@@ -199,16 +205,6 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
-
-
-def _serve(directory: Path, *, allow_stop: bool) -> None:
-    """Serve the page until the user ends it."""
-    import asyncio
-
-    from falsifier.views.report.watch import serve
-
-    with suppress(KeyboardInterrupt):
-        asyncio.run(serve(directory, announce=lambda address: say(f"page: {address}"), allow_stop=allow_stop))
 
 
 def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:

@@ -44,6 +44,9 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
 
+# What is printed: lines of text, and the content of the same as JSON.
+Told = tuple[list[str], dict[str, Any]]
+
 
 @command()
 @run_argument
@@ -96,11 +99,12 @@ def explain(
         refuse("add --shrink or --map", budget=budget, out=out)
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
-        _shrink(case, rights, budget=budget or SHRINK_BUDGET, at_most=at_most, out=out, as_json=as_json)
+        lines, content = _shrink(case, rights, budget or SHRINK_BUDGET, at_most, out)
     elif mapped:
-        _map(case, run, rights, budget=budget or MAP_BUDGET, out=out, as_json=as_json)
+        lines, content = _map(case, run, rights, budget or MAP_BUDGET, out)
     else:
-        _explain(case, run, rights, as_json=as_json)
+        lines, content = _explain(case, run, rights)
+    say(as_shown("\n".join(lines), content, as_json=as_json))
 
 
 @command()
@@ -164,14 +168,8 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
 
 
 def _shrink(
-    case: Case,
-    rights: Mapping[str, Any],
-    *,
-    budget: int,
-    at_most: float | None,
-    out: Path | None,
-    as_json: bool,
-) -> None:
+    case: Case, rights: Mapping[str, Any], budget: int, at_most: float | None, out: Path | None
+) -> Told:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
     # A link is followed, not replaced.
     file = (
@@ -226,27 +224,26 @@ def _shrink(
     )
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
     lines.append(f"  files          {', '.join(map(str, files))}")
-    say(as_shown("\n".join(map(one_line, lines)), content, as_json=as_json))
+    return list(map(one_line, lines)), content
 
 
 def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
     from falsifier.counterexamples.export.tables import input_table, write_csv
 
-    files = [write_csv(input_table(problem, evaluation.candidate), file, problem.model)]
-    picture = draw_evaluation(problem, evaluation, file.with_suffix(".png"))
-    return files if picture is None else [*files, picture]
+    written = write_csv(input_table(problem, evaluation.candidate), file, problem.model)
+    return [written, *draw_evaluation(problem, evaluation, file.with_suffix(".png"))]
 
 
-def _explain(case: Case, run: Path, rights: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print what broke, and what resetting each input alone comes to."""
+def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
+    """Tell what broke, and what resetting each input alone comes to."""
     from falsifier.counterexamples.explain import explain
 
-    picture = None
+    pictures: list[Path] = []
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         explanation = explain(problem, evaluation)
         if case.is_miss:
-            picture = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
+            pictures = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
     with suppress(OSError):  # it is printed anyway
         write_whole(beside(case.file, EXPLANATION), f"{explanation.text}\n")
     content = {
@@ -254,17 +251,13 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any], *, as_json: bool)
         "text": explanation.text,
         "effects": [asdict(effect) for effect in explanation.effects],
         "about": str(case.place),
-        "picture": picture and str(picture),
+        "picture": next(map(str, pictures), None),
     }
-    lines = [*_about(case, problem, run), explanation.text]
-    if picture is not None:
-        lines.append(f"picture: {picture}")
-    say(as_shown("\n".join(lines), content, as_json=as_json))
+    drawn = [f"picture: {picture}" for picture in pictures]
+    return [*_about(case, problem, run), explanation.text, *drawn], content
 
 
-def _map(
-    case: Case, run: Path, rights: Mapping[str, Any], *, budget: int, out: Path | None, as_json: bool
-) -> None:
+def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Path | None) -> Told:
     """Draw the robustness around it."""
     from falsifier.views.plotting import plot_robustness_map, save_figure
 
@@ -281,8 +274,8 @@ def _map(
         "about": str(case.place),
         "picture": str(picture),
     }
-    lines = [*_about(case, problem, run), f"{problem.name}: {found.text}", f"  picture        {picture}"]
-    say(as_shown("\n".join(lines), content, as_json=as_json))
+    told = f"{problem.name}: {found.text}"
+    return [*_about(case, problem, run), told, f"  picture        {picture}"], content
 
 
 def _about(case: Case, problem: Problem, named: Path) -> list[str]:

@@ -19,28 +19,19 @@ PICTURES = (".svg", ".png", ".pdf")
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
     """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
 
-    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it.
-
-    Args:
-        confirmation: the violation.
-        directory: where to write.
-        name: name of the JSON file; the picture has the same name, with the extension .png.
+    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it. It
+    has the name of the JSON file, with the extension .png.
 
     Raises:
         OSError: if the JSON file cannot be written.
     """
     data = save(to_store(confirmation), directory / name)
-    picture = draw_evaluation(confirmation.problem, confirmation.evaluation, data.with_suffix(".png"))
-    return [data] if picture is None else [data, picture]
+    picture = data.with_suffix(".png")
+    return [data, *draw_evaluation(confirmation.problem, confirmation.evaluation, picture)]
 
 
 def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
-    """Check that writing a file destroys nothing but an earlier output of the same kind.
-
-    Args:
-        path: where to write.
-        beginnings: how outputs of this kind begin.
-        kept: a file that must stay.
+    """Check that writing a file destroys no ``kept`` one, and only what has a beginning of its kind.
 
     Raises:
         SpecError: if something else is there.
@@ -79,17 +70,17 @@ def in_existing_folder(path: Path) -> Path:
     return path
 
 
-def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> Path | None:
+def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> list[Path]:
     """Write the picture of an evaluation with its trajectory; see ``draw``."""
     from falsifier.views.plotting import plot_evaluation
 
     return draw(lambda: plot_evaluation(problem, evaluation), picture)
 
 
-def draw(plot: Callable[[], Any], picture: Path) -> Path | None:
+def draw(plot: Callable[[], Any], picture: Path) -> list[Path]:
     """Write what ``plot`` returns, a figure; return its path.
 
-    None if it cannot be drawn or written, which is said on stderr.
+    No path if it cannot be drawn or written, which is said on stderr.
     """
     from falsifier.views.plotting import save_figure
 
@@ -97,5 +88,5 @@ def draw(plot: Callable[[], Any], picture: Path) -> Path | None:
         save_figure(plot(), picture)
     except Exception as error:  # whatever a drawing library thinks of values and names that others chose
         warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
-        return None
-    return picture
+        return []
+    return [picture]

@@ -1,7 +1,6 @@
 """``falsifier info`` and ``falsifier init``: what an FMU holds, and a spec for it."""
 
 import shlex
-from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import asdict, replace
 from os.path import relpath
@@ -12,7 +11,7 @@ import click
 
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import in_existing_folder
-from falsifier.cli.options import PATH, json_option, out_option, policy_changes, policy_options
+from falsifier.cli.options import PATH, changes_in, json_option, out_option, policy_options
 from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
 from falsifier.core.files import bundled
@@ -24,7 +23,7 @@ from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.spec import read_spec
-from falsifier.views.model_text import NO_INTERFACE, diagram_text, info_text, model_json
+from falsifier.views.model_text import NO_INTERFACE, info_text, model_json, simulink_text
 
 if TYPE_CHECKING:
     from falsifier.fmu import System
@@ -44,60 +43,33 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
     is_flag=True,
     help="Simulate at the step and at half of it, and show the largest differences between the outputs.",
 )
-@click.option("--names", is_flag=True, help="For a Simulink file: show only the names.")
-@click.option(
-    "--diagram",
-    "drawn",
-    is_flag=True,
-    help="Show the components of a system in the order in which they step, and what feeds what.",
-)
 @policy_options
 @json_option
-def info(
-    *,
-    fmu: Path,
-    everything: bool,
-    checked: bool,
-    names: bool,
-    drawn: bool,
-    as_json: bool,
-    **options: Any,
-) -> None:
+def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options: Any) -> None:
     """Show an FMU's interfaces, variables, units and ranges, or those of a system of FMUs.
 
     FILE is an FMU, the name of a bundled FMU (AT) or of a bundled requirement (AT1), or a spec file; for the
     last two, their FMU or system is shown. A Simulink file (.slx, .mdl) is shown as blocks, lines and charts.
     """
+    from falsifier.context.simulink import read_diagram
     from falsifier.fmu import read_info
 
     if fmu.suffix.lower() in SIMULINK:
-        refuse("applies to FMUs only", all=everything, check=checked, diagram=drawn)
-        say(_simulink(fmu, names=names, as_json=as_json))
+        refuse("applies to FMUs only", all=everything, check=checked)
+        diagram = read_diagram(fmu)
+        say(as_shown(simulink_text(diagram), asdict(diagram), as_json=as_json))
         return
-    refuse("applies to Simulink files only", names=names)
-    source, changes = _named(fmu), policy_changes(options)
-    if drawn:
-        refuse("leave it out: --diagram shows connections only", json=as_json, check=checked, all=everything)
-        if isinstance(source, Path):
-            raise SpecError(f"{fmu} is a single FMU, which has no connections; --diagram shows systems")
-        say(diagram_text(source))
-        return
+    source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     rights = rights_of(_spec_of(fmu), [changes])
-    found = replace(found, notes=(*found.notes, _rights_note(*rights)))
+    try:
+        note = rights_text(*rights)
+    except (MachineError, ModelError) as error:  # the description can be shown all the same
+        note = f"FMUs cannot be simulated now: {error}"
+    found = replace(found, notes=(*found.notes, note))
     say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
     if checked and not as_json:
         _print_convergence(source, found, *rights)
-
-
-def _simulink(file: Path, *, names: bool, as_json: bool) -> str:
-    from falsifier.context.simulink import names_text, read_diagram
-    from falsifier.views.model_text import simulink_text
-
-    diagram = read_diagram(file)
-    return as_shown(
-        names_text(diagram) if names else simulink_text(diagram), asdict(diagram), as_json=as_json
-    )
 
 
 @command()
@@ -206,14 +178,6 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     if step == experiment.output_interval:
         return f"this step {kept}"
     return f"step_size = {step:g} {kept}; set it in [model]"
-
-
-def _rights_note(allow: Sequence[str], deny: Sequence[str]) -> str:
-    """Return what the FMU may do; its description can be shown where no FMU can be run."""
-    try:
-        return rights_text(allow, deny)
-    except (MachineError, ModelError) as error:
-        return f"FMUs cannot be simulated now: {error}"
 
 
 def _named(given: Path) -> "Path | System":

@@ -64,25 +64,24 @@ def variant_option(*, multiple: bool = False) -> Decorator:
     )
 
 
-api_base_option = click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server.")
-
-
 anonymous_option = click.option("--anonymous", is_flag=True, help="Use neutral names in prompts.")
-
-
-llm_option_option = click.option(
-    "--llm-option",
-    "llm_options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per million "
-    "tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. Repeatable.",
-)
 
 
 def connection_options(command: Function) -> Function:
     """Add how to reach a language model, and what it costs."""
-    return add(command, api_base_option, llm_option_option)
+    return add(
+        command,
+        click.option("--api-base", metavar="URL", help="Address of an OpenAI-compatible server."),
+        click.option(
+            "--llm-option",
+            "llm_options",
+            multiple=True,
+            metavar="NAME=VALUE",
+            help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per "
+            "million tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. "
+            "Repeatable.",
+        ),
+    )
 
 
 def asking_options(command: Function) -> Function:
@@ -150,10 +149,7 @@ def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
 def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIMULATIONS) -> "Budget":
     """Take the values of budget_option and limit_options out of a command's keyword arguments.
 
-    Args:
-        options: the arguments.
-        asks: whether a language model is named.
-        usual: maximum number of simulations if none is given.
+    Without a maximum number of simulations, the usual one applies; ``asks``: a language model is named.
 
     Raises:
         click.UsageError: if a language model is limited that is not named.
@@ -169,9 +165,7 @@ def read_budget(options: dict[str, Any], *, asks: bool, usual: int = DEFAULT_SIM
 def check_context(named: Sequence[str], engines: Sequence[str | None]) -> None:
     """Refuse context that nothing reads.
 
-    Args:
-        named: values of ``--context``.
-        engines: engines without a language model, None for the default one; empty if one is asked.
+    Engines are those without a language model, None for the default one; none if a language model is asked.
 
     Raises:
         click.UsageError: naming the option.

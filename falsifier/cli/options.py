@@ -125,11 +125,14 @@ def policy_options(command: Function) -> Function:
     )
 
 
-def policy_changes(options: dict[str, Any]) -> "ModelChanges":
-    """Take the values of policy_options out of a command's keyword arguments."""
+_CHANGES = ("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "allow", "deny")
+
+
+def changes_in(options: dict[str, Any]) -> "ModelChanges":
+    """Take out of a command's keyword arguments what changes a problem, as far as the command has it."""
     from falsifier.problem.shorthand import changes_from_options
 
-    return changes_from_options(allow=options.pop("allow"), deny=options.pop("deny"))
+    return changes_from_options(**{name: options.pop(name) for name in _CHANGES if name in options})
 
 
 def interface_option(text: str) -> Decorator:
@@ -203,48 +206,29 @@ def requirement_options(command: Function) -> Function:
     return add(command, stl_option(), problem_options)
 
 
-def source_of(target: str, chosen: Parameterized, **more: Any) -> "ProblemSource":
-    """Return where a problem comes from.
-
-    Args:
-        target: as on the command line.
-        chosen: value of ``--parameterization``.
-        more: other fields of ProblemSource.
+def problem_source(options: dict[str, Any]) -> "ProblemSource":
+    """Take the values of requirement_options, as far as a command has them, out of its keyword arguments.
 
     Raises:
         click.UsageError: if a profile is chosen from an FMU.
     """
     from falsifier.problem.source import ProblemSource
 
+    chosen = options.pop("parameterization")
     source = ProblemSource(
-        target=target,
+        target=options.pop("target"),
+        stl=options.pop("stl"),
         profile=chosen.profile,
         parameterization=chosen.kind or DEFAULT_PARAMETERIZATION,
         shortest_piece=chosen.shortest_piece,
-        **more,
+        changes=changes_in(options),
+        context=options.pop("context", ()),
     )
     if chosen.profile is not None and source.parts.kind == "fmu":
         raise click.UsageError(
             f"--parameterization {chosen.profile}: only specs have profiles; expected free or fixed"
         )
     return source
-
-
-_CHANGES = ("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "allow", "deny")
-
-
-def problem_source(options: dict[str, Any]) -> "ProblemSource":
-    """Take the values of requirement_options out of a command's keyword arguments.
-
-    Raises:
-        click.UsageError: if a profile is chosen from an FMU.
-    """
-    from falsifier.problem.shorthand import changes_from_options
-
-    changes = changes_from_options(**{name: options.pop(name) for name in _CHANGES})
-    taken = {name: options.pop(name) for name in ("target", "stl")}
-    chosen = options.pop("parameterization")
-    return source_of(chosen=chosen, changes=changes, context=options.pop("context", ()), **taken)
 
 
 def engine_option(*, multiple: bool = False) -> Decorator:

@@ -54,10 +54,10 @@ def report(
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
+        warn(f"{arch_comp} written")
     if csv_file is not None:
         csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
-    for written in filter(None, (arch_comp, csv_file)):
-        warn(f"{written} written")
+        warn(f"{csv_file} written")
     if markdown and out is None:
         say(markdown_report(*directories), nl=False)
         return
@@ -84,8 +84,8 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     picture = directory / "coverage.png" if out is None else checked_picture(out)
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
     drawn = draw(lambda: plot_coverage(found, name), picture)
-    text = coverage_text(found, name) + (f"\npicture: {drawn}" if drawn else "")
-    content = {"requirements": name, **coverage_json(found), "picture": drawn and str(drawn)}
+    text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
+    content = {"requirements": name, **coverage_json(found), "picture": next(map(str, drawn), None)}
     say(as_shown(text, content, as_json=as_json))
 
 

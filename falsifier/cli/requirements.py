@@ -11,12 +11,11 @@ from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.options import (
-    Parameterized,
     budget_option,
     json_option,
     out_option,
     parameterization_option,
-    source_of,
+    problem_source,
     stl_option,
     target_argument,
 )
@@ -44,9 +43,7 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
     note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares",
 )
 @json_option
-def check(
-    *, target: str, parameterization: Parameterized, stl: str | None, budget: int, as_json: bool
-) -> None:
+def check(*, budget: int, as_json: bool, **options: Any) -> None:
     """Check a spec file, and find requirements that say nothing.
 
     First, keys, signals, ranges and formulas are checked. Then it looks for parts that cannot fail or hold,
@@ -55,7 +52,8 @@ def check(
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = source_of(target, parameterization, stl=stl)
+    source = problem_source(options)
+    target = source.target
     if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
         raise SpecError(
             f"{target}: no requirement to check; add --stl 'G[0,10] (SIGNAL <= 1)', or give a spec "
@@ -100,16 +98,7 @@ def _lines(finding: LintFinding) -> list[str]:
 @connection_options
 @click.option("--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec.")
 @out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
-@json_option
-def formalize(
-    *,
-    target: str,
-    sentence: str,
-    choose: int | None,
-    out: Path | None,
-    as_json: bool,
-    **options: Any,
-) -> None:
+def formalize(*, target: str, sentence: str, choose: int | None, out: Path | None, **options: Any) -> None:
     """Turn a requirement in words into formulas, and write the chosen one into a spec.
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
@@ -118,7 +107,7 @@ def formalize(
     """
     from falsifier.problem.templates import TEMPLATES
     from falsifier.problem.writing import subject_of
-    from falsifier.views.analyses_text import formalized_json, formalized_text
+    from falsifier.views.analyses_text import formalized_text
 
     settings = llm_settings(options)
     if settings is None:
@@ -131,10 +120,6 @@ def formalize(
     from falsifier.analyses.formalize import formalize as ask
 
     found = ask(target, sentence, settings)
-    if as_json:
-        written = None if choose is None else _write(found, choose, out)
-        say(as_shown("", formalized_json(found) | {"written": written}, as_json=True))
-        return
     say(formalized_text(found))
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")

@@ -132,5 +132,4 @@ def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path
     rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
     files = [write_whole(out / "trajectory.csv", csv_text([["time", *trajectory.names], *rows]))]
     files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))
-    picture = draw_evaluation(drawn, evaluation, out / "trajectory.png")
-    return files if picture is None else [*files, picture]
+    return [*files, *draw_evaluation(drawn, evaluation, out / "trajectory.png")]

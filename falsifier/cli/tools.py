@@ -16,7 +16,7 @@ from falsifier.cli.options import PATH, budget_option, directory_argument, json_
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
-from falsifier.counterexamples.store import load
+from falsifier.counterexamples.store import load_counterexample
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
@@ -62,7 +62,7 @@ def _repair_run(directory: Path) -> list[str]:
     findings = repair_run(directory)
     for path in sorted(directory.glob("counterexample*.json")):
         try:
-            load(path)
+            load_counterexample(path)
         except SpecError as error:
             findings.append(f"{error}; kept as {set_aside(path).name}, falsifier replay writes it again")
     return findings

@@ -12,7 +12,7 @@ from falsifier.counterexamples.store import (
     counterexample_file,
     file_of,
     keep_recorded,
-    load,
+    load_counterexample,
     shrunk_file,
 )
 from falsifier.engines.protocol import KNOWN
@@ -131,7 +131,7 @@ def counterexample_case(place: Path) -> Case:
         SpecError: if there is none or more than one.
     """
     file = counterexample_file(place)
-    stored = load(file)
+    stored = load_counterexample(file)
     return Case(
         file, Candidate.from_json(stored.candidate), stored.problem, stored.allow, stored.deny, stored
     )
@@ -238,7 +238,7 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
                 f"{place}: {found}expected a CSV file of inputs (u.csv), a counterexample.json or a run "
                 "directory"
             )
-        return Candidate.from_json(load(place).candidate)
+        return Candidate.from_json(load_counterexample(place).candidate)
     names = manifest.read(place).names
     judged = _judged(place, requirement if requirement in names else names[0])
     if not judged:

@@ -13,7 +13,14 @@ from pathlib import Path
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.counterexamples.shrink import shrink
-from falsifier.counterexamples.store import Replayed, StoredCounterexample, load, replay, save, to_store
+from falsifier.counterexamples.store import (
+    Replayed,
+    StoredCounterexample,
+    load_counterexample,
+    replay,
+    save,
+    to_store,
+)
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.loading import spec_file
@@ -42,7 +49,7 @@ class Database:
     def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
         """Yield the stored counterexamples of a problem, by file name."""
         for path in sorted(self._place(problem).glob("*.json")):
-            yield path, load(path)
+            yield path, load_counterexample(path)
 
     def _place(self, problem: Problem) -> Path:
         spec = None if problem.source is None else spec_file(problem.source)

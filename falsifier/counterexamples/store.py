@@ -146,7 +146,7 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     return write_whole(path, seal(json.dumps(content, indent=2)))
 
 
-def load(path: Path | str) -> StoredCounterexample:
+def load_counterexample(path: Path | str) -> StoredCounterexample:
     """Read a counterexample file, or the counterexample in a run directory.
 
     Raises:

@@ -19,12 +19,7 @@ _SHOWN = 8
 
 
 def coverage_text(found: Coverage, name: str) -> str:
-    """Format coverage as tables: what was searched, what of it was not tried, what the system did.
-
-    Args:
-        found: what was tried.
-        name: of the requirement or the run.
-    """
+    """Format coverage as tables: what was searched, what of it was not tried, what the system did."""
     count = sum(failure.count for failure in found.failures)
     failed = f", and {counted(count, 'failed one')}" if count else ""
     lines = [f"{name}: what {counted(found.simulations, 'simulation')} tried{failed}"]
@@ -172,33 +167,6 @@ def formalized_text(found: Formalized) -> str:
     return "\n".join(lines)
 
 
-def formalized_json(found: Formalized) -> dict[str, Any]:
-    """Return the same as a JSON object."""
-    return {
-        "sentence": found.sentence,
-        "readings": [
-            {
-                "formula": str(r.formula),
-                "words": r.words,
-                "meaning": r.meaning,
-                "nominal_robustness": r.nominal and r.nominal.robustness,
-            }
-            for r in found.readings
-        ],
-        "differences": [
-            {
-                "first": d.first,
-                "second": d.second,
-                "only_first": _points(d.only_first),
-                "only_second": _points(d.only_second),
-            }
-            for d in found.differences
-        ],
-        "rejected": list(found.rejected),
-        "spent": {"calls": found.spent.calls, "tokens": found.spent.tokens, "cost": found.spent.cost},
-    }
-
-
 def _reading_lines(number: int, reading: Reading) -> Iterator[str]:
     yield f"{number}. {reading.formula}"
     yield f"   in words   {reading.words}"
@@ -222,20 +190,6 @@ def _difference_lines(difference: Difference) -> Iterator[str]:
         if trajectory is not None:
             yield f"only {number}, not {rest}, is satisfied by (0 to {trajectory.times[-1]:g} s)"
             yield from (f"   {line}" for line in trace_lines(trajectory))
-
-
-def _points(trajectory: Trajectory | None) -> dict[str, list[list[float]]] | None:
-    """Return the steps of each signal as [time, value]."""
-    if trajectory is None:
-        return None
-    return {
-        name: [
-            [float(trajectory.times[k]), float(column[k])]
-            for k in range(len(column))
-            if k == 0 or column[k] != column[k - 1]
-        ]
-        for name, column in trajectory.columns.items()
-    }
 
 
 _BARS = "▁▂▃▄▅▆▇█"

@@ -8,7 +8,7 @@ from falsifier.campaigns import Progress, RunProgress
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.terminal import error_console, moving, unbroken
+from falsifier.views.terminal import error_console, live_line, unbroken
 
 Show = Callable[[Progress], None]
 Write = Callable[[str], None]
@@ -30,33 +30,23 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     elif not console.is_terminal:
         yield unbroken(Scoreboard(write))
     else:
-        from rich.live import Live
-        from rich.text import Text
-
-        live = Live(console=console, refresh_per_second=4, transient=True)
-        with moving(live):
-            yield unbroken(Scoreboard(write, lambda text: live.update(Text(one_line(text)))))
+        with live_line(console) as update:
+            yield unbroken(Scoreboard(write, update))
 
 
 class Scoreboard:
-    """Tells of each run that ends, and of the overall progress.
-
-    Args:
-        write: writes a line that stays.
-        update: replaces the line on the overall progress; None: that one is written now and then.
-    """
+    """Tells of each run that ends, and of all of them: in a line that is replaced, or now and then."""
 
     def __init__(self, write: Write, update: Write | None = None) -> None:
         self._write, self._update = write, update
-        self._ended: dict[str, str] = {}
-        self._begun = False
+        self._ended: dict[str, str] | None = None
         self._written, self._overall = 0.0, ""
 
     def __call__(self, progress: Progress) -> None:
         """Write a line per run that ended since the last call."""
         ended = {r.name: str(r.status) for r in progress.runs if r.status not in ("waiting", "running")}
-        if not self._begun:  # runs that ended before this start get no line
-            self._begun, self._ended = True, ended
+        if self._ended is None:  # runs that ended before this start get no line
+            self._ended = ended
             self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
         for run in progress.runs:
             if run.name in ended and self._ended.get(run.name) != run.status:

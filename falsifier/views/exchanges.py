@@ -16,20 +16,16 @@ _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
 def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
-    """Show the exchanges of a recorded run; empty if it asked nothing.
+    """Show the latest turns in which a requirement's engine asked, and how many are left out.
 
-    Args:
-        directory: run directory.
-        requirement: name of the requirement whose engine asked.
-        most: maximum number of turns to show, the latest; the text says what is left out.
+    Empty if the recorded run asked nothing.
     """
     asked = [one for one in iterations(read_journal(directory), requirement) if one.exchanges]
     parts, before = [], tuple[Message, ...]()
     for one in asked[-most:]:
         parts.append(_iteration(one, before))
         before = one.exchanges[-1].messages
-    missing = len(asked) - len(parts)
-    if missing:
+    if missing := len(asked) - len(parts):
         said = f"The first {counted(missing, 'question')} are not shown; the question before sample N: "
         command = el("code", f"falsifier llm prompt {shlex.quote(str(directory))} --at N")
         parts.insert(0, el("p", said, command, class_="note"))
@@ -60,26 +56,19 @@ def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
     known = 0
     while known < min(len(before), len(exchange.messages)) and before[known] == exchange.messages[known]:
         known += 1
-    prompt = [
-        el("p", f"{counted(known, 'message')} as in the question before", class_="note")
-        if known
-        else Html(""),
-        *(join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]),
-    ]
     usage, reply = exchange.usage, exchange.reply
-    return join(
-        el(
-            "details",
-            el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}"),
-            *prompt,
-            class_="prompt",
-        ),
+    prompt = [el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}")]
+    if known:
+        prompt.append(el("p", f"{counted(known, 'message')} as in the question before", class_="note"))
+    prompt += [join(el("p", el("b", m.role)), _text(m.content)) for m in exchange.messages[known:]]
+    parts = [
+        el("details", *prompt, class_="prompt"),
         el("p", f"Reply of {exchange.llm}: {counted(usage.completion_tokens, 'token')}"),
         _text(reply.text.strip() if reply else "(none)"),
-        el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem)
-        if exchange.problem
-        else Html(""),
-    )
+    ]
+    if exchange.problem:
+        parts.append(el("p", el("b", "Rejected: " if reply else "Failed: "), exchange.problem))
+    return join(*parts)
 
 
 def _text(text: str) -> Html:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from falsifier.core.literals import plain
 
-_VOID = frozenset({"br", "hr", "img", "link", "meta"})
+_VOID = frozenset({"br", "hr", "img", "input", "link", "meta"})
 # Notebook front ends align table cells to the right by default.
 _LEFT = "text-align: left"
 
@@ -21,10 +21,7 @@ class Html(str):
 def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
     """Make an element; children that are not Html are escaped, attributes always.
 
-    Args:
-        tag: name of the element.
-        children: content.
-        attributes: ``class_`` stands for ``class``, other underscores for hyphens; None omits an attribute.
+    ``class_`` stands for ``class``, other underscores for hyphens; None omits an attribute.
 
     >>> el("p", "1 < 2", class_="a")
     '<p class="a">1 &lt; 2</p>'

@@ -1,17 +1,13 @@
-"""What people see of a model: an FMU, a Simulink file, a system of FMUs; as text or JSON.
+"""What people see of a model: an FMU, a system of FMUs, a Simulink file; as text or JSON.
 
 The tables are plain text: a table library needs minutes for the 100,000 variables of large models.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import counted
-from falsifier.fmu import System
-from falsifier.fmu.process.network import SYSTEM, Link, Place
-from falsifier.fmu.systems.step_order import late_links
 from falsifier.views.text import aligned
 
 if TYPE_CHECKING:
@@ -27,12 +23,7 @@ _WIDEST_COLUMN = 40
 
 
 def info_text(info: ModelInfo, *, everything: bool = False) -> str:
-    """Return what an FMU says of itself for people.
-
-    Args:
-        info: the description.
-        everything: whether to list all variables, internal ones too.
-    """
+    """Return what an FMU says of itself for people; everything: internal variables too."""
     lines = [
         f"{info.name}  FMI {info.fmi_version}, {', '.join(info.interfaces) or NO_INTERFACE}",
         *([info.description] if info.description else []),
@@ -100,63 +91,3 @@ def simulink_text(diagram: "Diagram") -> str:
         f"{counted(len(systems), 'system')}, {counted(len(diagram.charts), 'chart')}"
     )
     return f"{size}\n{structure_text(diagram)}"
-
-
-# Maximum number of inputs, and of outputs, that are shown of a component.
-_MOST_PORTS = 40
-
-
-def diagram_text(system: System) -> str:
-    """Return what feeds what in a system: components in the order in which they step, with their ports."""
-    network, order = system.network, system.network.order
-    late = set(late_links(network.links, order, network.loops))
-    if network.coupling.method == "jacobi":
-        late = {link for link in network.links if link.source.member != SYSTEM}
-    ends: dict[Place, list[str]] = {}
-    for link in network.links:
-        fed_by = f"{network.title(link.source)}{_conversion(link)}{'  (late)' if link in late else ''}"
-        ends[link.target] = [fed_by]
-        ends.setdefault(link.source, []).append(network.title(link.target))
-    count = counted(len(order), "component") + (", in the order in which they step" if len(order) > 1 else "")
-    lines = [f"{system.name}: {count} ({network.coupling.method})"]
-    for first, last in network.loops:
-        names = ", ".join(network.members[k].name for k in order[first:last])
-        lines.append(f"{names}: repeated until the outputs agree")
-    outer = [(name, place) for name, place in network.places.items() if place.member == SYSTEM]
-    lines += [f"   input of the system: {name} -> {_joined(ends, place)}" for name, place in outer]
-    for number, position in enumerate(order, start=1):
-        member = network.members[position]
-        step = "" if member.step is None else f", every {member.step:.6g} s"
-        lines += ["", f"{number:2} {member.name}  ({member.path.name}, {member.interface}{step})"]
-        lines += _port_lines(member.description.info, position, ends)
-    if late:
-        lines += ["", "(late): the value of the previous communication point"]
-    return "\n".join(lines)
-
-
-def _port_lines(info: ModelInfo, position: int, ends: Mapping[Place, Sequence[str]]) -> Iterator[str]:
-    """Yield a line for each input and output of a component; of many, those that are connected."""
-    ports: list[tuple[str, str, str]] = []
-    left_out = 0
-    for arrow, variables in (("<-", info.inputs), ("->", info.outputs)):
-        found = [v for v in variables if not v.alias_of]
-        if len(found) > _MOST_PORTS:
-            found.sort(key=lambda v: Place(position, v.name) not in ends)
-        left_out += len(found[_MOST_PORTS:])
-        for v in found[:_MOST_PORTS]:
-            label = f"{v.name} [{v.unit}]" if v.unit else v.name
-            ports.append((label, arrow, _joined(ends, Place(position, v.name))))
-    width = max((len(label) for label, _, _ in ports), default=0)
-    yield from (f"     {label:{width}}  {arrow}  {other}" for label, arrow, other in ports)
-    if left_out:
-        yield f"     ... and {left_out} more that are not connected"
-
-
-def _joined(ends: Mapping[Place, Sequence[str]], place: Place) -> str:
-    return ", ".join(ends.get(place, ["not connected"]))
-
-
-def _conversion(link: Link) -> str:
-    factor = "" if link.factor == 1.0 else f" * {link.factor:.6g}"
-    offset = "" if link.offset == 0.0 else f" {link.offset:+.6g}"
-    return f"{factor}{offset}{' (extrapolated)' if link.is_linear else ''}"

@@ -1,8 +1,7 @@
 """The display of a running search: live on a terminal or in a notebook, plain lines otherwise."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,6 +12,7 @@ from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.events import (
+    Asked,
     Confirmed,
     Evaluated,
     Event,
@@ -25,7 +25,7 @@ from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
-from falsifier.views.terminal import error_console, moving, unbroken
+from falsifier.views.terminal import error_console, live_line, unbroken
 from falsifier.views.text import outcome_text
 
 if TYPE_CHECKING:
@@ -44,8 +44,14 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
     if quiet:
         yield lambda event: None
     elif console.is_terminal and not console.is_jupyter:
-        with _live_display(console) as display:
-            yield display
+        with live_line(console) as update:
+            line = _Line(lambda line: update(f"{line.title}: {line.text}"), _writer(console))
+
+            def tell(_name: str, reached: float, stop_time: float) -> None:
+                update(f"{line.title}: simulated {reached:.4g} of {stop_time:g} s")
+
+            with watching(tell):
+                yield unbroken(line)
     else:
         yield progress()
 
@@ -57,121 +63,86 @@ def progress() -> Listener:
     """
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
-        return _NotebookDisplay()
-    news = News()
+        return _Line(_show_in_notebook, keep=None)  # there is no place for more lines
+    news, write = News(), _writer(console)
 
     def show(event: Event) -> None:
-        for line in news.lines(event):
-            console.print(one_line(line), highlight=False, markup=False, soft_wrap=True)
+        told = news.lines(event)
+        if isinstance(event, Evaluated):
+            told += news.pace(event.spent, told=bool(told))
+        for line in told:
+            write(line)
 
     return unbroken(show)
 
 
-@contextmanager
-def _live_display(console: "Console") -> Iterator[Listener]:
-    """Show a bar with the best robustness so far, and above it what is to be kept."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    bar = Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(elapsed_when_finished=True),
-        console=console,
-        transient=True,
-    )
-    state, news = _State(), News()
-    with moving(bar):
-        task = bar.add_task("starting", total=None, note="")
-
-        def show(event: Event) -> None:
-            for line in news.kept(event):
-                bar.console.print(one_line(line), highlight=False, markup=False)
-            if state.follow(event, news):
-                bar.update(
-                    task, description=state.title, total=state.total, completed=state.done, note=state.note
-                )
-
-        def tell(_name: str, reached: float, stop_time: float) -> None:
-            bar.update(task, note=f"simulated {reached:.4g} of {stop_time:g} s")
-
-        with watching(tell):
-            yield unbroken(show)
+def _writer(console: "Console") -> Callable[[str], None]:
+    return lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
 
 
-class _NotebookDisplay:
-    """Shows a run as one line below the cell and updates it in place.
+def _show_in_notebook(line: "_Line") -> None:
+    """Show a run below the cell and update it in place.
 
     It needs only IPython and no widgets, so every front end shows it and the last line is stored in the file.
     """
+    from IPython.display import HTML, display
 
-    def __init__(self) -> None:
-        self._handle: Any = None
-        self._state, self._news = _State(), News()
-
-    def __call__(self, event: Event) -> None:
-        """Update the line."""
-        if isinstance(event, RunStarted):
-            self._handle, self._state, self._news = None, _State(), News()
-        tuple(self._news.kept(event))  # there is no place for it
-        if not self._state.follow(event, self._news):
-            return
-        from IPython.display import HTML, display
-
-        state = self._state
-        bar = el("progress", value=state.done, max=state.total) if state.total else ""
-        count = counted(state.total or state.done, "simulation")
-        of = f" {state.done} of {count}. " if state.total else f" {count}. "
-        line = HTML(join(el("code", state.title), " ", bar, of, state.note))  # type: ignore[no-untyped-call]
-        if self._handle is None:
-            self._handle = display(line, display_id=True)  # type: ignore[no-untyped-call]
-        else:
-            self._handle.update(line)
+    bar = el("progress", value=line.done, max=line.total) if line.total else ""
+    shown = HTML(join(el("code", line.title), " ", bar, f" {line.text}"))  # type: ignore[no-untyped-call]
+    if line.handle is None:
+        line.handle = display(shown, display_id=True)  # type: ignore[no-untyped-call]
+    else:
+        line.handle.update(shown)
 
 
-@dataclass(slots=True)
-class _State:
-    """What one line says of a run.
+class _Line:
+    """One line on a run that is replaced as it goes on, below the news, or with the latest of them.
 
     Attributes:
         title: the requirements and the engine.
         total: maximum number of simulations; None without a limit.
         done: number of simulations so far.
-        note: the latest news.
+        handle: where it is shown in a notebook.
     """
 
-    title: str = ""
-    total: int | None = None
-    done: int = 0
-    note: str = ""
+    def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None] | None) -> None:
+        self._show, self._keep, self._news = show, keep, News()
+        self._begin("", None)
 
-    def follow(self, event: Event, news: "News") -> bool:
-        """Return whether an event has changed it."""
+    def _begin(self, title: str, total: int | None) -> None:
+        self.title, self.total, self.done = title, total, 0
+        self.handle: Any = None
+        self._seconds, self._note = 0.0, ""
+
+    @property
+    def text(self) -> str:
+        """How far it is, and the latest news."""
+        of = f"{self.done} of " if self.total else ""
+        count = counted(self.total or self.done, "simulation")
+        left = self._seconds / self.done * (self.total - self.done) if self.total and self.done else 0.0
+        rest = f", about {_duration(left)} left" if left >= 1 else ""
+        return f"{of}{count}{rest}. {self._note}"
+
+    def __call__(self, event: Event) -> None:
+        """Show what an event has changed."""
+        if isinstance(event, RunStarted):
+            names = ", ".join(problem.name for problem in event.problems)
+            self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget.simulations)
+        for line in self._news.lines(event):
+            if self._keep is None:
+                self._note = line
+            else:
+                self._keep(line)
         match event:
-            case RunStarted():
-                names = ", ".join(problem.name for problem in event.problems)
-                self.title, self.total = one_line(f"{names}, {event.engines[0]}"), event.budget.simulations
-            case Evaluated():
-                self.done = event.spent.simulations
-                self.note = news.better(event) or self.note or "no successful simulation yet"
-            case Exchanged():
-                self.note = f"LLM replied, {event.spent.tokens} tokens so far"
-            case Confirmed():
-                self.note = f"violation {event.confirmation.outcome}"
+            case Asked():
+                return
+            case Evaluated(spent=spent):
+                self.done, self._seconds = spent.simulations, spent.seconds
+            case Exchanged(spent=spent):
+                self._note = f"LLM replied, {spent.tokens} tokens so far"
             case RunEnded():
-                self.note = f"{event.status}; {self.note}"
-            case _:
-                return False
-        return True
+                self._note = f"{event.status}; {self._note}"
+        self._show(self)
 
 
 class News:
@@ -183,46 +154,35 @@ class News:
         self._least: dict[str, float] = {}
         self._since = Spent()
 
-    def lines(self, event: Event) -> Iterator[str]:
-        """Yield all that is new: what is kept, improvements, causes of failures, or at times the pace."""
+    def lines(self, event: Event) -> list[str]:
+        """Return all that is new: choices, improvements, causes of failures, warnings and confirmations."""
         match event:
             case RunStarted():
+                self._started, self._told, self._least, self._since = event, set(), {}, Spent()
                 known = counted(event.replayed, "evaluation")
                 replayed = f", {known} from the journal" if event.replayed else ""
-                yield from (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
-                yield f"engine {event.engines[0]}{replayed}"
-                yield from self.kept(event)
-            case Evaluated():
-                ended, told = event.evaluation, list[str]()
+                formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
+                return [*formulas, f"engine {event.engines[0]}{replayed}", *_choices(event)]
+            case Evaluated(evaluation=ended, spent=spent):
+                told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
                     told.append(f"simulation {event.index + 1} {outcome_text(ended)}")
-                told += self.kept(event)
-                if better := self.better(event):
-                    told.append(f"simulation {event.index + 1}: {better}")
-                yield from told
-                yield from self._pace(event.spent, told=bool(told))
-            case _:
-                yield from self.kept(event)
-
-    def kept(self, event: Event) -> Iterator[str]:
-        """Yield what should stay on the screen: choices, levels, warnings and confirmations."""
-        match event:
-            case RunStarted():
-                self._started, self._since = event, Spent()
-                yield from _choices(event)
-            case Evaluated(spent=spent) if spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed:
-                if self._is_new("mostly failed"):
-                    yield (
+                many = spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed
+                if many and self._is_new("mostly failed"):
+                    told.append(
                         f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run "
                         "counts as failed if more than half do"
                     )
+                if better := self._better(event):
+                    told.append(f"simulation {event.index + 1}: {better}")
+                return told
             case Confirmed(confirmation=found):
                 # Several requirements may share the search, so it is named.
-                yield f"{found.problem.name}: violation {found.outcome}: {found.reason}"
+                return [f"{found.problem.name}: violation {found.outcome}: {found.reason}"]
             case _:
-                pass
+                return []
 
-    def better(self, event: Evaluated) -> str:
+    def _better(self, event: Evaluated) -> str:
         """Tell the smallest robustness if it has changed, of several requirements by name; else nothing."""
         told = []
         for name, seen in event.judged.items():
@@ -241,7 +201,7 @@ class News:
         self._told.add(key)
         return is_new
 
-    def _pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
+    def pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
         """Tell how fast the search is and what is left of it, if nothing else was told for a while."""
         quiet = spent.seconds - self._since.seconds
         if told or quiet < max(_QUIET, _QUIET_SHARE * spent.seconds):

@@ -5,13 +5,11 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, TypeVar
 
-from falsifier.core.literals import plain
+from falsifier.core.literals import one_line, plain
 from falsifier.core.secrets import redact
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.live import Live
-    from rich.progress import Progress
 
 T = TypeVar("T")
 
@@ -50,12 +48,16 @@ def unbroken(show: Callable[[T], None]) -> Callable[[T], None]:
 
 
 @contextmanager
-def moving(live: "Live | Progress") -> Iterator[None]:
-    """Keep a display moving for as long as the context lasts."""
+def live_line(console: "Console") -> Iterator[Callable[[str], None]]:
+    """Show a line below everything else for as long as the context lasts; yield what replaces its text."""
+    from rich.status import Status
+    from rich.text import Text
+
+    status = Status("", console=console)
     with suppress(OSError):
-        live.start()
+        status.start()
     try:
-        yield
+        yield lambda text: status.update(Text(one_line(text), no_wrap=True, overflow="ellipsis"))
     finally:
         with suppress(OSError):
-            live.stop()
+            status.stop()

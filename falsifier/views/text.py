@@ -151,12 +151,7 @@ def broken_facts(verdict: Verdict | None) -> list[Fact]:
 
 
 def margin_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
-    """Return the robustness, what decided it and when, with the values then.
-
-    Args:
-        verdict: the verdict; without one, there is nothing to tell.
-        units: units of the signals, by name; those without one may be missing.
-    """
+    """Return the robustness, what decided it and when, with the values then; nothing without a verdict."""
     if verdict is None:
         return []
     values = (f"{name} = {value:.6g} {units.get(name, '')}".strip() for name, value in verdict.values.items())
@@ -176,12 +171,9 @@ def fact_lines(facts: Iterable[Fact]) -> list[str]:
 def aligned(
     rows: Iterable[Sequence[str]], *, right: Collection[int] = (), widest: int | None = None
 ) -> list[str]:
-    """Return the rows of a table as lines with aligned columns.
+    """Return the rows of a table as lines with aligned columns, those of some numbers aligned right.
 
-    Args:
-        rows: cells; all rows have the same number.
-        right: numbers of the columns that are aligned right.
-        widest: maximum width of a column; longer cells push the rest of their row to the right.
+    Cells longer than the widest column push the rest of their row to the right.
     """
     rows = list(rows)
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -14,7 +14,7 @@ from falsifier.campaigns import (
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.campaigns.directory import campaign_lock
 from falsifier.counterexamples.case import counterexample_case
-from falsifier.counterexamples.store import load, replay
+from falsifier.counterexamples.store import load_counterexample, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
@@ -155,9 +155,9 @@ def test_requirements_of_the_same_name_are_refused(tmp_path: Path) -> None:
 def test_counterexamples_are_files_that_can_be_replayed(tmp_path: Path) -> None:
     run_campaign(request("hard", "impossible", seeds=1), tmp_path)
     (file,) = tmp_path.rglob("counterexample.json")
-    stored = load(file.parent)
+    stored = load_counterexample(file.parent)
     assert stored.problem == ProblemSource(target="python:tests.problems:hard", parameterization="fixed")
     assert replay(stored, counterexample_case(file).problem()[0]).status == "violates"
     file.unlink()
     resume_campaign(tmp_path)
-    assert load(file) == stored
+    assert load_counterexample(file) == stored

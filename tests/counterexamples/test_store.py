@@ -8,7 +8,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.regression import Database
-from falsifier.counterexamples.store import load, replay, save, to_store
+from falsifier.counterexamples.store import load_counterexample, replay, save, to_store
 from falsifier.errors import JournalError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import evaluate
@@ -63,7 +63,7 @@ def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
     assert json.loads(path.read_text())["problem"]["target"] == "../../my.toml:R"
     monkeypatch.chdir(tmp_path)
     folder.rename(tmp_path / "moved")
-    stored = load(tmp_path / "moved" / path)
+    stored = load_counterexample(tmp_path / "moved" / path)
     loaded, _ = counterexample_case(tmp_path / "moved" / path).problem()
     assert loaded.parameters == {"brake": 0.0, "finalDrive": 3.225}
     assert replay(stored, loaded).status == "violates"
@@ -76,10 +76,10 @@ def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPa
     Path("my.toml").write_text(SPEC.replace("120", "130"))
     with Path("AT.fmu").open("ab") as fmu:
         fmu.write(b"\0")  # a comment after the archive: another file with the same model
-    replayed = replay(load(path), load_problem("my.toml:R"))
+    replayed = replay(load_counterexample(path), load_problem("my.toml:R"))
     assert replayed.status == "does not violate"
     assert replayed.evaluation is not None
-    assert replayed.evaluation.robustness == pytest.approx(10 + load(path).robustness)
+    assert replayed.evaluation.robustness == pytest.approx(10 + load_counterexample(path).robustness)
     assert "the FMU has changed since" in replayed.text
     assert "the requirement has changed from G[0,20] (speed <= 120) to" in replayed.text
 
@@ -108,14 +108,14 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
 def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "c.json").write_text(content)
     with pytest.raises(SpecError, match=f"c.json: .*{message}"):
-        load(tmp_path / "c.json")
+        load_counterexample(tmp_path / "c.json")
 
 
 def test_what_is_not_there_is_said(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="not a run directory"):
-        load(tmp_path)
+        load_counterexample(tmp_path)
     with pytest.raises(SpecError, match="no such file"):
-        load(tmp_path / "gone.json")
+        load_counterexample(tmp_path / "gone.json")
 
 
 def test_a_run_without_the_file_is_read_from_its_journal(
@@ -124,7 +124,7 @@ def test_a_run_without_the_file_is_read_from_its_journal(
     monkeypatch.chdir(folder)
     result = falsify("my.toml:R", "corners", budget=5, directory="run")
     assert result.counterexample is not None
-    stored = load(Path("run"))
+    stored = load_counterexample(Path("run"))
     assert stored.robustness == result.counterexample.evaluation.robustness
     assert replay(stored, load_problem("my.toml:R")).text.count("changed") == 0
     assert json.loads(Path("run/counterexample.json").read_text())["problem"]["target"] == "../my.toml:R"
@@ -147,7 +147,7 @@ def test_a_journal_that_confirms_what_it_does_not_record_as_a_violation_is_named
     with pytest.raises(
         JournalError, match=rf"journal\.jsonl: line {line} confirms .* NEVER, but simulation 3 "
     ):
-        load(tmp_path)
+        load_counterexample(tmp_path)
 
 
 def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
     for name in ("counterexample-A.json", "counterexample-B.json"):
         save(to_store(violation(problem)), tmp_path / name)
     with pytest.raises(SpecError, match=r"several counterexamples; .*counterexample-A\.json"):
-        load(tmp_path)
+        load_counterexample(tmp_path)
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
@@ -182,5 +182,5 @@ def test_rights_move_with_the_file(folder: Path, tmp_path: Path) -> None:
     path = save(to_store(violation(problem)), folder / "c.json")
     assert json.loads(path.read_text())["allow"] == ["write:."]
     folder.rename(tmp_path / "moved")
-    stored = load(tmp_path / "moved" / "c.json")
+    stored = load_counterexample(tmp_path / "moved" / "c.json")
     assert stored.allow is not None and [Path(w[6:]).name for w in stored.allow] == ["moved"]

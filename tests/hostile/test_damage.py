@@ -15,8 +15,7 @@ from click.testing import CliRunner
 from falsifier.campaigns import resume_campaign, run_campaign
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.cli import cli
-from falsifier.counterexamples.store import FILE_NAME, save, to_store
-from falsifier.counterexamples.store import load as load_counterexample
+from falsifier.counterexamples.store import FILE_NAME, load_counterexample, save, to_store
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.scripted import ScriptedChat

@@ -11,7 +11,7 @@ from falsifier.cli import cli
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export import export_counterexample
-from falsifier.counterexamples.store import load, replay
+from falsifier.counterexamples.store import load_counterexample, replay
 from falsifier.errors import JournalError, SpecError
 from tests.command import falsifier
 from tests.fmu.fixtures import path
@@ -50,13 +50,13 @@ def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) 
     assert "plant.u uses the values of the previous communication point" in problem.notes[0]
     found = falsify(problem, engine="corners", budget=5, directory=tmp_path / "run")
     assert found.falsified
-    assert "half the communication step (0.05 s)" in load(tmp_path / "run").reason
+    assert "half the communication step (0.05 s)" in load_counterexample(tmp_path / "run").reason
     hashes = json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]
     assert sorted(Path(p).name for p in hashes) == ["Gain_2.fmu", "Plant_2.fmu", "loop.toml"]
     (again,) = resume(tmp_path / "run")
     assert again.falsified and again.spent.simulations == 1
 
-    stored = load(tmp_path / "run")
+    stored = load_counterexample(tmp_path / "run")
     replayed = replay(stored, problem)
     assert replayed.status == "violates" and replayed.text.startswith("R: still violated")
     evaluation = replayed.evaluation
@@ -121,7 +121,7 @@ def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: py
     result = falsify(problem, engine="corners", budget=2, directory=tmp_path / "run")
     assert result.falsified
     assert list(json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]) == ["loop.ssp"]
-    stored = load(tmp_path / "run")
+    stored = load_counterexample(tmp_path / "run")
     assert replay(stored, problem).status == "violates"
     write(tmp_path / "loop.ssp", ssd.replace('"root"', '"other"'), "Plant_2", "Gain_2")
     with pytest.raises(JournalError, match=r"loop\.ssp has changed since the start"):

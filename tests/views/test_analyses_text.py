@@ -11,7 +11,6 @@ from falsifier.record.manifest import InputRecord
 from falsifier.views.analyses_text import (
     coverage_json,
     coverage_text,
-    formalized_json,
     formalized_text,
     trace_lines,
 )
@@ -64,10 +63,6 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
         "0.0000 US dollars",
     ):
         assert part in text, part
-    content = formalized_json(found)
-    assert [r["formula"] for r in content["readings"]] == [r["formula"] for r in READINGS]
-    assert content["differences"][0]["only_first"]["speed"][0][0] == 0.0
-    assert json.loads(json.dumps(content)) == content
 
 
 def test_a_reason_that_occurred_again_is_told_once_in_one_line() -> None:

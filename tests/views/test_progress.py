@@ -46,7 +46,7 @@ def test_progress_is_one_line_that_ends_with_the_outcome(front_end: Shown) -> No
 def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) -> None:
     with make_display() as display:
         falsify(hard(), "corners", budget=5, listeners=[display])
-    assert "falsified; violation confirmed" in front_end.lines[-1]
+    assert "falsified; HARD: violation confirmed" in front_end.lines[-1]
 
 
 def test_a_cause_is_told_once_and_that_most_have_failed(

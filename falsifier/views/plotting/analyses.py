@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,18 +29,12 @@ _NEVER, _TRIED = "#f2b8b0", "#9dbbe0"
 # A figure has at most this many panels of each kind: inputs, parameters, pairs, outputs.
 _PANELS = 8
 _COLUMNS = 4
-# Shades of each of the two colours of a map.
-_SHADES = 128
 
 
 def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     """Plot what was tried of inputs over time, of parameters and of pairs, and the band of each output.
 
     Of each kind, the first eight are drawn; the pairs are the least tried ones.
-
-    Args:
-        found: what was tried.
-        title: title of the figure.
     """
     from matplotlib.figure import Figure
 
@@ -143,7 +137,12 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     left, right = figure.subplots(1, 2)
     centre, colour = ("counterexample", VIOLATED) if found.original < 0 else ("nearest miss", OUTPUT)
-    _plot_sizes(left, found)
+    violates = found.robustness < 0
+    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
+        if mask.any():
+            left.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
+    left.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    left.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
     left.plot(0.0, found.original, "o", color=colour, label=centre)
     left.legend()
     if len(found.grid) > 1:
@@ -158,18 +157,12 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     return figure
 
 
-def _plot_sizes(ax: "Axes", found: RobustnessMap) -> None:
-    violates = found.robustness < 0
-    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
-        if mask.any():
-            ax.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
-    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
-    ax.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
-
-
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
+    from matplotlib.colors import CenteredNorm
+
     first, second = (found.coordinates[i] for i in found.axes)
-    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", **_scale(found))
+    # Centred, so that red, for violations, begins at 0.
+    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", cmap="RdBu", norm=CenteredNorm())
     low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
     if low < 0 <= high:
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
@@ -177,22 +170,4 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
         ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
     ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
-    bar = ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")
-    ticks = sorted({min(low, 0.0), 0.0, max(high, 0.0)})
-    bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
-
-
-def _scale(found: RobustnessMap) -> dict[str, Any]:
-    """Return a colour scale that contains 0, where red, for violations, ends and blue begins."""
-    from matplotlib import colormaps
-    from matplotlib.colors import ListedColormap, Normalize, TwoSlopeNorm
-
-    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
-    reds = colormaps["Reds_r"](np.linspace(0.1, 0.75, _SHADES))
-    blues = colormaps["Blues"](np.linspace(0.15, 0.8, _SHADES))
-    if low >= 0:
-        return {"cmap": ListedColormap(blues), "norm": Normalize(0.0, high or 1.0)}
-    if high < 0:
-        return {"cmap": ListedColormap(reds), "norm": Normalize(low, 0.0)}
-    both = ListedColormap(np.vstack([reds, blues]))
-    return {"cmap": both, "norm": TwoSlopeNorm(0.0, low, high or -low)}
+    ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from falsifier.analyses.coverage import labels_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
@@ -82,47 +83,37 @@ def panels(
     formula: Formula,
     trajectory: Trajectory,
     candidate: Candidate,
-    inputs: Iterable[Range],
+    inputs: Sequence[Range],
     verdict: Verdict | None,
     labels: Mapping[str, Mapping[int, str]],
     components: Sequence[str] = (),
 ) -> list[Panel]:
     """Make the panels of one simulation: one per compared quantity, then one per searched input.
 
-    Those of a system are grouped by component, after quantities of several components.
-
-    Args:
-        formula: the requirement.
-        trajectory: what was simulated.
-        candidate: the inputs.
-        inputs: the searched inputs.
-        verdict: robustness, and what decided it.
-        labels: names of the numbers of signals that are not real, by signal.
-        components: names of the components of a system.
+    Those of a system are grouped by component, after quantities of several components. Labels are names of
+    the numbers of other signals that are not real, by signal.
     """
+    labels = {**labels, **{r.name: labels_of(r.kind, r.items) for r in inputs if r.kind != "real"}}
     compared: dict[str, _Judged] = {}
     for predicate, window in judged_windows(formula):
         compared.setdefault(str(compared_sides(predicate)[0]), []).append((predicate, window))
     drawn = [
-        _named(_quantity(trajectory, judged, verdict), name, predicate.signals, labels, components)
+        (name, set(quantity.signals), _quantity(trajectory, judged, verdict))
         for name, judged in compared.items()
-        for predicate in [compared_sides(judged[0][0])[0]]
+        for quantity in [compared_sides(judged[0][0])[0]]
     ]
-    drawn += [_named(_input(r, trajectory, candidate), r.name, [r.name], labels, components) for r in inputs]
+    drawn += [(r.name, {r.name}, _input(r, trajectory, candidate)) for r in inputs]
+    shown = [
+        replace(
+            panel,
+            component=_owner(signals, components),
+            labels=labels.get(name),
+            steps=panel.steps or name in labels,
+        )
+        for name, signals, panel in drawn
+    ]
     place = {name: k for k, name in enumerate(components)}
-    return sorted(drawn, key=lambda panel: place.get(panel.component, -1))
-
-
-def _named(
-    panel: Panel,
-    name: str,
-    signals: Iterable[str],
-    labels: Mapping[str, Mapping[int, str]],
-    components: Sequence[str],
-) -> Panel:
-    """Return a panel with the component that it belongs to, and the names of its numbers if it has any."""
-    panel = replace(panel, component=_owner(signals, components))
-    return replace(panel, labels=labels[name], steps=True) if name in labels else panel
+    return sorted(shown, key=lambda panel: place.get(panel.component, -1))
 
 
 def _owner(signals: Iterable[str], components: Sequence[str]) -> str:

@@ -32,11 +32,8 @@ _MOST_DRAWN = 1000
 def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
     """Plot the robustness of each simulation of runs, the smallest so far, and the counterexamples.
 
-    Of a long run, the smallest robustness in each of a thousand equal parts is drawn.
-
-    Args:
-        runs: runs returned by load or load_run, of one requirement and method.
-        ax: where to draw; None: a new figure.
+    The runs, from load or load_run, have one requirement and method. Of a long one, the smallest robustness
+    in each of a thousand equal parts is drawn.
     """
     ax = ax if ax is not None else own_axes(9.0, 3.2)
     for run in runs:
@@ -76,12 +73,7 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
 
 
 def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
-    """Plot the mean number of simulations until falsification with standard deviation, one bar per method.
-
-    Args:
-        runs: runs of a campaign.
-        ax: where to draw; None: a new figure.
-    """
+    """Plot the mean number of simulations until falsification with standard deviation, one bar per method."""
     cells = {key: statistics(members) for key, members in group(runs).items()}
     requirements = list(dict.fromkeys(requirement for requirement, _ in cells))
     methods = list(dict.fromkeys(method for _, method in cells))
@@ -118,10 +110,6 @@ def falsification_curve(runs: Iterable[Run]) -> Curve:
 def thinned(robustness: NDArray[np.float64], limit: int) -> Curve:
     """Robustness values for drawing: all of them, or the lowest in each of ``limit`` equal parts.
 
-    Args:
-        robustness: robustness of each simulation, shape (n,); NaN without a verdict.
-        limit: maximum number of values to keep.
-
     Returns:
         Numbers of the simulations, from 1, and their values; without NaN.
     """
@@ -134,9 +122,6 @@ def thinned(robustness: NDArray[np.float64], limit: int) -> Curve:
 
 def improvements(robustness: NDArray[np.float64]) -> Curve:
     """Simulations that improve on the smallest robustness so far: their numbers, from 1, and the values."""
-    if not len(robustness):
-        return robustness, robustness
-    best = np.fmin.accumulate(robustness)
-    before = np.append(np.inf, np.nan_to_num(best[:-1], nan=np.inf))
-    at = np.flatnonzero(np.nan_to_num(best, nan=np.inf) < before)
-    return (at + 1).astype(np.float64), best[at]
+    best = np.fmin.accumulate(np.append(np.inf, robustness))
+    at = np.flatnonzero(best[1:] < best[:-1])
+    return (at + 1).astype(np.float64), robustness[at]

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# In inches; and the number of characters of a title's line.
-_PANEL_HEIGHT, _INPUT_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
+# In inches, low for what is compared with nothing; and the number of characters of a title's line.
+_PANEL_HEIGHT, _LOW_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
 # A margin below this share of a panel's height is enlarged, with this share of the simulated time around it.
 _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
@@ -68,10 +68,6 @@ def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
 def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
     """Plot one simulation: compared quantities with their bounds and windows, then inputs.
 
-    Args:
-        problem: the problem with the requirement and the search space.
-        evaluation: an evaluation with its trajectory.
-
     Raises:
         ValueError: if the evaluation has no trajectory.
     """
@@ -87,7 +83,6 @@ def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verd
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
     labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
-    labels |= {r.name: labels_of(r.kind, r.items) for r in problem.space.inputs if r.kind != "real"}
     drawn = panels(
         problem.requirement.formula,
         evaluation.trajectory,
@@ -101,22 +96,19 @@ def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verd
 
 
 def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = "") -> "Figure":
-    """Plot the quantities of one simulation below each other, with a legend.
+    """Plot the quantities of one simulation, at least one, below each other, with a legend.
 
-    Args:
-        drawn: the quantities, at least one.
-        verdict: what broke or decided; None: nothing is marked.
-        title: text above, on any number of lines.
+    The title may have several lines; without a verdict, nothing is marked.
     """
     from matplotlib.figure import Figure
 
-    heights = [_PANEL_HEIGHT if panel.limits is None else _INPUT_HEIGHT for panel in drawn]
+    heights = [_PANEL_HEIGHT if panel.bounds else _LOW_HEIGHT for panel in drawn]
     height = sum(heights) + _LINE_HEIGHT * (title.count("\n") + 1)
     figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     group = ""
     for ax, panel in zip(axes, drawn, strict=True):
-        plot_panel(ax, panel, _decided_colour(verdict))
+        plot_panel(ax, panel, verdict)
         if panel.component != group:
             group = panel.component
             ax.set_title(caption(group), loc="left", fontsize=9, weight="bold")
@@ -125,35 +117,11 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
     axes[-1].set_xlabel("time [s]")
     if title:
         figure.suptitle(title, fontsize=10)
-    if keys := _keys(drawn, verdict):
-        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), frameon=False, fontsize=8)
+    keys = {label: mark for ax in axes for mark, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    if keys:
+        place: dict[str, Any] = {"loc": "outside lower center", "ncols": len(keys), "fontsize": 8}
+        figure.legend(keys.values(), keys.keys(), frameon=False, **place)
     return figure
-
-
-def _keys(drawn: Sequence[Panel], verdict: Verdict | None) -> list[Any]:
-    """Return the legend: an entry for each kind of mark that is drawn."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    colour = _decided_colour(verdict)
-    bounds = [(bound, panel.times) for panel in drawn for bound in panel.bounds]
-    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5, "color": colour}
-    keys: list[Any] = []
-    if bounds:
-        keys.append(Line2D([], [], color=LIMIT, linewidth=1.2, linestyle="--", label="limit"))
-    if any(bound.start > times[0] or bound.end < times[-1] for bound, times in bounds):
-        keys.append(Patch(facecolor=QUIET, alpha=0.15, label="time in which it counts"))
-    if any(panel.broken for panel in drawn):
-        keys.append(Patch(facecolor=colour, alpha=0.25, label="violated (worst interval)"))
-    if any(panel.critical is not None for panel in drawn):
-        marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
-        keys.append(Line2D([], [], **dot, label=marked))
-    if any(panel.decided is not None for panel in drawn):
-        keys.append(Line2D([], [], **dot, markerfacecolor="none", label="decided the robustness"))
-    if any(panel.points for panel in drawn):
-        points: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 3.5, "color": INPUT}
-        keys.append(Line2D([], [], **points, label="control point of an input"))
-    return keys
 
 
 def _decided(verdict: Verdict) -> list[str]:
@@ -186,10 +154,7 @@ def _margin(verdict: Verdict) -> float:
 def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
     """Plot the quantity that broke, or else decided the verdict, with its bound, its window and that time.
 
-    Args:
-        problem: the problem with the requirement.
-        evaluation: an evaluation with its trajectory.
-        ax: where to draw; None: a new figure.
+    It is drawn on the given axes, or in a new figure.
 
     Raises:
         ValueError: if the evaluation has no trajectory.
@@ -197,7 +162,7 @@ def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None"
     drawn, verdict = _panels(problem, evaluation)
     ax = ax if ax is not None else own_axes(8, 3)
     decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
-    plot_panel(ax, decisive, _decided_colour(verdict))
+    plot_panel(ax, decisive, verdict)
     _mark_moment(ax, decisive, verdict)
     ax.set_xlabel("time [s]")
     ax.set_title("\n".join(wrapped(line, _TITLE_WIDTH) for line in _decided(verdict)), fontsize=10)
@@ -218,7 +183,7 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     """Draw the panel again, enlarged around the marked time, in the emptiest corner."""
     critical, length = verdict.moment, _enlarged(panel, verdict)
     inside = ax.inset_axes(min(_CORNERS, key=lambda corner: _covered(ax, panel, corner)))
-    plot_panel(inside, panel, _decided_colour(verdict))
+    plot_panel(inside, panel, verdict)
     for text in inside.texts:
         text.set_visible(False)
     inside.set(xlim=(critical - length / 2, critical + length / 2), ylabel="")
@@ -241,25 +206,37 @@ def _covered(ax: "Axes", panel: Panel, corner: tuple[float, float, float, float]
     return int((beside & (y >= bottom - 0.1) & (y <= bottom + height + 0.05)).sum())
 
 
-def plot_panel(ax: "Axes", panel: Panel, critical: str = VIOLATED) -> None:
+def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
+    critical = _decided_colour(verdict)
+    marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
     is_input = panel.limits is not None
     color = INPUT if is_input else OUTPUT
     style = "steps-post" if panel.steps else "default"
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
-        ax.plot(panel.times[within], bound.values[within], color=LIMIT, linewidth=1.2, linestyle="--")
-        ax.axvspan(bound.start, bound.end, color=QUIET, alpha=0.08, linewidth=0)
+        ax.plot(
+            panel.times[within],
+            bound.values[within],
+            color=LIMIT,
+            linewidth=1.2,
+            linestyle="--",
+            label="limit",
+        )
+        counts = "time in which it counts" if not within.all() else None
+        ax.axvspan(bound.start, bound.end, color=QUIET, alpha=0.08, linewidth=0, label=counts)
     for start, end in panel.broken:
-        ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0)
-    for time, filling in ((panel.critical, critical), (panel.decided, "none")):
+        ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0, label="violated (worst interval)")
+    decided = "decided the robustness"
+    for time, filling, label in ((panel.critical, critical, marked), (panel.decided, "none", decided)):
         if time is not None:
             k = abs(panel.times - time).argmin()
             at = panel.times[k], panel.values[k]
-            ax.plot(*at, "o", color=critical, markersize=5, markerfacecolor=filling)
+            ax.plot(*at, "o", color=critical, markersize=5, markerfacecolor=filling, label=label)
     if panel.points:
-        ax.plot(*zip(*panel.points, strict=True), "o", color=INPUT, markersize=3.5)
+        points = zip(*panel.points, strict=True)
+        ax.plot(*points, "o", color=INPUT, markersize=3.5, label="control point of an input")
     if panel.limits is not None:
         low, high = panel.limits
         margin = 0.06 * (high - low)
@@ -286,20 +263,10 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
 
 
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
-    """Plot signals over time, one small panel per signal.
-
-    Args:
-        trajectory: the simulation.
-        names: names of the signals; None: all.
-    """
-    from matplotlib.figure import Figure
-
-    names = trajectory.names if names is None else names
-    figure = Figure(figsize=(8, 0.6 + 1.1 * len(names)), layout="constrained")
-    axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, name in zip(axes, names, strict=True):
-        unit = trajectory.units.get(name, "")
-        ax.plot(trajectory.times, trajectory[name], linewidth=1.2, color=OUTPUT)
-        ax.set_ylabel(caption(f"{name} [{unit}]" if unit else name))
-    axes[-1].set_xlabel("time [s]")
-    return figure
+    """Plot signals over time, those named or else all, one small panel per signal."""
+    shown = [
+        Panel(f"{name} [{unit}]" if unit else name, trajectory.times, trajectory[name])
+        for name in (trajectory.names if names is None else names)
+        for unit in [trajectory.units.get(name, "")]
+    ]
+    return plot_panels(shown, None)

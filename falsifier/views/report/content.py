@@ -11,8 +11,7 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import total
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.counterexamples.store import EXPLANATION, beside, shrunk_file
-from falsifier.counterexamples.store import load as load_counterexample
+from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
@@ -29,13 +28,9 @@ class Shown:
     """A run's counterexample, shrunk if it was, or its best simulation.
 
     Attributes:
-        run: the run.
-        candidate: what was simulated.
         verdict: robustness, and what decided it; None if it could not be judged.
-        units: units of the signals, by name.
         panels: what to draw; empty if the trajectory was not kept.
         confirmed: why a counterexample counts.
-        is_shrunk: whether it is the shrunk counterexample.
         is_lost: whether a trajectory was kept, but its file is damaged or missing.
     """
 
@@ -70,9 +65,7 @@ class Section:
     """The part of a report about one requirement.
 
     Attributes:
-        name: name of the requirement.
         heading: the name; of a formula without a name, the formula.
-        formula: text of the formula.
         sentence: what it means.
         by_method: its runs by method.
         shown: counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of
@@ -108,9 +101,7 @@ class Side:
 
     Attributes:
         title: name of the directory.
-        runs: all runs that have started.
         table: statistics of the protocol; None if no method has several runs.
-        sections: one per requirement.
     """
 
     title: str
@@ -173,13 +164,7 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
 
 
 def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
-    """Return what is said of a requirement.
-
-    Args:
-        name: name of the requirement.
-        by_method: its runs by method.
-        shown: their counterexamples or, if there are none, the best simulation.
-    """
+    """Return what is said of a requirement; shown: counterexamples or, without any, the best simulation."""
     runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     heading = requirement.formula if runs[0].is_ad_hoc else name
@@ -239,7 +224,6 @@ def _drawn(
     described, drawn = run.manifest, list[Panel]()
     if trajectory is not None:
         labels = {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
-        labels |= {r.name: labels_of(r.kind, r.items) for r in described.inputs if r.kind != "real"}
         formula, components = parse(described.requirement.formula), described.components
         drawn = panels(formula, trajectory, candidate, described.inputs, verdict, labels, components)
     return Shown(

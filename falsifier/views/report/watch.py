@@ -4,16 +4,14 @@
 
     asyncio.run(serve(Path("runs/nightly"), announce=print))
 
-The page is served on this machine only. It asks for its content again and again; each answer reads on in the
-journals for a moment only, so that the page of a long run opens at once and completes itself.
+The page is served on this machine only, and runs no script: the browser loads it again and again. Each answer
+reads on in the journals for a moment only, so that the page of a long run opens at once and completes itself.
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from hashlib import sha256
-from importlib.resources import files
 from pathlib import Path
 from secrets import compare_digest, token_urlsafe
 from time import monotonic
@@ -30,10 +28,9 @@ from falsifier.llm.messages import Exchange
 from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
 from falsifier.record.summary import RunFollower
-from falsifier.stl.margins import signed
-from falsifier.views.campaign_progress import overall_line
+from falsifier.views.campaign_progress import overall_line, run_line
 from falsifier.views.exchanges import exchange_html
-from falsifier.views.html import Html, el, join, table
+from falsifier.views.html import Html, el, join
 from falsifier.views.report.content import section_of, shown_of
 from falsifier.views.report.page import card_html, document, drawn, facts_html
 from falsifier.views.text import llm_use, seconds_text
@@ -44,9 +41,11 @@ if TYPE_CHECKING:
 # Time in s that the first answer may spend on reading, and each later one: a journal of 100,000 evaluations
 # takes some ten, and the figures of an answer one.
 _READING, _READING_ON = 0.3, 2.0
+# Time in s after which the browser loads the page of a running search again, and one that is not read yet.
+_PERIOD, _PERIOD_BEHIND = 5, 1
 # Maximum number of candidates kept of a run, evenly spaced, to show what was tried.
 _MOST_KEPT = 300
-# Maximum number of rows of a campaign's table; running ones first.
+# Maximum number of runs of a campaign to choose from.
 _MOST_RUNS = 200
 
 
@@ -57,12 +56,10 @@ class _Watched:
     run: RunFollower[Run]
     candidates: dict[int, dict[str, Any]] = field(default_factory=dict)
     exchange: Exchange | None = None
-    is_behind: bool = False
     _every: int = 1
 
-    def read(self, until: float) -> None:
-        """Read on until there is nothing new, or the clock (in s) says that it is enough."""
-        self.is_behind = False
+    def read(self, until: float) -> bool:
+        """Read on until the clock (in s) says that it is enough; return whether there may be more."""
         for record in self.run.read():
             if isinstance(record, AskedRecord):
                 self.candidates |= dict(enumerate(record.candidates, start=record.first))
@@ -70,8 +67,8 @@ class _Watched:
             elif isinstance(record, ExchangeRecord):
                 self.exchange = record.exchange
             if monotonic() > until:
-                self.is_behind = True
-                return
+                return True
+        return False
 
     def _thin(self) -> None:
         """Keep the candidates that are still to be simulated or to be shown, and of the others every n-th."""
@@ -79,12 +76,9 @@ class _Watched:
             return
         self._every *= 2
         needed = {run.shown for run in self.run.summaries}
-        first = max(self.candidates) - _MOST_KEPT // 2
-        self.candidates = {
-            index: candidate
-            for index, candidate in self.candidates.items()
-            if index % self._every == 0 or index in needed or index > first
-        }
+        needed |= set(range(max(self.candidates) - _MOST_KEPT // 2, max(self.candidates) + 1))
+        kept = [index for index in self.candidates if index % self._every == 0 or index in needed]
+        self.candidates = {index: self.candidates[index] for index in kept}
 
 
 class Watch:
@@ -101,75 +95,61 @@ class Watch:
     def __init__(self, directory: Path, token: str = "") -> None:
         self.directory = directory
         self.token = token
-        self._watched: dict[Path, _Watched] = {}
+        self._watched: _Watched | None = None  # one run at a time is in memory
         run_directories(directory)  # raises if there is nothing to watch
         self._follower = Follower(directory) if is_campaign(directory) else None
 
-    def look(self, chosen: str = "") -> tuple[str, bool]:
-        """Return the content of the page, and whether more is to be read.
+    def look(self, chosen: str = "") -> tuple[str, int | None]:
+        """Return the content of the page, and the time in s after which there is more; None if nothing comes.
 
-        Args:
-            chosen: name of the folder of a run; without one, the first that is running.
+        Without the name of the folder of a run, the first that is running is shown.
         """
         places = {place.name: place for place in run_directories(self.directory)}
         parts, rows = [], list[RunProgress]()
+        working = is_worked_on(self.directory)
         if self._follower is not None:
-            progress, working = self._follower.look(), is_worked_on(self.directory)
+            progress = self._follower.look()
             rows = list(progress.runs)
             parts.append(el("p", overall_line(progress, stopped=not working), class_="result"))
         if chosen not in places:
             running = [run.name for run in rows if run.status == "running" and run.name in places]
             chosen = next(iter([*running, *places]), "")
         if len(places) > 1 or rows:
-            parts.append(_choice(places, rows, chosen))
+            parts.append(_choice(places.keys(), rows))
         behind = False
         if chosen:
-            place = places[chosen]
             seconds = _READING_ON
-            if place not in self._watched:
+            if self._watched is None or self._watched.run.directory != places[chosen]:
                 seconds = _READING
-                run = RunFollower(place, unread_runs(place))
-                self._watched = {place: _Watched(run)}  # one at a time is in memory
-            watched = self._watched[place]
-            watched.read(monotonic() + seconds)
-            behind = watched.is_behind
-            parts += [self._state(watched), *(_run_html(run, watched) for run in watched.run.summaries)]
-        return join(*parts), behind
+                self._watched = _Watched(RunFollower(places[chosen], unread_runs(places[chosen])))
+            watched = self._watched
+            behind = watched.read(monotonic() + seconds)
+            working = working or is_worked_on(places[chosen])
+            state = "reading the journal" if behind else "running" if working else "not running"
+            parts.append(el("p", f"{chosen}: {state}.", class_="result"))
+            if working:
+                still = el("a", "keep it as it is", href=f"?run={chosen}&still")
+                parts.append(el("p", "The page is loaded again and again; to read on, ", still, "."))
+            if working and self.token:
+                token = el("input", type="hidden", name="token", value=self.token)
+                parts.append(el("form", token, el("button", "Stop"), method="post", action="stop"))
+            parts += [_run_html(run, watched) for run in watched.run.summaries]
+        return join(*parts), _PERIOD_BEHIND if behind else _PERIOD if working else None
 
     def stop(self) -> None:
         """Ask the process that works here to stop as after Ctrl-C: it looks for this file."""
         (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
 
-    def _state(self, watched: _Watched) -> Html:
-        working = is_worked_on(self.directory) or is_worked_on(watched.run.directory)
-        text = "reading the journal" if watched.is_behind else "running" if working else "not running"
-        button = (
-            el("button", "Stop", type="button", data_token=self.token) if self.token and working else Html("")
-        )
-        return el("p", f"{watched.run.directory.name}: {text}. ", button, class_="result", id="state")
 
-
-def _choice(places: dict[str, Path], rows: list[RunProgress], chosen: str) -> Html:
-    """The runs to choose from; of a campaign with what came of them so far."""
-    if not rows:
-        links = [el("li", el("a", name, href=f"?run={name}")) for name in places]
-        return el("nav", el("ul", *links), aria_label="Runs")
-    order = sorted(rows, key=lambda run: (run.status != "running", run.finished))
-    cells = [
-        (
-            el("a", run.requirement, href=f"?run={run.name}") if run.name in places else run.requirement,
-            f"{run.method.label}, seed {run.seed}",
-            f"{run.status}{' (shown below)' if run.name == chosen else ''}",
-            run.spent.simulations_text,
-            "" if run.best_robustness is None else signed(run.best_robustness, 4),
-        )
-        for run in order[:_MOST_RUNS]
-    ]
-    header = ("requirement", "run", "status", "simulations", "best robustness")
+def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
+    """The runs to choose from, those of a campaign with what came of them so far, running ones first."""
+    order = sorted(rows, key=lambda run: (run.status != "running", run.finished))[:_MOST_RUNS]
+    told = {run.name: run_line(run) for run in order} or {name: name for name in places}
+    runs = [el("a", text, href=f"?run={name}") if name in places else text for name, text in told.items()]
     return el(
         "details",
-        el("summary", f"All {counted(len(rows), 'run')}"),
-        table(header, cells, label="Runs"),
+        el("summary", f"All {counted(len(rows or places), 'run')}"),
+        el("ul", *(el("li", run) for run in runs)),
         open="",
     )
 
@@ -200,13 +180,6 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     return card_html(section_of(run.requirement, {run.method.label: [run]}, shown), more=more)
 
 
-def page(title: str) -> str:
-    """Return the page, whose script fetches its content."""
-    script = files("falsifier.views.report").joinpath("watch.js").read_text(encoding="utf-8")
-    header = el("header", el("h1", title))
-    return document(f"falsifier: {title}", header, el("main", "Reading ...", id="live"), script=script)
-
-
 def application(watch: Watch) -> "Application":
     """Return the pages as an application of aiohttp."""
     from aiohttp import web
@@ -222,27 +195,24 @@ def application(watch: Watch) -> "Application":
         answer: StreamResponse = await handler(request)
         return answer
 
-    async def whole(_: "Request") -> "Response":
-        return web.Response(text=page(name), content_type="text/html")
-
-    async def live(request: "Request") -> "StreamResponse":
+    async def page(request: "Request") -> "Response":
         async with lock:  # figures are drawn one at a time, beside the loop that answers
-            text, behind = await asyncio.to_thread(watch.look, request.query.get("run", ""))
-        tag = sha256(text.encode()).hexdigest()
-        headers = {"ETag": tag, "Cache-Control": "no-store"} | ({"X-Unread": "1"} if behind else {})
-        if request.headers.get("If-None-Match") == tag:
-            return web.Response(status=304, headers=headers)
-        return web.Response(text=text, content_type="text/html", headers=headers)
+            text, again = await asyncio.to_thread(watch.look, request.query.get("run", ""))
+        headers = {"Cache-Control": "no-store"}
+        if again is not None and "still" not in request.query:
+            headers["Refresh"] = str(again)
+        shown = document(f"falsifier: {name}", el("header", el("h1", name)), el("main", Html(text)))
+        return web.Response(text=shown, content_type="text/html", headers=headers)
 
     async def stop(request: "Request") -> "Response":
-        if not watch.token or not compare_digest(request.headers.get("X-Token", ""), watch.token):
+        token = str((await request.post()).get("token", ""))
+        if not watch.token or not compare_digest(token.encode(), watch.token.encode()):
             raise web.HTTPForbidden(text="stopping was not allowed: falsifier watch --page --allow-stop")
         watch.stop()
-        return web.Response(text="stopping")
+        raise web.HTTPSeeOther("/")
 
     made = web.Application(middlewares=[from_here])
-    made.router.add_get("/", whole)
-    made.router.add_get("/live", live)
+    made.router.add_get("/", page)
     made.router.add_post("/stop", stop)
     return made
 
@@ -250,10 +220,7 @@ def application(watch: Watch) -> "Application":
 async def serve(directory: Path, *, announce: Callable[[str], None], allow_stop: bool = False) -> None:
     """Serve the page of a directory on 127.0.0.1 until this is cancelled.
 
-    Args:
-        directory: a run, a campaign, or a folder of runs.
-        announce: called with the page's address, which has a free port.
-        allow_stop: whether the page has a button that stops the run or campaign.
+    The address, which has a free port, is announced. With allow_stop, the page has a button.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.

@@ -32,9 +32,9 @@ _MOST_COUNTED = 5000
 
 def differences(sides: Sequence[Side]) -> Table:
     """Return what the directories of a comparison differ in: files, formulas, engines, seeds and versions."""
-    columns: list[dict[str, list[str]]] = []
+    columns: list[dict[str, dict[str, None]]] = []
     for side in sides:
-        told: dict[str, list[str]] = {}
+        told: dict[str, dict[str, None]] = {}
         for run in side.runs:
             manifest = run.manifest
             facts = {
@@ -45,11 +45,10 @@ def differences(sides: Sequence[Side]) -> Table:
                 "falsifier": manifest.falsifier,
             }
             for name, text in facts.items():
-                told.setdefault(name, [])
-                told[name] += [text] if text not in told[name] else []
+                told.setdefault(name, {})[text] = None
         columns.append(told)
     names = dict.fromkeys(name for told in columns for name in told)
-    texts = {name: [", ".join(told.get(name, [])) for told in columns] for name in names}
+    texts = {name: [", ".join(told.get(name, ())) for told in columns] for name in names}
     differing = tuple((name, *cells) for name, cells in texts.items() if len(set(cells)) > 1)
     return Table("What differs", ("", *(side.title for side in sides)), differing)
 
@@ -76,12 +75,7 @@ def result_text(section: Section) -> str:
 
 
 def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
-    """Return what broke; without a violation, how near it came.
-
-    Args:
-        verdict: robustness, and what decided it.
-        units: units of the signals, by name.
-    """
+    """Return what broke; without a violation, how near it came."""
     return broken_facts(verdict) or margin_facts(verdict, units)
 
 
