@@ -15,12 +15,7 @@ from falsifier.problem.problem import Problem
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A point with the reason why it was chosen.
-
-    Attributes:
-        point: the point in [0, 1]^d.
-        rationale: the reason, in words.
-    """
+    """A point in [0, 1]^d with the reason why it was chosen."""
 
     point: Array
     rationale: str

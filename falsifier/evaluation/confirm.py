@@ -187,15 +187,7 @@ class Movement:
 def step_convergence(
     model: Model, experiment: Experiment, signals: Mapping[str, Signal]
 ) -> dict[str, Movement]:
-    """Simulate with the step and with half of it, and compare the outputs on the same grid.
-
-    Args:
-        model: the model to simulate.
-        experiment: times, outputs and the step to check.
-        signals: inputs by name.
-
-    Returns:
-        How much each output changes, by name.
+    """Simulate with the step and with half of it; return how much each output changes, by name.
 
     Raises:
         SimulationError: if one of the simulations fails.

@@ -28,11 +28,7 @@ _TRACKER_FILTER = "ignore:resource_tracker"
 
 
 class LastingExecutor(Executor):
-    """An executor that makes another one if the processes of the present one have died.
-
-    Args:
-        make: makes an executor.
-    """
+    """An executor that makes another one if the processes of the present one have died."""
 
     def __init__(self, make: Callable[[], Executor]) -> None:
         self._make = make

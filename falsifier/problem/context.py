@@ -17,13 +17,7 @@ _LOG = logging.getLogger(__name__)
 
 
 def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | None = None) -> Named:
-    """Return what a spec and its user's options name as context.
-
-    Args:
-        source: the options; ``none`` among them leaves out what the spec names.
-        spec: the spec, if there is one.
-        path: its file, to which its paths are relative.
-    """
+    """Return what a spec and its user's options name as context; ``none`` leaves out what the spec names."""
     named = Named.of(source.context)
     if spec is None or path is None or NOTHING in source.context:
         return named

@@ -236,11 +236,7 @@ def read_journal(directory: Path) -> list[Record]:
 
 
 class JournalReader:
-    """Reads a journal that is still growing.
-
-    Args:
-        directory: run directory; the run need not have started.
-    """
+    """Reads a journal that is still growing; the run need not have started."""
 
     def __init__(self, directory: Path) -> None:
         self.path = directory / JOURNAL

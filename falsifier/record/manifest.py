@@ -212,12 +212,7 @@ def file_hashes(problem: Problem) -> dict[str, str]:
 
 
 def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
-    """Refuse to resume a run or campaign if a file or problem differs from when it was started.
-
-    Args:
-        directory: directory of the run or campaign.
-        recorded: hashes by path, or fingerprints by requirement, from the record.
-        found: the same, computed now.
+    """Refuse to resume a run or campaign if hashes by path, or fingerprints by requirement, have changed.
 
     Raises:
         JournalError: naming what has changed.

@@ -38,12 +38,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Iteration:
-    """One call of an engine, and what came of it.
-
-    Attributes:
-        exchanges: what was asked and answered during the call, rejected replies included.
-        samples: one per candidate.
-    """
+    """One call of an engine, and what came of it: what was asked and answered, and a sample per candidate."""
 
     exchanges: tuple[Exchange, ...]
     samples: tuple[Sample, ...]
@@ -112,13 +107,7 @@ def exchange_before(records: Iterable[Record], index: int) -> Exchange | None:
 def doubtful_confirmations(
     problem: Problem, records: Iterable[Record], evaluations: Mapping[int, Evaluation]
 ) -> list[Confirmation]:
-    """Return the recorded confirmations of violations that do not count, of one requirement.
-
-    Args:
-        problem: problem whose requirement was violated.
-        records: records of a journal.
-        evaluations: evaluations of the same run by their index.
-    """
+    """Return the recorded confirmations of violations that do not count, of one requirement."""
     return [
         record.confirmation(problem, evaluations[record.index])
         for record in records

@@ -216,11 +216,7 @@ def resume(
 
 
 class StopFile:
-    """Listener that interrupts a run, as Ctrl-C does, once a file exists; the run can be resumed.
-
-    Args:
-        path: the file, which any process may write.
-    """
+    """Listener that interrupts a run, as Ctrl-C does, once a file exists; the run can be resumed."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

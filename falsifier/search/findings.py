@@ -57,13 +57,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Simulations that failed for the same cause.
-
-    Attributes:
-        count: how many.
-        reason: of the first of them, in words.
-        simulation: index of the first of them.
-    """
+    """Simulations that failed for the same cause: how many, and reason and index of the first of them."""
 
     count: int
     reason: str
@@ -101,12 +95,7 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
 
 
 def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
-    """Return what the fixed control points of a search could not express; None if they left nothing out.
-
-    Args:
-        problem: what was to be falsified.
-        searched: the part of its search space that the engine used.
-    """
+    """Return what the fixed control points of a search could not express; None if they left nothing out."""
     formula = problem.requirement.formula
     experiment = problem.experiment
     limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)

@@ -25,12 +25,7 @@ _SEED_STRIDE = 1_000_003
 
 
 def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
-    """Make the engines of a request, one per problem.
-
-    Args:
-        request: what was requested.
-        problems: what is searched.
-        chat: chat with the request's language model, if it was made in Python.
+    """Make the engines of a request, one per problem; a chat is given if it was made in Python.
 
     Raises:
         SpecError: for an unknown engine, an engine that does not fit the language model, or a cost limit

@@ -59,11 +59,6 @@ class Steps:
 def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate]:
     """Ask an engine, and return its candidates as they will be simulated.
 
-    Args:
-        engine: the engine, possibly made by the user.
-        space: what may be varied.
-        wanted: number of candidates to ask for.
-
     Raises:
         SpecError: if the engine returns something else than a list of candidates, none, or more than it was
             asked for.

@@ -66,11 +66,7 @@ class _Seen:
 
 
 class Vacuity:
-    """Extremes of a requirement's parts over all simulations of a search.
-
-    Args:
-        problem: what is searched.
-    """
+    """Extremes of a requirement's parts over all simulations of a search."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
@@ -232,9 +228,6 @@ class Effects:
     """Compares simulations that differ in one input or parameter alone.
 
     Others say nothing for certain: what one input changes, another may change back.
-
-    Args:
-        problem: what is searched.
     """
 
     def __init__(self, problem: Problem) -> None:

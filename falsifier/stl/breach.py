@@ -104,13 +104,7 @@ class Breach:
 
 
 def find_breach(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Breach:
-    """Return what broke on a trajectory that violates a formula.
-
-    Args:
-        root: the compiled formula; its value at time 0 is negative.
-        buffer: values of all its parts.
-        trajectory: the trajectory on which it was evaluated.
-    """
+    """Return what broke on a trajectory on which a formula has a negative value at time 0."""
     whole = _Demand.of(root, wanted=True)
     return Breach(tuple(_Search(buffer, trajectory).at(whole, _Spot(0))))
 

@@ -55,13 +55,7 @@ class Waypoint(NamedTuple):
 
 
 def path_to_decider(part: CompiledPart, buffer: Floats, sample: int = 0) -> list[Waypoint]:
-    """Return the path from a compiled formula at this sample to the predicate that decided its value.
-
-    Args:
-        part: the compiled formula.
-        buffer: values of all parts, filled by the kernels.
-        sample: sample at which the formula was evaluated.
-    """
+    """Return the path from a compiled formula at this sample to the predicate that decided its value."""
     path: list[Waypoint] = []
     while True:
         path.append(Waypoint(part, sample, part.at(buffer, sample), part.window_at(sample)))
@@ -183,13 +177,7 @@ class Diagnosis:
 
 
 def diagnose(root: CompiledPart, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
-    """Return the diagnosis of an evaluated formula.
-
-    Args:
-        root: the compiled formula.
-        buffer: values of all its parts.
-        trajectory: the trajectory on which it was evaluated.
-    """
+    """Return the diagnosis of an evaluated formula."""
     times = trajectory.times
     path = path_to_decider(root, buffer)
     steps = []

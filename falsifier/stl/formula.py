@@ -38,12 +38,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """The closed time interval of a temporal operator, relative to the time at which it is evaluated.
-
-    Attributes:
-        start: start in s.
-        end: end in s.
-    """
+    """The closed time interval in s of a temporal operator, relative to the time at which it is evaluated."""
 
     start: float
     end: float

@@ -15,12 +15,7 @@ from falsifier.stl.margins import on_limit
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """All numbers from low to high.
-
-    Attributes:
-        low: smallest number; may be -inf.
-        high: largest number; may be inf.
-    """
+    """All numbers from low to high, which may be infinite."""
 
     low: float = -math.inf
     high: float = math.inf
@@ -83,12 +78,7 @@ def margins(formula: Formula, ranges: Mapping[str, Interval]) -> Interval:
 
 
 def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[Formula, bool]]:
-    """Yield the largest parts that hold for all trajectories in range, or for none, and which of the two.
-
-    Args:
-        formula: the formula.
-        ranges: range of each signal.
-    """
+    """Yield the largest parts that hold for all trajectories in range, or for none, and which of the two."""
     found = margins(formula, ranges)
     if found.low > 0 or found.high < 0:
         yield formula, found.low > 0

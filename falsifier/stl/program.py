@@ -204,12 +204,7 @@ class Program:
 
 
 def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
-    """Evaluate a program on a trajectory; return the buffer with the values of all its parts.
-
-    Args:
-        program: the compiled formula.
-        trajectory: the trajectory.
-        buffer: receives all values, shape (program.size,).
+    """Evaluate a program on a trajectory; return the buffer, shape (program.size,), with all values.
 
     Raises:
         MonitorError: if the trajectory cannot be evaluated.

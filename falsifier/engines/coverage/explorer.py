@@ -76,11 +76,7 @@ class Explorer:
     def learn(self, point: Array, trajectory: Trajectory, robustness: float, critical: float) -> bool:
         """Add a simulation to the archive; return whether a discrete signal did something new.
 
-        Args:
-            point: the input, shape (d,).
-            trajectory: what it did.
-            robustness: robustness of the requirement.
-            critical: time in s that decided the robustness.
+        The critical time is in s.
         """
         self._seen += 1
         difference = robustness - self._lowest

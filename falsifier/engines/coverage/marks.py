@@ -32,12 +32,7 @@ MODES = "the modes"
 
 
 class Mark(NamedTuple):
-    """Something that a trajectory did.
-
-    Attributes:
-        source: the signal or predicate that did it.
-        what: what it did.
-    """
+    """Something that a trajectory did: the signal or predicate, and what it did."""
 
     source: str
     what: tuple[float | str, ...]
