@@ -158,12 +158,14 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
 
 
 def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
-    from matplotlib.colors import CenteredNorm
+    from matplotlib.colors import TwoSlopeNorm
 
     first, second = (found.coordinates[i] for i in found.axes)
-    # Centred, so that red, for violations, begins at 0.
-    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", cmap="RdBu", norm=CenteredNorm())
     low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
+    # Red, for violations, begins at 0 and is seen however small they are.
+    largest = max(-low, high) or 1.0
+    norm = TwoSlopeNorm(0.0, low if low < 0 else -largest, high if high > 0 else largest)
+    mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", cmap="RdBu", norm=norm)
     if low < 0 <= high:
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
     elif low < high:  # one colour: lines show which way it changes
