@@ -129,7 +129,7 @@ class Watch:
             parts.append(el("p", f"{chosen}: {state}.", class_="result"))
             if working:
                 still = el("a", "keep it as it is", href=f"?run={chosen}&still")
-                parts.append(el("p", "The page is loaded again and again; to read on, ", still, "."))
+                parts.append(el("p", "This page reloads itself; to read on, ", still, "."))
             if working and self.token:
                 token = el("input", type="hidden", name="token", value=self.token)
                 parts.append(el("form", token, el("button", "Stop"), method="post", action="stop"))
