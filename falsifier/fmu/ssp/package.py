@@ -238,6 +238,8 @@ def _value(parameter: Element) -> Given:
         raise ValueError(f"the parameter {name!r} has no value of a known type")
     value: float | str = typed.attrib["value"]
     if kind not in ("Enumeration", "String"):
+        if kind == "Boolean" and value not in ("true", "false", "0", "1"):
+            raise ValueError(f"the parameter {name!r} is {value!r}; expected true or false")
         value = float(is_true(str(value))) if kind == "Boolean" else number(str(value))
     return Given(name, value, kind == "Enumeration", unit)
 

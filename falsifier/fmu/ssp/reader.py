@@ -151,9 +151,13 @@ class _Reader:
         outputs: list[tuple[str, str]] = []
         for end, (kind, _) in self._connectors.items():
             if kind == "output" and not end[0]:
-                source, found = self._traced(end)
-                if found == _UNCHANGED and source[0] in self.components:
+                source, (factor, offset) = self._traced(end)
+                if (factor, offset) == _UNCHANGED and source[0] in self.components:
                     outputs.append((end[1], _title(source)))
+                    continue
+                value = f"{_title(source)} * {factor:.6g} {offset:+.6g}"
+                why = "nothing feeds it" if source == end else f"write {value} in formulas"
+                self.notes.append(f"the output {end[1]} of the package is left out: {why}")
             elif kind == "input" and end[0] in self.components and end in self._steps:
                 source, (factor, offset) = self._traced(end)
                 connections[_title(end)] = Connection(_title(source), factor, offset)
@@ -299,6 +303,12 @@ class _Reader:
                 f"{text} passes on a calculated parameter, which is not supported; set the parameter in a "
                 "parameter set"
             )
+        is_held = self._connectors[sink][0] == "parameter"
+        if is_held and self._connectors[source][0] != "parameter":
+            raise self._wrong(
+                f"{text} feeds a parameter, which keeps its value during a simulation; set it in a parameter "
+                "set, or connect an input"
+            )
         if sink in self._steps:
             known = _title(self._steps[sink][0])
             raise self._wrong(
@@ -322,6 +332,10 @@ class _Reader:
             if any(at == passed for passed, _ in chain):
                 circle = " -> ".join(_title(passed) for passed, _ in chain)
                 raise self._wrong(f"connectors feed each other in a circle: {circle}; remove one")
+        if at != end and at[0] not in self.components and self._connectors[at][0] in _SOURCES:
+            raise self._wrong(
+                f"{_title(end)} is fed by the output {_title(at)}, which nothing feeds; connect that one too"
+            )
         factor, offset, unit, before = 1.0, 0.0, self._connectors[at][1], at
         for target, change in reversed(chain):
             wanted = self._connectors[target][1]
@@ -381,7 +395,12 @@ class _Reader:
                     "and the package defines no conversion; state the variable's unit"
                 )
             value = found[0] * value + found[1]
-        return change.factor * value + change.offset
+        value = change.factor * value + change.offset
+        low, high = variable.limits
+        if (low is not None and value < low) or (high is not None and value > high):
+            limits = ", ".join("no limit" if x is None else f"{x:g}" for x in (low, high))
+            raise self._wrong(f"{value:g} exceeds the FMU's limits for {variable.name!r}, [{limits}]")
+        return value
 
 
 def _kind(type_name: str) -> str:

@@ -112,6 +112,18 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
 
 
+def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_path: Path) -> None:
+    scaled = """<ssd:Connection startElement="plant" startConnector="y" endConnector="height">
+      <ssc:LinearTransformation factor="2"/></ssd:Connection>"""
+    ssd = structure(system(PLANT, scaled, before=ROOT_PORTS))
+    model = read_package(write(tmp_path / "scaled.ssp", ssd, "Plant_2"))
+    said = "the output height of the package is left out: write plant.y * 2 +0 in formulas"
+    assert said in model.info.notes and "height" not in model.info
+    ssd = structure(system(PLANT, before=ROOT_PORTS))
+    model = read_package(write(tmp_path / "open.ssp", ssd, "Plant_2"))
+    assert "the output height of the package is left out: nothing feeds it" in model.info.notes
+
+
 def plant(old: str, new: str) -> str:
     """A structure with the plant alone, in which something is replaced."""
     return structure(system(PLANT.replace(old, new)))
@@ -135,6 +147,10 @@ INNER = f'<ssd:System name="inner"><ssd:Elements>{PI}</ssd:Elements></ssd:System
 FROM_INNER = FEEDBACK.replace('"pi"', '"inner.pi"')
 IN_KELVIN = PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "")
 SCHEDULED, EXCHANGED = (f'<ssd:Component implementation="{each}" ' for each in ("Scheduled", "ModelExchange"))
+OUT = '<ssd:Connectors><ssd:Connector name="out" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+FED_BY_NOTHING = FEEDBACK.replace(
+    'startElement="pi" startConnector="y"', 'startElement="box" startConnector="out"'
+)
 WRONG = {
     "not well-formed XML": "<ssd",
     "expected the SSP element SystemStructureDescription, got a": "<a/>",
@@ -158,6 +174,16 @@ WRONG = {
     "names the unknown element 'po'; did you mean 'pi'": feedback('startElement="pi"', 'startElement="po"'),
     "names the unknown element 'inner.pi'": structure(system(PLANT + INNER, FROM_INNER)),
     "the connection pi.y - plant.y joins two outputs": feedback('Connector="measured"', 'Connector="y"'),
+    "plant.u is fed by the output box.out, which nothing feeds": structure(
+        system(PLANT + PI + system("", before=OUT, name="box"), FED_BY_NOTHING)
+    ),
+    "the connection pi.y - plant.T feeds a parameter": feedback('Connector="u"', 'Connector="T"'),
+    "the parameter 'plant.T' is 'maybe'; expected true or false": structure(
+        system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
+    ),
+    "-5 exceeds the FMU's limits for 'T', [0.1, no limit]": structure(
+        system(PLANT, before=BOUND.format(values("plant.T Real -5")))
+    ),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
     "plant.y is in m, pi.measured in K; the package defines no": feedback("", "", pi=IN_KELVIN),
     "is of type application/x-modelica; only FMUs": structure(
