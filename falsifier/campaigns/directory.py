@@ -17,11 +17,10 @@ from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError
-from falsifier.record.files import locked, read_sealed, write_sealed
+from falsifier.record.files import CAMPAIGN, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
-CAMPAIGN = "campaign.json"
 _LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5
@@ -41,14 +40,15 @@ def is_campaign(directory: Path) -> bool:
 
 
 def check_new(directory: Path) -> None:
-    """Check that no campaign was started in a directory.
+    """Check that no campaign and no run was started in a directory.
 
     Raises:
         JournalError: if one was.
     """
-    if is_campaign(directory):
+    if is_campaign(directory) or holds_run(directory):
+        what = "campaign" if is_campaign(directory) else "run"
         raise JournalError(
-            f"{directory} already contains a campaign: choose another --out, or to continue it: "
+            f"{directory} already contains a {what}: choose another --out, or to continue it: "
             f"falsifier resume {directory}"
         )
 

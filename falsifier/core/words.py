@@ -13,9 +13,7 @@ _SHOWN_POINTS = 12
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
-    Args:
-        candidate: the candidate.
-        space: search space with the units; without one, none are told.
+    Units are told if the search space is given, which has them.
     """
     units = {r.name: r.unit for r in (*space.inputs, *space.parameters)} if space is not None else {}
     labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}

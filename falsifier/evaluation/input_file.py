@@ -63,6 +63,8 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     header = [cell.strip() for cell in rows[0][1]]
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         raise SpecError(f"expected commas between the columns, got {other!r}: export it with commas")
+    if header[0].lower() not in ("", "t", "time") and header[0] in (v.name for v in info.inputs):
+        raise SpecError(f"the first column must be the time in s, got the input {header[0]!r}")
     columns = [_inputs_of(name, info) for name in header[1:]]
     named = [v.name for column in columns for v in column]
     if twice := next((name for name in named if named.count(name) > 1), None):

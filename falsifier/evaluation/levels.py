@@ -83,11 +83,7 @@ class Levels:
         return place
 
     def told(self, noun: str) -> str:
-        """Say how many simulations had each of the lowest levels, and which was the first.
-
-        Args:
-            noun: what a simulation is called.
-        """
+        """Say how many simulations had each of the lowest levels, and which was the first."""
         parts = [
             f"{signed(level.robustness)} in {level.simulations}, first in {noun} {level.first}"
             for level in self.found[:_TOLD]

@@ -12,7 +12,16 @@ from falsifier.errors import did_you_mean
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
-Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bool | str):  # pydantic would take true for 1, and "5" for 5
+        raise ValueError(f"expected a number, got {value!r}")
+    return value
+
+
+Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
+Count = Annotated[int, BeforeValidator(_plain)]
 
 
 def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
@@ -54,7 +63,7 @@ def _wrong(key: str, message: str) -> PydanticCustomError:
 class FreeSection(Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: int = Field(
+    max_control_points: Count = Field(
         ge=1, le=MAX_CONTROL_POINTS, description="Maximum number of control points."
     )
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
@@ -64,7 +73,7 @@ class InputSection(Strict):
     """One input signal: searched within a range, or kept constant."""
 
     range: Range | None = Field(None, description="[low, high]; default: the FMU's min and max.")
-    control_points: int | None = Field(
+    control_points: Count | None = Field(
         None,
         ge=1,
         le=MAX_CONTROL_POINTS,
@@ -194,7 +203,7 @@ class CouplingSection(Strict):
         description="Change of an output, relative above 1, below which an initialisation or an iteration "
         "has converged.",
     )
-    max_rounds: int = Field(
+    max_rounds: Count = Field(
         100, ge=1, description="Maximum number of rounds of an initialisation, and of an iterated step."
     )
     isolation: Isolation = Field(

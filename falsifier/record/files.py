@@ -21,6 +21,8 @@ from falsifier.errors import JournalError, rejected
 _LOG = logging.getLogger(__name__)
 
 TRAJECTORIES = "trajectories"
+# The file that makes a directory a campaign's, whose runs have directories of their own below it.
+CAMPAIGN = "campaign.json"
 # Names of files that are complete.
 TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 
@@ -98,13 +100,17 @@ def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
 
 
 def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
-    """Load the trajectory of a record; None if it was not kept, or is damaged, of which a warning tells."""
+    """Load the trajectory of a record; None if it is not kept, or is damaged, of which a warning tells."""
     if name is None:
         return None
     path = directory / name
     try:
         content = path.read_bytes()
     except OSError as error:
+        # Where only the best one is kept, it is the only file, and later than those that it has replaced.
+        left = [int(other.name.partition("-")[0]) for other in path.parent.glob("*.npz")]
+        if len(left) == 1 and left[0] > int(path.name.partition("-")[0]):
+            return None
         _tell_lost(path, error.strerror or "it cannot be read")
         return None
     if is_intact(path, content):

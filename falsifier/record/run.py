@@ -21,6 +21,7 @@ from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
+from falsifier.record.files import CAMPAIGN
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
 from falsifier.record.records import EvaluatedRecord
 from falsifier.record.replay import replayed
@@ -267,6 +268,8 @@ def carry_out(
                 f"{directory} already contains a run: choose another directory, or to continue it: "
                 + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
             )
+        if directory is not None and (directory / CAMPAIGN).exists():
+            raise JournalError(f"{directory} already contains a campaign: choose another directory")
         if directory is not None and not begun and holds_lines(directory):
             raise JournalError(
                 f"{directory} contains a journal without its manifest, so its run is unknown: "

@@ -143,14 +143,9 @@ S = TypeVar("S", bound=Summary)
 
 
 class RunFollower(Generic[S]):
-    """Follows the journal of a run that may still be going on.
+    """Follows the journal of a run that may still be going on, or need not have started.
 
-    Args:
-        directory: run directory; the run need not have started.
-        empty: the summaries before the first record, one per requirement that is of interest.
-
-    Attributes:
-        summaries: what was read so far.
+    Its summaries, one per requirement of interest, say what was read so far; ``empty`` are those before.
     """
 
     def __init__(self, directory: Path, empty: Sequence[S]) -> None:

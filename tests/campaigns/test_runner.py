@@ -57,6 +57,11 @@ def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path)
     run_campaign(request("easy"), directory)
     with pytest.raises(JournalError, match="already contains a campaign"):
         run_campaign(request("easy"), directory)
+    with pytest.raises(JournalError, match="already contains a campaign"):
+        falsify(problems.easy(), "uniform", budget=1, directory=directory)
+    falsify(problems.easy(), "uniform", budget=1, directory=tmp_path / "r")
+    with pytest.raises(JournalError, match="already contains a run"):
+        run_campaign(request("easy"), tmp_path / "r")
     with (
         campaign_lock(directory),
         pytest.raises(JournalError, match="another process is working on"),

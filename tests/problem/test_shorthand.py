@@ -44,7 +44,7 @@ def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
         if key in ("ranges", "values", "allow", "deny"):
             said.setdefault(key, []).append(value)
         else:
-            said[key] = value
+            said[key] = value if key == "interface" else float(value)
     assert changes_from_options(**said) == changes
 
 

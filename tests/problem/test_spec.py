@@ -34,6 +34,8 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
         ("inputs.u.range", [0], r"inputs\.u\.range\.1: a value is missing"),
         ("inputs.u.interpolation", "cubic", r"inputs\.u\.interpolation: .*'constant', got 'cubic'$"),
+        ("inputs.u.control_points", True, r"inputs\.u\.control_points: expected a number, got True$"),
+        ("model.stop_time", "50", r"model\.stop_time: expected a number, got '50'$"),
         ("inputs.u.control_points", 0, r"inputs\.u\.control_points: .*greater than or equal to 1, got 0$"),
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
         ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),

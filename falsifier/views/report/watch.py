@@ -206,8 +206,10 @@ def application(watch: Watch) -> "Application":
 
     async def stop(request: "Request") -> "Response":
         token = str((await request.post()).get("token", ""))
-        if not watch.token or not compare_digest(token.encode(), watch.token.encode()):
+        if not watch.token:
             raise web.HTTPForbidden(text="stopping was not allowed: falsifier watch --page --allow-stop")
+        if not compare_digest(token.encode(), watch.token.encode()):
+            raise web.HTTPForbidden(text="this page is older than its server: load it again, then stop")
         watch.stop()
         raise web.HTTPSeeOther("/")
 
