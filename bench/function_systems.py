@@ -1,8 +1,8 @@
 """Which engine finds the violations of 17 small systems that were written after the default engine?
 
 ``python -m bench.function_systems`` prints the table of ``bench/example_systems.py`` for 42 requirements: of
-the nine systems in this file and of the eight machines. The engine was finished before they were written, and
-was not changed after them. Committed table: ``bench/search.md``.
+the nine systems in this file and of the eight machines. The engine was finished before they were written;
+``bench/search.md`` says beside the table what was changed after them.
 """
 
 from collections.abc import Callable, Mapping
