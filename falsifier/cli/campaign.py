@@ -201,7 +201,7 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
         progress = follower.look()  # after the lock was released: by then everything has been written
         show(progress)
     for run in () if is_campaign(directory) else progress.runs:
-        say(run_line(run))
+        say(run_line(replace(run, status="interrupted") if run.status == "running" else run))
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")

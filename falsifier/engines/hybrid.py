@@ -93,14 +93,7 @@ class Turns:
 
 
 class Hybrid:
-    """The surrogate engine with a language model as adviser.
-
-    Args:
-        problem: the problem to search.
-        seed: of the surrogate.
-        adviser: asks the LLM.
-        surrogate_settings: settings of the surrogate.
-    """
+    """The surrogate engine with a language model as adviser."""
 
     name = "hybrid"
 

@@ -69,9 +69,7 @@ class Levels:
     def add(self, robustness: float, number: int | None = None) -> int | None:
         """Add a simulation; return the place of its level if it is a new one.
 
-        Args:
-            robustness: its robustness.
-            number: its number, from 1; None: that of those added.
+        Simulations are numbered from 1, by default in the order in which they are added.
         """
         self.simulations += 1
         place = bisect_left(self.found, robustness, key=lambda level: level.robustness)

@@ -67,12 +67,7 @@ _KEPT_TRAJECTORIES = 200
 
 
 class Journal:
-    """Writes one run directory as a listener of the run; made by open_journal.
-
-    Args:
-        directory: run directory, whose lock is held.
-        keep: which trajectories are kept.
-    """
+    """Writes one run directory, whose lock is held, as a listener of the run; made by open_journal."""
 
     def __init__(self, directory: Path, keep: Keep) -> None:
         self.directory = directory

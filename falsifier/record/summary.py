@@ -143,7 +143,7 @@ S = TypeVar("S", bound=Summary)
 
 
 class RunFollower(Generic[S]):
-    """Follows the journal of a run that may still be going on, or need not have started.
+    """Follows the journal of a run that may still be going on, and need not have started.
 
     Its summaries, one per requirement of interest, say what was read so far; ``empty`` are those before.
     """

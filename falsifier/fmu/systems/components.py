@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import gcd, lcm
+from math import ceil, gcd, lcm
 from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import one_of, positive
-from falsifier.core.model import Interface, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
 from falsifier.fmu.description.model_description import Description
@@ -135,7 +135,9 @@ def merged(
         platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
         stop_time=frame.stop_time or _only([i.stop_time for i in infos]),
-        step_size=_step([m.step for m in members], [i.step_size for i in infos]),
+        step_size=_step(
+            [m.step for m in members], [m.description.info.step_size for m in members if not m.step]
+        ),
         tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
         variables=tuple(variables),
         components=tuple(m.name for m in members),
@@ -175,9 +177,11 @@ def _only(times: Iterable[float | None]) -> float | None:
 
 
 def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float | None:
-    """Return the largest step that divides all steps of the components' own; else the smallest default."""
+    """Return the largest step that divides all of the components' own, and exceeds no default of others."""
     exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in own if step]
-    if exact:
-        whole = lcm(*(step.denominator for step in exact))
-        return gcd(*(int(step * whole) for step in exact)) / whole
-    return min((step for step in default if step), default=None)
+    finest = min((step for step in default if step), default=None)
+    if not exact:
+        return finest
+    whole = lcm(*(step.denominator for step in exact))
+    common = gcd(*(int(step * whole) for step in exact)) / whole
+    return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING))

@@ -1,9 +1,11 @@
+from pathlib import Path
+
 import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
-from falsifier.fmu import Coupling, System
+from falsifier.fmu import Component, Coupling, System
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
 
@@ -70,3 +72,9 @@ def test_the_default_step_divides_the_steps_of_the_components(
 ) -> None:
     a, b = (component("Plant_2", step) for step in steps)
     assert system({"a": a, "b": b}, {}).info.step_size == pytest.approx(expected)
+
+
+def test_the_default_step_is_no_longer_than_that_of_an_fmu_without_a_step_of_its_own() -> None:
+    fmus = Path(__file__).resolve().parents[3] / "fmus"
+    parts = {"car": Component(fmus / "ATCar.fmu"), "shift": Component(fmus / "ATShift.fmu", 0.04)}
+    assert System(parts).info.step_size == pytest.approx(0.01)
