@@ -46,7 +46,7 @@ def positive(name: str, given: object) -> float:
     raise SpecError(f"{name}: expected a positive number, got {given!r}")
 
 
-def instance(name: str, given: object, kind: type, expected: str) -> None:
+def instance(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:
     """Check the type of a value that a user gave.
 
     Raises:

@@ -57,6 +57,13 @@ class System(Isolated):
         self._resolve_rights()
         instance("components", self.components, Mapping, "FMUs by name")
         instance("connections", self.connections, Mapping, "outputs by input")
+        instance("coupling", self.coupling, Coupling, "a Coupling such as Coupling('jacobi')")
+        for name, given in self.components.items():
+            instance(
+                f"components: {name}", given, (Component, str, Path), "a Component or the path of an FMU"
+            )
+        for target, source in self.connections.items():
+            instance(f"connections: {target}", source, (Connection, str), "an output or a Connection")
         if not self.components:
             raise SpecError("components: expected at least one FMU")
         if "" in self.components:

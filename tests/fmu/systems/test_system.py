@@ -1,4 +1,5 @@
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -6,6 +7,7 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Component, Coupling, System
+from tests.fmu.fixtures import path
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
 
@@ -78,3 +80,17 @@ def test_the_default_step_is_no_longer_than_that_of_an_fmu_without_a_step_of_its
     fmus = Path(__file__).resolve().parents[3] / "fmus"
     parts = {"car": Component(fmus / "ATCar.fmu"), "shift": Component(fmus / "ATShift.fmu", 0.04)}
     assert System(parts).info.step_size == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"components": {"a": 5}}, "components: a: expected a Component or the path of an FMU, got 5"),
+        ({"connections": {"a.u": 5}}, "connections: a.u: expected an output or a Connection, got 5"),
+        ({"coupling": "jacobi"}, "coupling: expected a Coupling such as"),
+    ],
+)
+def test_what_is_no_part_of_a_system_is_named(arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(SpecError) as wrong:
+        System(**{"components": {"a": path("Plant_2")}, **arguments})
+    assert str(wrong.value).startswith(said)
