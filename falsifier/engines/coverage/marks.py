@@ -39,14 +39,7 @@ class Mark(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A change of a discrete signal, or of the truth of a predicate.
-
-    Attributes:
-        sample: index of the first sample with the new value.
-        source: the signal or predicate.
-        old: value before.
-        new: value after.
-    """
+    """A change of a discrete signal or of a predicate; the sample is the first one with the new value."""
 
     sample: int
     source: str

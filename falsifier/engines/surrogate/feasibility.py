@@ -17,10 +17,6 @@ class Feasibility:
 
     Linear in these and in the squares of the extremes, because few failures must do: it generalises from two
     of them, and an input that does not matter does not disturb it.
-
-    Attributes:
-        layout: layout of the points.
-        grid: the cells over which inputs are summarized.
     """
 
     layout: Layout

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
@@ -123,8 +123,6 @@ def opened(path: Path, shown: str, expected: str) -> Iterator[Element]:
         raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
     try:
         yield root
-    except KeyError as error:
-        raise SpecError(f"{shown}: the attribute {error} is missing") from None
     except ValueError as error:
         raise SpecError(f"{shown}: {error}") from None
 
@@ -132,6 +130,14 @@ def opened(path: Path, shown: str, expected: str) -> Iterator[Element]:
 def tag(element: Element) -> str:
     """Return the name of an element without its namespace."""
     return element.tag.rpartition("}")[2]
+
+
+def attribute(element: Element, name: str) -> str:
+    """Return an attribute; ValueError naming the element if it is missing."""
+    if (found := element.get(name)) is None:
+        stated = "".join(f' {key}="{value}"' for key, value in element.attrib.items())
+        raise ValueError(f"<{tag(element)}{stated}>: the attribute {name!r} is missing")
+    return found
 
 
 def type_and_unit(element: Element) -> tuple[str, str, Element]:
@@ -145,7 +151,10 @@ def type_and_unit(element: Element) -> tuple[str, str, Element]:
 
 def number(text: str) -> float:
     """Return the finite number of an attribute; raise ValueError for others."""
-    found = float(text)
+    try:
+        found = float(text)
+    except ValueError:
+        found = inf
     if not isfinite(found):
         raise ValueError(f"{text!r} is not a finite number")
     return found
@@ -232,11 +241,11 @@ def _entries(
 
 
 def _value(parameter: Element) -> Given:
-    name = parameter.attrib["name"]
+    name = attribute(parameter, "name")
     kind, unit, typed = type_and_unit(parameter)
     if not kind:
         raise ValueError(f"the parameter {name!r} has no value of a known type")
-    value: float | str = typed.attrib["value"]
+    value: float | str = attribute(typed, "value")
     if kind not in ("Enumeration", "String"):
         if kind == "Boolean" and value not in ("true", "false", "0", "1"):
             raise ValueError(f"the parameter {name!r} is {value!r}; expected true or false")
@@ -245,4 +254,4 @@ def _value(parameter: Element) -> Given:
 
 
 def _mapped(entry: Element) -> tuple[str, str, Transformation]:
-    return entry.attrib["source"], entry.attrib["target"], transformation(entry)
+    return attribute(entry, "source"), attribute(entry, "target"), transformation(entry)

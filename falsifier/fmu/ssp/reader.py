@@ -19,6 +19,7 @@ from falsifier.fmu.ssp.package import (
     Given,
     Package,
     Transformation,
+    attribute,
     bound_values,
     number,
     opened,
@@ -220,7 +221,7 @@ class _Reader:
     def _declare(self, element: Element, at: str, variables: Mapping[str, Variable] | None = None) -> None:
         """Note the connectors of an element; those of an FMU must fit its variables."""
         for connector in element.findall("{*}Connectors/{*}Connector"):
-            name, kind = connector.attrib["name"], connector.attrib["kind"]
+            name, kind = attribute(connector, "name"), attribute(connector, "kind")
             stated, unit, _ = type_and_unit(connector)
             title = f"the connector {_title((at, name))}"
             if variables is not None:
@@ -234,7 +235,7 @@ class _Reader:
             self._connectors[at, name] = kind, unit
 
     def _component(self, element: Element, at: str, package: Package, above: tuple[Path, ...]) -> None:
-        name, source = element.attrib["name"], element.attrib["source"]
+        name, source = attribute(element, "name"), attribute(element, "source")
         if not (name and source):
             raise ValueError(
                 f"a component has the name {name!r} and the source {source!r}; neither may be empty"
@@ -279,7 +280,7 @@ class _Reader:
     def _wire(self, wire: Element, at: str, children: Sequence[str]) -> None:
         """Note which end feeds the other; an input connector is a source inside of its own system."""
         change = transformation(wire)
-        ends = [(wire.get(f"{end}Element"), wire.attrib[f"{end}Connector"]) for end in ("start", "end")]
+        ends = [(wire.get(f"{end}Element"), attribute(wire, f"{end}Connector")) for end in ("start", "end")]
         shown = [f"{element}.{name}" if element else name for element, name in ends]
         text = f"the connection {' - '.join(shown)}"
         sources: list[End] = []

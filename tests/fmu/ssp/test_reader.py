@@ -177,6 +177,10 @@ WRONG = {
     "plant.u is fed by the output box.out, which nothing feeds": structure(
         system(PLANT + PI + system("", before=OUT, name="box"), FED_BY_NOTHING)
     ),
+    "<Connector kind=\"input\">: the attribute 'name' is missing": plant('name="u" kind', "kind"),
+    "'much' is not a finite number": structure(
+        system(PLANT, before=BOUND.format(values("plant.T Real much")))
+    ),
     "the connection pi.y - plant.T feeds a parameter": feedback('Connector="u"', 'Connector="T"'),
     "the parameter 'plant.T' is 'maybe'; expected true or false": structure(
         system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
