@@ -141,7 +141,7 @@ class _Line:
             case Exchanged(spent=spent):
                 self._note = f"LLM replied, {spent.tokens} tokens so far"
             case RunEnded():
-                self._note = f"{event.status}; {self._note}"
+                self._seconds, self._note = 0.0, f"{event.status}; {self._note}"  # no time is left
         self._show(self)
 
 

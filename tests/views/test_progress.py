@@ -43,6 +43,12 @@ def test_progress_is_one_line_that_ends_with_the_outcome(front_end: Shown) -> No
     assert "not falsified" in front_end.lines[-1]
 
 
+def test_no_time_is_left_when_a_run_has_ended(front_end: Shown) -> None:
+    falsify(hard(), "corners", budget=10_000_000, listeners=[progress()])
+    assert any(" left" in line for line in front_end.lines)
+    assert " left" not in front_end.lines[-1]
+
+
 def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) -> None:
     with make_display() as display:
         falsify(hard(), "corners", budget=5, listeners=[display])
