@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from falsifier.context.thresholds import CLOSING, OPENING, Token, statements, tokens_of
+from falsifier.context.thresholds import CLOSING, OPENING, SourceToken, statements, tokens_of
 
 # Patterns take what they have looked at, so that time grows with the length of a file.
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)[ \t]+(.*)", re.DOTALL)
@@ -86,7 +86,7 @@ def without_annotations(text: str) -> str:
     return told + (text[end:] if begun is None else text[end:begun].rstrip())
 
 
-def _assignments(text: str, tokens: Sequence[Token], *, is_modelica: bool) -> Iterator[Assigned]:
+def _assignments(text: str, tokens: Sequence[SourceToken], *, is_modelica: bool) -> Iterator[Assigned]:
     begins: dict[int, int] = {}  # of brackets, by where they end
     opened: list[int] = []
     is_constant = False
@@ -118,7 +118,7 @@ def _stated(value: str) -> str:
     return " ".join(_COMMENT.sub(" ", value.replace("\\\n", " ")).split())
 
 
-def _value(text: str, tokens: Sequence[Token], sign: int) -> str:
+def _value(text: str, tokens: Sequence[SourceToken], sign: int) -> str:
     """Return what stands behind an equals sign; empty if it is long."""
     depth = 0
     for token in tokens[sign + 1 : sign + 2 + _MAX_VALUE]:

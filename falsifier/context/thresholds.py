@@ -34,7 +34,7 @@ _TOKEN = re.compile(
 )
 
 
-class Token(NamedTuple):
+class SourceToken(NamedTuple):
     """One word, number, text, sign or line of C's preprocessor, and where it stands in its file."""
 
     kind: str  # name, number, text, sign or directive
@@ -89,7 +89,7 @@ def thresholds(
                 yield found
 
 
-def _compared(tokens: Sequence[Token]) -> Iterator[tuple[int, int, int]]:
+def _compared(tokens: Sequence[SourceToken]) -> Iterator[tuple[int, int, int]]:
     """Return where the sign of each comparison is, where its left side begins and its right side ends.
 
     Comparisons in brackets that are not closed end with the tokens.
@@ -113,7 +113,7 @@ def _compared(tokens: Sequence[Token]) -> Iterator[tuple[int, int, int]]:
 
 def _threshold(
     text: str,
-    sides: tuple[Sequence[Token], Sequence[Token]],
+    sides: tuple[Sequence[SourceToken], Sequence[SourceToken]],
     constants: Mapping[str, str],
     place: str,
     *,
@@ -149,13 +149,13 @@ def _numbers(texts: Iterable[str]) -> Iterator[float]:
                     yield -number if sign == "-" else number
 
 
-def _is_name(side: Sequence[Token]) -> bool:
+def _is_name(side: Sequence[SourceToken]) -> bool:
     """Whether an operand is nothing but a name, such as ``(m->u)``."""
     is_called = any(a.kind == "name" and b.text == "(" for a, b in pairwise(side))
     return not is_called and all(t.kind == "name" or t.text in (".", "->", "(", ")") for t in side)
 
 
-def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[str, str]]:
+def _variables(tokens: Sequence[SourceToken], *, is_dotted: bool) -> Iterator[tuple[str, str]]:
     """Names that are no functions, with the last part of each: of ``a->b`` the name is ``b``, too."""
     path = ""
     for token, after in pairwise(chain(tokens, (None,))):
@@ -168,16 +168,16 @@ def _variables(tokens: Sequence[Token], *, is_dotted: bool) -> Iterator[tuple[st
             path = f"{path}{token.text}" if after.text == "." else ""
 
 
-def tokens_of(text: str) -> Iterator[Token]:
+def tokens_of(text: str) -> Iterator[SourceToken]:
     """Return the tokens of a text in any of the languages, without blanks and comments."""
     for found in _TOKEN.finditer(text):
         if found.lastgroup not in ("blank", "comment"):
-            yield Token(found.lastgroup or "", found[0], found.start(), found.end())
+            yield SourceToken(found.lastgroup or "", found[0], found.start(), found.end())
 
 
-def statements(text: str) -> Iterator[list[Token]]:
+def statements(text: str) -> Iterator[list[SourceToken]]:
     """Return the tokens between semicolons outside of square brackets, where they end rows of a matrix."""
-    tokens: list[Token] = []
+    tokens: list[SourceToken] = []
     depth = 0
     for token in tokens_of(text):
         depth += (token.text == "[") - (token.text == "]")

@@ -7,8 +7,8 @@ from pathlib import Path
 from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End, Wire
 from falsifier.context.simulink.parameters import meaningful
 from falsifier.context.simulink.sections import (
+    ModelPackage,
     Node,
-    Package,
     parse_mdl,
     read_parts,
     text_parts,
@@ -53,7 +53,7 @@ def _diagram(tree: Node, shown: str) -> Diagram:
 
 def _tree(path: Path) -> Node:
     if path.suffix.lower() == ".slx":
-        return Package(read_parts(path), str(path)).tree()
+        return ModelPackage(read_parts(path), str(path)).tree()
     try:
         size = path.stat().st_size
         if size > _MAX_TEXT_BYTES:
@@ -68,7 +68,7 @@ def _tree(path: Path) -> Node:
     if "\0" in text:
         raise SpecError(f"{path}: expected text, found binary data; save the model as .mdl or .slx again")
     if parts := text_parts(text):
-        return Package(parts, str(path)).tree()
+        return ModelPackage(parts, str(path)).tree()
     return parse_mdl(text, str(path))
 
 

@@ -151,7 +151,7 @@ def read_parts(path: Path) -> dict[str, bytes]:
     return parts
 
 
-class Package:
+class ModelPackage:
     """The parts of a package, by their names in small letters, and what errors call the file."""
 
     def __init__(self, parts: Mapping[str, bytes], shown: str) -> None:

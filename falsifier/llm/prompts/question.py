@@ -24,7 +24,7 @@ from falsifier.llm.prompts.published import (
     published_facts,
     published_standing,
 )
-from falsifier.llm.prompts.reached import Progress, Reached
+from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -85,7 +85,7 @@ class _Sample:
     tokens: tuple[int, ...]  # of each of these
     depth: int  # which of them is told
     robustness: float | None  # None: there is no verdict
-    progress: Progress = field(default_factory=Progress)
+    progress: SampleProgress = field(default_factory=SampleProgress)
     is_first: bool = False  # whether it was the first to reach something
 
 
@@ -282,7 +282,9 @@ class Questions:
         if verdict is None:
             text = _text(inputs, _failure(evaluation), *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
-        progress = Progress.of(self.view, evaluation.trajectory) if evaluation.trajectory else Progress()
+        progress = (
+            SampleProgress.of(self.view, evaluation.trajectory) if evaluation.trajectory else SampleProgress()
+        )
         news = self._reached.news(progress)
         predicates = self.view.requirement.formula.predicates
         self._climb.add(self._told, verdict, evaluation.trajectory, predicates)

@@ -20,14 +20,14 @@ _MOST_NEW = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class SampleProgress:
     """What the recorded signals of one sample did: stages of the discrete ones, ranges of the others."""
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, view: View, trajectory: Trajectory) -> "Progress":
+    def of(cls, view: View, trajectory: Trajectory) -> "SampleProgress":
         """Look at a trajectory up to where the requirement looks."""
         columns = view.inside(trajectory).columns
         stages: set[Stage] = set()
@@ -53,7 +53,7 @@ class Reached:
         self._stages: set[Stage] = set()
         self._ranges: dict[str, tuple[float, float]] = {}
 
-    def news(self, progress: Progress) -> tuple[str, ...]:
+    def news(self, progress: SampleProgress) -> tuple[str, ...]:
         """Add a sample; return what no earlier one did, in words; of the first one nothing."""
         is_begun = self._stages or self._ranges
         found = [*self._new_stages(progress), *self._further(progress)] if is_begun else []
@@ -63,7 +63,7 @@ class Reached:
             self._ranges[name] = (min(low, least), max(high, most))
         return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
 
-    def rank(self, progress: Progress) -> float:
+    def rank(self, progress: SampleProgress) -> float:
         """How far a sample got among all so far: its stages, and the share of all ranges that it covered."""
         shares = [
             (high - low) / (most - least)
@@ -73,7 +73,7 @@ class Reached:
         ]
         return len(progress.stages) + (sum(shares) / len(shares) if shares else 0.0)
 
-    def _new_stages(self, progress: Progress) -> Iterator[str]:
+    def _new_stages(self, progress: SampleProgress) -> Iterator[str]:
         for name, before, value in sorted(
             progress.stages - self._stages, key=lambda s: (s[0], s[1] is not None, s[1] or 0.0, s[2])
         ):
@@ -83,7 +83,7 @@ class Reached:
     def _value(self, name: str, value: float) -> str:
         return self._view.labelled(name, value, plain(value, 6))
 
-    def _further(self, progress: Progress) -> Iterator[str]:
+    def _further(self, progress: SampleProgress) -> Iterator[str]:
         for name, (low, high) in progress.ranges.items():
             least, most = self._ranges.get(name, (low, high))
             least_new = _FURTHER * (most - least)
