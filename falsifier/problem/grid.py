@@ -33,12 +33,7 @@ _MOST_PIECES = 1000
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A time grid.
-
-    Attributes:
-        interval: its step in s.
-        reason: why this one, in words.
-    """
+    """A time grid: its step in s, and why this one, in words."""
 
     interval: float
     reason: str

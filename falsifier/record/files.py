@@ -2,6 +2,7 @@
 
 import errno
 import logging
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -70,10 +71,7 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
 def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
     """Hold a lock file; that of a killed process is released by the system.
 
-    Args:
-        path: the lock file.
-        busy: what to say if another process holds it.
-        patience: time in s to wait for that process.
+    Another process is waited for, ``patience`` s at most; ``busy`` is what to say if it still holds the file.
 
     Raises:
         JournalError: if another process still holds it after that time.
@@ -108,8 +106,10 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         content = path.read_bytes()
     except OSError as error:
         # Where only the best one is kept, it is the only file, and later than those that it has replaced.
-        left = [int(other.name.partition("-")[0]) for other in path.parent.glob("*.npz")]
-        if len(left) == 1 and left[0] > int(path.name.partition("-")[0]):
+        left = [
+            _index(other) for other in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, other.name)
+        ]
+        if isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path):
             return None
         _tell_lost(path, error.strerror or "it cannot be read")
         return None
@@ -117,6 +117,10 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         return Trajectory.load(BytesIO(content))
     _tell_lost(path, "its checksum does not match")
     return None
+
+
+def _index(trajectory: Path) -> int:
+    return int(trajectory.name.partition("-")[0])
 
 
 @cache

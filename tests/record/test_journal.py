@@ -82,3 +82,15 @@ def test_what_is_set_aside_replaces_nothing(tmp_path: Path) -> None:
         (tmp_path / "a").write_text(str(number))
         assert set_aside(tmp_path / "a").name == f"a.damaged-{number}"
     assert (tmp_path / "a.damaged-1").read_text() == "1"
+
+
+def test_trajectories_that_a_better_one_has_replaced_are_not_told_as_damaged(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    falsify(impossible(), "uniform", budget=20, directory=tmp_path)
+    kept = sorted((tmp_path / "trajectories").iterdir(), key=lambda path: int(path.name.partition("-")[0]))
+    for path in kept[:-1]:
+        path.unlink()
+    (tmp_path / "trajectories" / "mine.npz").touch()
+    found = recorded_evaluations(tmp_path, read_journal(tmp_path))
+    assert found[0].trajectory is None and "is damaged" not in caplog.text

@@ -400,7 +400,10 @@ class _Reader:
         low, high = variable.limits
         if (low is not None and value < low) or (high is not None and value > high):
             limits = ", ".join("no limit" if x is None else f"{x:g}" for x in (low, high))
-            raise self._wrong(f"{value:g} exceeds the FMU's limits for {variable.name!r}, [{limits}]")
+            raise self._wrong(
+                f"the parameter {given.name} is {value:g}, beyond the FMU's limits for {variable.name!r}, "
+                f"[{limits}]; correct it"
+            )
         return value
 
 

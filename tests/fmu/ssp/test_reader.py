@@ -185,7 +185,7 @@ WRONG = {
     "the parameter 'plant.T' is 'maybe'; expected true or false": structure(
         system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
     ),
-    "-5 exceeds the FMU's limits for 'T', [0.1, no limit]": structure(
+    "the parameter plant.T is -5, beyond the FMU's limits for 'T', [0.1, no limit]; correct it": structure(
         system(PLANT, before=BOUND.format(values("plant.T Real -5")))
     ),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
