@@ -97,6 +97,24 @@ class Variable:
         high = max(numbers, default=None) if self.high is None else self.high
         return low, high
 
+    @property
+    def items_text(self) -> str:
+        """Numbers and names of an enumeration's items; empty for other types."""
+        return ", ".join(f"{number} = {name}" for name, number in self.literals.items())
+
+    def excess(self, low: float, high: float) -> str:
+        """Say which limits a range, or a single value, exceeds; empty if none."""
+        numbers = self.literals.values()
+        for what, (least, most) in (
+            (f"the range of the type {self.type} of", self.type_limits or (None, None)),
+            (f"the items ({self.items_text}) of", (min(numbers), max(numbers)) if numbers else (None, None)),
+            ("the model's limits for", self.limits),
+        ):
+            if (least is not None and low < least) or (most is not None and high > most):
+                limits = ", ".join("no limit" if limit is None else f"{limit:g}" for limit in (least, most))
+                return f"exceeds {what} {self.name!r}, [{limits}]"
+        return ""
+
 
 @dataclass(frozen=True, slots=True)
 class ModelInfo:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -264,16 +263,10 @@ def check_limits(problem: Problem) -> None:
     Raises:
         SpecError: naming the range that exceeds them.
     """
-    limits = {v.name: v.limits for v in problem.info.variables}
     ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
-    for searched in ranges:
-        low, high = limits.get(searched.name, (None, None))
-        if (low is not None and searched.low < low) or (high is not None and searched.high > high):
-            least, most = (-inf if low is None else low), (inf if high is None else high)
-            raise SpecError(
-                f"{problem.name}: [{searched.low:g}, {searched.high:g}] exceeds the model's limits for "
-                f"{searched.name!r}, [{least:g}, {most:g}]; narrow the range"
-            )
+    for each in ranges:
+        if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
+            raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
 
 
 def check_names(problems: Iterable[Problem]) -> None:

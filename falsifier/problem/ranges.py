@@ -144,25 +144,13 @@ def _check(variable: Variable, low: float, high: float | None = None) -> None:
     """Check a range, or a single value, against the variable's type and the FMU's min and max."""
     key, shown, high = ("value", f"{low:g}", low) if high is None else ("range", f"[{low:g}, {high:g}]", high)
     numbers = variable.literals.values()
-    items = (min(numbers), max(numbers)) if numbers else (None, None)
     with in_section(key=key):
-        for what, (least, most) in (
-            (f"the range of the type {variable.type} of", variable.type_limits or (None, None)),
-            (f"the items ({items_text(variable)}) of the enumeration", items),
-            ("the FMU's limits for", (variable.low, variable.high)),
-        ):
-            if (least is not None and low < least) or (most is not None and high > most):
-                limits = ", ".join("no limit" if limit is None else f"{limit:g}" for limit in (least, most))
-                raise SpecError(f"{shown} exceeds {what} {variable.name!r}, [{limits}]")
+        if excess := variable.excess(low, high):
+            raise SpecError(f"{shown} {excess}")
         # Whether a range contains such a number is checked by the range itself.
         if variable.kind != "real" and key == "value" and low not in (numbers or (round(low),)):
-            expected = f"one of {items_text(variable)}" if numbers else "an integer"
+            expected = f"one of {variable.items_text}" if numbers else "an integer"
             raise SpecError(f"{shown}: expected {expected} for {variable.name!r}")
-
-
-def items_text(variable: Variable) -> str:
-    """Return the numbers and names of an enumeration's items."""
-    return ", ".join(f"{number} = {name}" for name, number in variable.literals.items())
 
 
 def _value_kind(variable: Variable) -> ValueKind:

@@ -20,7 +20,7 @@ from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec, load_source
 from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
-from falsifier.problem.ranges import DEFAULT_POINTS, items_text
+from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import RequirementSection
 from falsifier.problem.source import MODEL_FILES, ProblemSource
@@ -99,7 +99,7 @@ def _local(name: str) -> str:
 def _input(v: Variable) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
     lines = [f"[inputs.{_key(v.name)}]"]
-    lines += [_comment(line) for line in (meaning, items_text(v) if v.literals else "") if line]
+    lines += [_comment(line) for line in (meaning, v.items_text) if line]
     low, high = v.limits
     # What the FMU leaves open is one unit away from what it states.
     if low is None:
