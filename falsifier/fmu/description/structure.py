@@ -36,17 +36,22 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
     """Return the units that a description defines by base units (FMI 2 and 3); those without are left out.
 
     Raises:
-        ValueError: if a number is not one.
+        ValueError: naming the unit of which a number is not one, or a name is missing.
     """
     found = {}
     for element in root.findall(tag):
         base = element.find("{*}BaseUnit")
         if base is not None:
-            found[element.attrib["name"]] = Unit(
-                tuple(int(base.get(name, "0")) for name in _BASE),
-                float(base.get("factor", "1")),
-                float(base.get("offset", "0")),
-            )
+            try:
+                found[element.attrib["name"]] = Unit(
+                    tuple(int(base.get(name, "0")) for name in _BASE),
+                    float(base.get("factor", "1")),
+                    float(base.get("offset", "0")),
+                )
+            except (LookupError, ValueError) as error:
+                raise ValueError(
+                    f"the unit {element.get('name')!r}: {type(error).__name__}: {error}"
+                ) from None
     return found
 
 

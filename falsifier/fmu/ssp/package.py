@@ -17,7 +17,7 @@ from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
-from falsifier.errors import ModelError, SpecError, did_you_mean
+from falsifier.errors import ModelError, SpecError, did_you_mean, in_section
 from falsifier.fmu.description.archive import extract, file_hash
 from falsifier.fmu.description.variables import is_true
 from falsifier.fmu.description.xml import read_xml
@@ -70,12 +70,12 @@ class Package:
         try:
             parts = urlsplit(source)
         except ValueError:
-            raise SpecError(f"{self.shown}: {source!r} is not a path; name a file in the package") from None
+            raise SpecError(f"{source!r} is not a path; name a file in the package") from None
         path = PurePosixPath(unquote(parts.path))
         if parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts:
             raise SpecError(
-                f"{self.shown}: {source!r} is not inside the package; put the file there and name it "
-                f"relative to {self.description.name}"
+                f"{source!r} is not inside the package; put the file there and name it relative to "
+                f"{self.description.name}"
             )
         found = self.description.parent / path
         try:
@@ -83,7 +83,7 @@ class Package:
                 return found
         except (OSError, ValueError):  # the name is too long, or no name
             pass
-        raise SpecError(f"{self.shown}: the resource {source!r} is missing; export the package again")
+        raise SpecError(f"the resource {source!r} is missing; export the package again")
 
 
 @lru_cache(maxsize=64)
@@ -114,17 +114,26 @@ def opened(path: Path, shown: str, expected: str) -> Iterator[Element]:
     """Give the root element of a file, for as long as it is read.
 
     Raises:
-        SpecError: if it has not the expected name; also for what is then found wrong with its attributes.
+        SpecError: if it has not the expected name; also names the file in what is then found wrong.
     """
-    if path.stat().st_size > _MAX_TEXT_BYTES:
-        raise SpecError(f"{shown} has more than {_MAX_TEXT_BYTES >> 20} MiB")
-    root = read_xml(path.read_bytes(), shown, SpecError)
-    if not root.tag.startswith(_NAMESPACE) or tag(root) != expected:
-        raise SpecError(f"{shown}: expected the SSP element {expected}, got {root.tag}")
-    try:
+    with in_section(shown):
+        if path.stat().st_size > _MAX_TEXT_BYTES:
+            raise SpecError(f"it has more than {_MAX_TEXT_BYTES >> 20} MiB; split it")
+        root = read_xml(path.read_bytes(), "the file", SpecError)
+        if not root.tag.startswith(_NAMESPACE) or tag(root) != expected:
+            raise SpecError(f"expected the SSP element {expected}, got {root.tag}")
         yield root
-    except ValueError as error:
-        raise SpecError(f"{shown}: {error}") from None
+
+
+@contextmanager
+def within(place: str) -> Iterator[None]:
+    """Name the element of which an error raised within speaks, if it names no other file."""
+    try:
+        yield
+    except SpecError as error:
+        if error.file is not None:
+            raise
+        raise SpecError(f"{place}: {error}") from None
 
 
 def tag(element: Element) -> str:
@@ -133,10 +142,10 @@ def tag(element: Element) -> str:
 
 
 def attribute(element: Element, name: str) -> str:
-    """Return an attribute; ValueError naming the element if it is missing."""
+    """Return an attribute; SpecError naming the element if it is missing."""
     if (found := element.get(name)) is None:
         stated = "".join(f' {key}="{value}"' for key, value in element.attrib.items())
-        raise ValueError(f"<{tag(element)}{stated}>: the attribute {name!r} is missing")
+        raise SpecError(f"<{tag(element)}{stated}>: the attribute {name!r} is missing")
     return found
 
 
@@ -149,14 +158,14 @@ def type_and_unit(element: Element) -> tuple[str, str, Element]:
     return tag(typed), "" if unit == "1" else unit, typed
 
 
-def number(text: str) -> float:
-    """Return the finite number of an attribute; raise ValueError for others."""
+def number(name: str, text: str) -> float:
+    """Return the finite number that an attribute states; raise SpecError for others."""
     try:
         found = float(text)
     except ValueError:
         found = inf
     if not isfinite(found):
-        raise ValueError(f"{text!r} is not a finite number")
+        raise SpecError(f"{name}: {text!r} is not a finite number; correct it")
     return found
 
 
@@ -173,11 +182,13 @@ def transformation(element: Element) -> Transformation:
     """Return the transformation of a connection, or of an entry of a mapping."""
     for child in element:
         if tag(child) in _MAPPINGS:
-            raise ValueError(f"the element {tag(child)} is not supported; map the values inside a component")
+            raise SpecError(f"the element {tag(child)} is not supported; map the values inside a component")
     stated = {k: v for each in element.findall("{*}LinearTransformation") for k, v in each.attrib.items()}
-    factor, offset = number(stated.get("factor", "1")), number(stated.get("offset", "0"))
+    factor, offset = (
+        number(name, stated.get(name, start)) for name, start in (("factor", "1"), ("offset", "0"))
+    )
     if factor == 0.0:
-        raise ValueError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
+        raise SpecError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
     return Transformation(factor, offset, is_true(element.get("suppressUnitConversion")))
 
 
@@ -211,9 +222,7 @@ def bound_values(element: Element, package: Package) -> dict[str, Given]:
         mapping = binding.find("{*}ParameterMapping")
         for each in (binding, mapping):
             if each is not None and each.get("sourceBase", "SSD") != "SSD":
-                raise ValueError(
-                    "parameters inside an FMU (sourceBase) are not supported; put them beside it"
-                )
+                raise SpecError("parameters inside an FMU (sourceBase) are not supported; put them beside it")
         values = _entries(binding, package, "ParameterSet", ".//{*}Parameters/{*}Parameter", _value)
         named = {binding.get("prefix", "") + value.name: value for value in values}
         if mapping is None:
@@ -225,7 +234,7 @@ def bound_values(element: Element, package: Package) -> dict[str, Given]:
         ):
             if source not in named:
                 near = did_you_mean(source, named)
-                raise SpecError(f"{package.shown}: a mapping names the unknown parameter {source!r}; {near}")
+                raise SpecError(f"a mapping names the unknown parameter {source!r}; {near}")
             found[target] = replace(named[source], transformation=change)
     return found
 
@@ -243,15 +252,18 @@ def _entries(
 def _value(parameter: Element) -> Given:
     name = attribute(parameter, "name")
     kind, unit, typed = type_and_unit(parameter)
-    if not kind:
-        raise ValueError(f"the parameter {name!r} has no value of a known type")
-    value: float | str = attribute(typed, "value")
-    if kind not in ("Enumeration", "String"):
+    with within(f"the parameter {name}"):
+        if not kind:
+            raise SpecError(f"it has no value of a known type; state one as {', '.join(_VALUE_TAGS[:5])}")
+        value: float | str = attribute(typed, "value")
         if kind == "Boolean" and value not in ("true", "false", "0", "1"):
-            raise ValueError(f"the parameter {name!r} is {value!r}; expected true or false")
-        value = float(is_true(str(value))) if kind == "Boolean" else number(str(value))
+            raise SpecError(f"{value!r}: expected true or false")
+        if kind not in ("Enumeration", "String"):
+            value = float(is_true(str(value))) if kind == "Boolean" else number("value", str(value))
     return Given(name, value, kind == "Enumeration", unit)
 
 
 def _mapped(entry: Element) -> tuple[str, str, Transformation]:
-    return attribute(entry, "source"), attribute(entry, "target"), transformation(entry)
+    source, target = attribute(entry, "source"), attribute(entry, "target")
+    with within(f"the mapping of {source} to {target}"):
+        return source, target, transformation(entry)

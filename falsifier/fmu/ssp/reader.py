@@ -26,6 +26,7 @@ from falsifier.fmu.ssp.package import (
     tag,
     transformation,
     type_and_unit,
+    within,
 )
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.system import System
@@ -127,18 +128,23 @@ class _Reader:
             raise SpecError(
                 f"{package.shown}: the system contains itself, at {at}; remove one of the references"
             )
-        with opened(file, f"{package.shown}: {file.name}", "SystemStructureDescription") as root:
+        shown = package.shown if package.shown.endswith(file.name) else f"{package.shown}: {file.name}"
+        with opened(file, shown, "SystemStructureDescription") as root:
             version = root.get("version", "")
             if version[:1] not in ("1", "2"):
-                raise ValueError(f"SSP version {version!r}; export it as SSP 1.0 or 2.0")
+                raise SpecError(f"SSP version {version!r}; export it as SSP 1.0 or 2.0")
             system = root.find("{*}System")
             if system is None:
-                raise ValueError("it has no System")
+                raise SpecError("it has no System; export it again")
             stated = {k: v for each in root.findall("{*}DefaultExperiment") for k, v in each.attrib.items()}
-            times = {k: number(v) for k, v in stated.items() if k in ("startTime", "stopTime")}
+            with within("DefaultExperiment"):
+                times = {k: number(k, v) for k, v in stated.items() if k in ("startTime", "stopTime")}
             if not above:
                 self.name, self.times = system.get("name", ""), times
-            self._units |= read_units(root, tag="{*}Units/{*}Unit")
+            try:
+                self._units |= read_units(root, tag="{*}Units/{*}Unit")
+            except ValueError as error:
+                raise SpecError(f"{error}; correct it") from None
             self._walk(system, at, package, (*above, key))
 
     def wiring(self) -> tuple[dict[str, Connection | str], tuple[Variable, ...], tuple[tuple[str, str], ...]]:
@@ -185,11 +191,12 @@ class _Reader:
                     continue
                 if refusal := description.slots[end[1]].refusal:
                     raise self._wrong(f"the parameter {_title(end)} cannot be set: {refusal}")
-                found[_title(end)] = self._value(given, description.info[end[1]])
+                variable = replace(description.info[end[1]], name=_title(end))
+                found[variable.name] = self._value(given, variable)
         return found
 
     def _wrong(self, what: str) -> SpecError:
-        return SpecError(f"{self._shown}: {what}")
+        return SpecError(what, file=self._shown)
 
     def _walk(self, system: Element, at: str, package: Package, above: tuple[Path, ...]) -> None:
         self._declare(system, at)
@@ -197,9 +204,9 @@ class _Reader:
         for child in system.findall("{*}Elements/*"):
             name = child.get("name", "")
             if tag(child) == "SignalDictionaryReference":
-                raise ValueError(
-                    f"{name!r} refers to a signal dictionary, which is not supported; connect the components "
-                    "directly"
+                raise SpecError(
+                    f"{_title((at, name))!r} refers to a signal dictionary, which is not supported; connect "
+                    "the components directly"
                 )
             if tag(child) not in ("Component", "System"):
                 continue
@@ -214,14 +221,16 @@ class _Reader:
                 self._walk(child, path, package, above)
             else:
                 self._component(child, path, package, above)
-        for wire in system.findall("{*}Connections/{*}Connection"):
-            self._wire(wire, at, children)
+        with within(_named(at)):
+            for wire in system.findall("{*}Connections/{*}Connection"):
+                self._wire(wire, at, children)
         self._bind(system, at, package)
 
     def _declare(self, element: Element, at: str, variables: Mapping[str, Variable] | None = None) -> None:
         """Note the connectors of an element; those of an FMU must fit its variables."""
         for connector in element.findall("{*}Connectors/{*}Connector"):
-            name, kind = attribute(connector, "name"), attribute(connector, "kind")
+            with within(_named(at)):
+                name, kind = attribute(connector, "name"), attribute(connector, "kind")
             stated, unit, _ = type_and_unit(connector)
             title = f"the connector {_title((at, name))}"
             if variables is not None:
@@ -235,29 +244,32 @@ class _Reader:
             self._connectors[at, name] = kind, unit
 
     def _component(self, element: Element, at: str, package: Package, above: tuple[Path, ...]) -> None:
-        name, source = attribute(element, "name"), attribute(element, "source")
-        if not (name and source):
-            raise ValueError(
-                f"a component has the name {name!r} and the source {source!r}; neither may be empty"
-            )
-        type_, implementation = element.get("type", _FMU_TYPE), element.get("implementation", "any")
-        if type_ in _NESTED_TYPES:
+        with within(_named(at)):
+            name, source = attribute(element, "name"), attribute(element, "source")
+            if not (name and source):
+                raise SpecError(
+                    f"a component has the name {name!r} and the source {source!r}; neither may be empty"
+                )
+            type_, implementation = element.get("type", _FMU_TYPE), element.get("implementation", "any")
+            if type_ not in (_FMU_TYPE, *_NESTED_TYPES):
+                raise SpecError(f"it is of type {type_}; only FMUs and SSP packages are supported")
+            if implementation not in _INTERFACES:
+                raise SpecError(
+                    f"its implementation is {implementation!r}; expected one of {', '.join(_INTERFACES)}"
+                )
+            file = package.file(source)
+            nested = Package(file, f"{package.shown}: {source}") if type_ in _NESTED_TYPES else None
+        if nested is not None:
             self._declare(element, at)
-            self.walk_file(Package(package.file(source), f"{package.shown}: {source}"), at, above)
+            self.walk_file(nested, at, above)
             self._bind(element, at, package)
             return
-        if type_ != _FMU_TYPE:
-            raise self._wrong(f"the component {at} is of type {type_}; only FMUs are supported")
-        if implementation not in _INTERFACES:
-            known = ", ".join(_INTERFACES)
-            raise self._wrong(f"the implementation of {at} is {implementation!r}; expected one of {known}")
-        fmu = package.file(source)
         try:
-            component = self.components[at] = Component(fmu, None, _INTERFACES[implementation])
-            description = self._descriptions[at] = describe(fmu, component.sha256)
-            self._units = {**read_structure(fmu, component.sha256).units, **self._units}
+            component = self.components[at] = Component(file, None, _INTERFACES[implementation])
+            description = self._descriptions[at] = describe(file, component.sha256)
+            self._units = {**read_structure(file, component.sha256).units, **self._units}
         except ModelError as error:
-            raise self._wrong(f"{source}: {error}") from None
+            raise self._wrong(f"the component {at}: {source}: {error}") from None
         self._declare(element, at, {v.name: v for v in description.info.variables})
         self._bind(element, at, package)
 
@@ -279,48 +291,51 @@ class _Reader:
 
     def _wire(self, wire: Element, at: str, children: Sequence[str]) -> None:
         """Note which end feeds the other; an input connector is a source inside of its own system."""
-        change = transformation(wire)
         ends = [(wire.get(f"{end}Element"), attribute(wire, f"{end}Connector")) for end in ("start", "end")]
         shown = [f"{element}.{name}" if element else name for element, name in ends]
         text = f"the connection {' - '.join(shown)}"
+        with within(text):
+            change = transformation(wire)
         sources: list[End] = []
         sinks: list[End] = []
         for (element, name), title in zip(ends, shown, strict=True):
             path = at if element is None else f"{at}.{element}" if at else element
             if element is not None and element not in children:
                 near = did_you_mean(element, children)
-                raise self._wrong(f"{text} names the unknown element {element!r}; {near}")
+                raise SpecError(f"{text} names the unknown element {element!r}; {near}")
             if (path, name) not in self._connectors:
                 near = did_you_mean(name, (local for place, local in self._connectors if place == path))
-                raise self._wrong(f"{text} names the unknown connector {title!r}; {near}")
+                raise SpecError(f"{text} names the unknown connector {title!r}; {near}")
             is_source = self._connectors[path, name][0] in (_SINKS if element is None else _SOURCES)
             (sources if is_source else sinks).append((path, name))
         if len(sources) != 1:
             both = "outputs" if sources else "inputs"
-            raise self._wrong(f"{text} joins two {both}; connect an output to an input")
+            raise SpecError(f"{text} joins two {both}; connect an output to an input")
         (source,), (sink,) = sources, sinks
         if self._connectors[source][0] == "calculatedParameter":
-            raise self._wrong(
+            raise SpecError(
                 f"{text} passes on a calculated parameter, which is not supported; set the parameter in a "
                 "parameter set"
             )
         is_held = self._connectors[sink][0] == "parameter"
         if is_held and self._connectors[source][0] != "parameter":
-            raise self._wrong(
+            raise SpecError(
                 f"{text} feeds a parameter, which keeps its value during a simulation; set it in a parameter "
                 "set, or connect an input"
             )
         if sink in self._steps:
             known = _title(self._steps[sink][0])
-            raise self._wrong(
+            raise SpecError(
                 f"{_title(sink)} is fed by {known} and by {_title(source)}; remove one of the connections"
             )
         self._steps[sink] = source, change
 
     def _bind(self, element: Element, at: str, package: Package) -> None:
         """Add the values of an element's bindings; called from the inside out, so that outer ones win."""
-        for name, value in bound_values(element, package).items():
-            self._given[f"{at}.{name}" if at else name] = value
+        with within(_named(at)):
+            self._given |= {
+                _title((at, name)): value for name, value in bound_values(element, package).items()
+            }
 
     def _traced(self, end: End) -> tuple[End, tuple[float, float]]:
         """Follow the connections back from a connector; return where they begin, and the conversion."""
@@ -397,13 +412,8 @@ class _Reader:
                 )
             value = found[0] * value + found[1]
         value = change.factor * value + change.offset
-        low, high = variable.limits
-        if (low is not None and value < low) or (high is not None and value > high):
-            limits = ", ".join("no limit" if x is None else f"{x:g}" for x in (low, high))
-            raise self._wrong(
-                f"the parameter {given.name} is {value:g}, beyond the FMU's limits for {variable.name!r}, "
-                f"[{limits}]; correct it"
-            )
+        if excess := variable.excess(value, value):
+            raise self._wrong(f"the parameter {given.name} is {value:g}, which {excess}; correct it")
         return value
 
 
@@ -412,6 +422,10 @@ def _kind(type_name: str) -> str:
     if type_name in ("Real", "Float32", "Float64"):
         return "real"
     return type_name.lower() if type_name in ("Boolean", "String") else "integer"
+
+
+def _named(at: str) -> str:
+    return f"the element {at}" if at else "the system"
 
 
 def _title(end: End) -> str:

@@ -156,15 +156,30 @@ WRONG = {
     "expected the SSP element SystemStructureDescription, got a": "<a/>",
     "SSP version '3.0'; export it as SSP 1.0 or 2.0": structure(system(PLANT), version="3.0"),
     "it has no System": structure(""),
-    "the resource 'resources/Gone.fmu' is missing": plant("Plant_2", "Gone"),
-    "'../Plant_2.fmu' is not inside the package": plant("resources/", "../"),
-    "'file:///Plant_2.fmu' is not inside the package": plant("resources/", "file:///"),
-    "is not a path": plant("resources/", "http://["),
-    "resources/Broken.fmu: ": plant("Plant_2", "Broken"),
+    "the element plant: the resource 'resources/Gone.fmu' is missing": plant("Plant_2", "Gone"),
+    "the element plant: '../Plant_2.fmu' is not inside the package": plant("resources/", "../"),
+    "the element plant: 'file:///Plant_2.fmu' is not inside the package": plant("resources/", "file:///"),
+    "the element plant: 'http://[Plant_2.fmu' is not a path": plant("resources/", "http://["),
+    "the component plant: resources/Broken.fmu: ": plant("Plant_2", "Broken"),
     "two elements are named 'plant'": structure(system(PLANT + PLANT)),
     "has the name '' and the source": plant('"plant"', '""'),
     "neither may be empty": plant("resources/Plant_2.fmu", ""),
-    "a LinearTransformation has the factor 0": structure(system(PLANT, FLAT)),
+    "the connection a - plant.u: a LinearTransformation has the factor 0": structure(system(PLANT, FLAT)),
+    "the connection a - plant.u: factor: 'ten' is not a finite number": structure(
+        system(PLANT, FLAT.replace('"0"', '"ten"'))
+    ),
+    "the element box: the connection b.y - plant.u names the unknown element 'b'": structure(
+        system(system(PLANT, FEEDBACK.replace('"pi"', '"b"'), name="box"))
+    ),
+    "DefaultExperiment: stopTime: 'late' is not a": structure(
+        system(PLANT), after='<ssd:DefaultExperiment stopTime="late"/>'
+    ),
+    "SystemStructure.ssd: the unit 'mm': ValueError: could not": structure(
+        system(PLANT), after=MILLIMETRE.replace("0.001", "small")
+    ),
+    "SystemStructure.ssd: the unit None: KeyError: 'name'": structure(
+        system(PLANT), after=MILLIMETRE.replace('name="mm"', "")
+    ),
     "nested more than 400 deep": structure(DEEP),
     "the FMU of plant has no variable for the connector plant.v; ": plant('"u"', '"v"'),
     "plant.u is of kind output, but the FMU's variable has": plant('"u" kind="input"', '"u" kind="output"'),
@@ -177,20 +192,25 @@ WRONG = {
     "plant.u is fed by the output box.out, which nothing feeds": structure(
         system(PLANT + PI + system("", before=OUT, name="box"), FED_BY_NOTHING)
     ),
-    "<Connector kind=\"input\">: the attribute 'name' is missing": plant('name="u" kind', "kind"),
-    "'much' is not a finite number": structure(
+    "the element plant: <Connector kind=\"input\">: the attribute 'name' is missing": plant(
+        'name="u" kind', "kind"
+    ),
+    "the system: the parameter plant.T: value: 'much' is not a finite number": structure(
         system(PLANT, before=BOUND.format(values("plant.T Real much")))
     ),
+    "the element plant: the parameter T: value: 'nan' is not a finite number": plant(
+        "<ssd:Connectors>", BOUND.format(values("T Real nan")) + "<ssd:Connectors>"
+    ),
     "the connection pi.y - plant.T feeds a parameter": feedback('Connector="u"', 'Connector="T"'),
-    "the parameter 'plant.T' is 'maybe'; expected true or false": structure(
+    "the parameter plant.T: 'maybe': expected true or false": structure(
         system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
     ),
-    "the parameter plant.T is -5, beyond the FMU's limits for 'T', [0.1, no limit]; correct it": structure(
+    "plant.T is -5, which exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
         system(PLANT, before=BOUND.format(values("plant.T Real -5")))
     ),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
     "plant.y is in m, pi.measured in K; the package defines no": feedback("", "", pi=IN_KELVIN),
-    "is of type application/x-modelica; only FMUs": structure(
+    "the element pi: it is of type application/x-modelica; only FMUs": structure(
         system(PI.replace("x-fmu-sharedlibrary", "x-modelica"))
     ),
     "the system contains itself, at me": structure(system(ITSELF)),
@@ -198,8 +218,12 @@ WRONG = {
         system(PLANT, before=BOUND.format(values("plant.y Real 1")))
     ),
     "'bus' refers to a signal dictionary, which is not supported": structure(system(BUS)),
-    "the element IntegerMappingTransformation is not supported": structure(system(PLANT + PI, MAPPED)),
-    "plant is 'Scheduled'; expected one of any, CoSimulation": plant("<ssd:Component ", SCHEDULED),
+    "pi.y - plant.u: the element IntegerMappingTransformation is not supported": structure(
+        system(PLANT + PI, MAPPED)
+    ),
+    "the element plant: its implementation is 'Scheduled'; expected one of any, Co": plant(
+        "<ssd:Component ", SCHEDULED
+    ),
     "the FMU offers co-simulation, not model-exchange": plant("<ssd:Component ", EXCHANGED),
 }
 
@@ -222,7 +246,9 @@ def test_an_fmu_with_wrong_units_is_a_wrong_package(tmp_path: Path) -> None:
             copy.writestr(name, known.read(name).replace(b'<BaseUnit m="1"/>', b'<BaseUnit m="one"/>'))
     more: dict[str, str | bytes] = {"resources/Odd.fmu": odd.read_bytes()}
     file = write(tmp_path / "odd.ssp", plant("Plant_2", "Odd"), more=more)
-    with pytest.raises(SpecError, match=r"odd\.ssp: resources/Odd\.fmu: .*units or dependencies"):
+    with pytest.raises(
+        SpecError, match=r"odd\.ssp: the component plant: resources/Odd\.fmu: .*units or dependencies"
+    ):
         read_package(file)
 
 
@@ -267,5 +293,7 @@ def test_what_is_no_archive_or_has_no_description_is_said(tmp_path: Path) -> Non
 
 def test_a_name_that_is_too_long_is_missing(tmp_path: Path) -> None:
     (tmp_path / "a.ssd").write_text(structure(system(PLANT.replace("resources/", "x" * 300))))
-    with pytest.raises(SpecError, match=r"a\.ssd: the resource 'x+Plant_2\.fmu' is missing"):
+    with pytest.raises(
+        SpecError, match=r"/a\.ssd: the element plant: the resource 'x+Plant_2\.fmu' is missing"
+    ):
         read_package(tmp_path / "a.ssd")
