@@ -14,7 +14,7 @@ from falsifier.cli.files import in_existing_folder
 from falsifier.cli.options import PATH, changes_in, json_option, out_option, policy_options
 from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
-from falsifier.core.files import bundled
+from falsifier.core.files import absent, bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.errors import MachineError, ModelError, SpecError
@@ -217,7 +217,7 @@ def _existing_fmu(fmu: Path) -> Path:
         return fmu
     if fmu.parent == Path() and _bundled_fmu(fmu).is_file():
         return _bundled_fmu(fmu)
-    raise SpecError(f"{fmu}: no such file; expected the path of an FMU, or the name of a bundled one")
+    raise SpecError(f"{absent(fmu)}; expected the path of an FMU, or the name of a bundled one")
 
 
 def _bundled_fmu(name: Path) -> Path:

@@ -124,6 +124,11 @@ def private_folder(folder: Path) -> Path | None:
     return folder if is_private and os.access(folder, os.W_OK) else None
 
 
+def absent(path: Path) -> str:
+    """Say that there is no file to read: nothing at all, or a folder."""
+    return f"{path} is a folder" if path.is_dir() else f"{path}: no such file"
+
+
 def bundled(folder: str) -> Path:
     """Return the folder ``specs`` or ``fmus``: bundled with the package, or next to it in a checkout."""
     package = Path(__file__).resolve().parents[1]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from falsifier.core.files import absent
 from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed
@@ -134,7 +135,7 @@ def join_formula(
     """
     path = model if isinstance(model, Path) else Path(model.name)
     if isinstance(model, Path) and not model.is_file():
-        raise SpecError(f"{path}: no such file, or a folder; give the path of an .fmu file")
+        raise SpecError(f"{absent(path)}; give the path of an FMU or SSP package")
     if isinstance(model, Path) and is_package(model):
         model = replace(read_package(model), logging=bool(changes.logging))
     data: dict[str, Any]

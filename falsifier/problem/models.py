@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from falsifier.core.files import absent
 from falsifier.core.model import Interface, Model, ModelInfo
 from falsifier.errors import ModelError, SpecError, in_section
 from falsifier.fmu import (
@@ -109,7 +110,7 @@ def _existing(path: Path, fmu: str, key: str) -> Path:
         )
     found = path.parent / fmu
     if not found.is_file():
-        raise SpecError(f"no such FMU: {found.resolve()}; give its path relative to the spec file", key=key)
+        raise SpecError(f"{absent(found.resolve())}; give an FMU's path relative to the spec file", key=key)
     return found
 
 

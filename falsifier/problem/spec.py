@@ -121,7 +121,7 @@ def _text_of(path: Path) -> str:
     except FileNotFoundError:
         raise SpecError("no such spec file; `falsifier init MODEL.fmu` writes one") from None
     except OSError as error:
-        raise SpecError(f"cannot be read: {error}") from None
+        raise SpecError(f"cannot be read ({error.strerror}); expected the text of a spec") from None
     try:
         return content.decode("utf-8-sig")  # some editors begin files with a byte order mark
     except UnicodeDecodeError as error:

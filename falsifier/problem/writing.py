@@ -11,6 +11,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Item
 
+from falsifier.core.files import absent
 from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
@@ -238,7 +239,7 @@ def subject_of(target: str) -> Subject:
 
 def _of_model(fmu: Path) -> Subject:
     if not fmu.is_file():
-        raise SpecError(f"{fmu}: no such file, or a folder; give the path of an .fmu file, or a spec")
+        raise SpecError(f"{absent(fmu)}; give the path of an FMU or SSP package, or a spec")
     info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
     path, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
     return Subject(problem_of_starter(text, path), path, text, is_new=True, free_grid=True)

@@ -47,6 +47,9 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
     [
         ((*SPEED, "--set", "throttle=50", "--set", "brake=0"), "nothing to search: --set keeps"),
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
+        (("folder.ssp", "--stl", "G (x <= 1)"), "folder.ssp is a folder; give"),
+        (("folder.toml",), "folder.toml: cannot be read (Is a directory); expected"),
+        ((*SPEED[:2], "rise signal=speed"), "--stl: reference: this key is missing"),
         (
             (*SPEED, "--search", "throttle=0-100"),
             "expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search throttle=0:100:7",
@@ -61,7 +64,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         (("AT1", "--parameterization", "free:x"), "expected a time in s"),
         (("at1",), "did you mean 'AT1'?"),
         (("empty:R",), "did you mean 'empty.toml:R'?"),
-        (("folder.fmu", "--stl", "G (speed <= 1)"), "folder.fmu: no such file, or a folder"),
+        (("folder.fmu", "--stl", "G (speed <= 1)"), "folder.fmu is a folder; give"),
         (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
         ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
         ((*SPEED, "--search", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
@@ -73,7 +76,8 @@ def test_what_newcomers_get_wrong_is_answered_with_what_to_write(
 ) -> None:
     (tmp_path / "my.fmu").symlink_to(bundled("fmus") / "AT.fmu")
     (tmp_path / "empty.toml").write_text("# nothing yet\n")
-    (tmp_path / "folder.fmu").mkdir()
+    for ending in ("fmu", "ssp", "toml"):
+        (tmp_path / f"folder.{ending}").mkdir()
     result = command("run", *arguments)
     assert result.exit_code != 0
     assert message in f"{result.output} {result.exception}"

@@ -74,7 +74,9 @@ def file_hash(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise ModelError(f"{path}: cannot read the FMU ({error.strerror or error})") from error
+        raise ModelError(
+            f"{path}: cannot read the FMU ({error.strerror or error}); give the path of an .fmu file"
+        ) from error
 
 
 @contextmanager

@@ -17,6 +17,7 @@ from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
+from falsifier.core.files import absent
 from falsifier.errors import ModelError, SpecError, did_you_mean, in_section
 from falsifier.fmu.description.archive import extract, file_hash
 from falsifier.fmu.description.variables import is_true
@@ -51,7 +52,7 @@ class Package:
     def __init__(self, path: Path, shown: str) -> None:
         self.shown = shown
         if not path.is_file():
-            raise SpecError(f"{shown}: no such file; give the path of an .ssp or .ssd file")
+            raise SpecError(f"{absent(path)}; give the path of an .ssp or .ssd file")
         if path.suffix == ".ssp":
             try:
                 path = _unpacked(path, file_hash(path)) / _DESCRIPTION
