@@ -9,7 +9,10 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
 
 # Maximum number of characters of a rejected value in a message.
 _SHOWN_INPUT = 60
@@ -208,6 +211,12 @@ def rejected(message: str, given: object) -> str:
     )
     text = repr(given)
     return f"{message}, got {text if len(text) <= _SHOWN_INPUT else f'{text[:_SHOWN_INPUT]} ...'}"
+
+
+def first_fault(error: "ValidationError") -> tuple[str, str]:
+    """Return the key of the first thing that pydantic has found wrong, and what is wrong in our words."""
+    first = error.errors()[0]
+    return ".".join(map(str, first["loc"])), rejected(first["msg"], first["input"])
 
 
 def _simulation_error(

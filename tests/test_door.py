@@ -8,10 +8,12 @@ from typing import Any
 import pytest
 
 import falsifier
+from falsifier.core.files import bundled
 from falsifier.errors import FalsifierError
 from tests.command import ROOT
 from tests.problems import easy
 
+AT = bundled("fmus") / "AT.fmu"
 USER = ROOT / "tests" / "user_code.py"
 
 
@@ -43,6 +45,30 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.Problem.from_fmu("my.fmu", "G[0,1] (x <= 1)", inputs=["u"]),
         r"inputs: expected choices by name.*\['u'\]",
     ),
+    "a number as FMU": (
+        lambda: untyped.Problem.from_fmu(3, "x <= 1"),
+        r"fmu: expected the path.*got 3 \(int",
+    ),
+    "a number to read": (lambda: untyped.read_info(3), r"path: expected the path of an FMU, got 3 \(int\)"),
+    "a number as model": (lambda: untyped.FmuModel(3), r"path: expected a path, got 3 \(int\)"),
+    "an FMU as package": (lambda: untyped.read_package(AT), r"AT\.fmu: expected the path of an \.ssp or"),
+    "a number as target": (lambda: untyped.load_problem(3), "target: expected text, got 3"),
+    "a number to check": (lambda: untyped.lint(3), "target: expected text, got 3"),
+    "a number as run": (lambda: untyped.resume(3), r"directory: expected the directory of a run, got 3"),
+    "a text as list": (lambda: untyped.load_problem("AT1", context="a.mo"), "context: expected a list of"),
+    "a number as language model": (
+        lambda: untyped.falsify(easy(), llm=3),
+        "llm: expected a name, LLMSettings",
+    ),
+    "what templates lack": (
+        lambda: untyped.Problem.from_fmu(AT, "rise signal=speed"),
+        "^formula: reference: this key is missing",
+    ),
+    "no range": (
+        lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", inputs={"throttle": 3, "brake": 0}),
+        r"a value keeps throttle and brake constant.* add inputs=\{'NAME': \(LOW, HIGH\)\}",
+    ),
+    "no requirement": (lambda: untyped.load_problem(AT), r"no requirement; add stl='G\[0,10\]"),
     "a result to explain": (lambda: untyped.explain(easy(), 5), "explain: expected an evaluation"),
     "a number to shrink": (lambda: untyped.shrink(easy(), 5), "shrink: expected an evaluation"),
     "a device as directory": (

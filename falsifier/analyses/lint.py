@@ -15,7 +15,7 @@ from falsifier.fmu import FmuModel
 from falsifier.fmu.description.structure import read_structure
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, alike
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import ProblemSource, source_of
 from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.vacuity import hidden_margin
 from falsifier.stl import Formula
@@ -67,7 +67,7 @@ def lint(target: str | ProblemSource, *, simulations: int = SIMULATIONS) -> list
     """
     findings: list[LintFinding] = []
     problems: list[Problem] = []
-    stated = target if isinstance(target, ProblemSource) else ProblemSource(target=target)
+    stated = target if isinstance(target, ProblemSource) else source_of(target)
     for source in [stated] if stated.stl is not None else sources_of(stated):
         try:
             problems.append(load_source(source))

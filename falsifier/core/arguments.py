@@ -1,10 +1,12 @@
 """Checks of values that users write in Python."""
 
 import reprlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite
 from numbers import Real
 from operator import index
+from os import PathLike
+from pathlib import Path
 from typing import SupportsIndex
 
 from falsifier.errors import SpecError
@@ -54,6 +56,28 @@ def instance(name: str, given: object, kind: type | tuple[type, ...], expected: 
     """
     if not isinstance(given, kind):
         raise SpecError(f"{name}: expected {expected}, got {reprlib.repr(given)} ({type(given).__name__})")
+
+
+def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> Path:
+    """Return the path that a user gave.
+
+    Raises:
+        SpecError: naming the argument, if it is no path.
+    """
+    instance(name, given, (str, PathLike), expected)
+    return Path(given)
+
+
+def texts(name: str, given: Iterable[str]) -> tuple[str, ...]:
+    """Return the texts of a list that a user gave; a single text is no list.
+
+    Raises:
+        SpecError: naming the argument, if it is no list of texts.
+    """
+    found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
+    if found is None or not all(isinstance(each, str) for each in found):
+        raise SpecError(f"{name}: expected a list of texts, got {given!r}")
+    return found
 
 
 def one_of(name: str, given: object, allowed: Sequence[str]) -> None:

@@ -14,9 +14,10 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from falsifier import __version__
+from falsifier.core.arguments import path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, rejected
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, first_fault
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import fmu_files, fmus_sha256, resolved
@@ -152,17 +153,15 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
     Raises:
         SpecError: naming the file and what is wrong with it.
     """
-    file = counterexample_file(Path(path))
+    file = counterexample_file(path_of("path", path, "the path of a counterexample, or of a run"))
     try:
         content = file.read_bytes()
         stored = StoredCounterexample.model_validate_json(content)
     except OSError as error:
         raise SpecError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        why = rejected(first["msg"], first["input"])
-        if first["type"] in ("json_invalid", "missing") or not key:
+        key, why = first_fault(error)
+        if error.errors()[0]["type"] in ("json_invalid", "missing") or not key:
             key, why = "", "expected the counterexample.json of a run, or a run directory"
         raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
     try:

@@ -10,6 +10,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import path_of
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
@@ -49,7 +50,7 @@ class FmuModel(Isolated):
 
     def __post_init__(self) -> None:
         self._resolve_rights()
-        object.__setattr__(self, "path", Path(self.path).absolute())
+        object.__setattr__(self, "path", path_of("path", self.path).absolute())
         object.__setattr__(self, "sha256", file_hash(self.path))
         _check_interface(self)
 

@@ -9,10 +9,12 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
+from os import PathLike
 from pathlib import Path
 from traceback import extract_tb
 
 from falsifier.context.values import Named
+from falsifier.core.arguments import texts
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
@@ -22,8 +24,8 @@ from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import ModelChanges, RequirementSection
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
-from falsifier.problem.source import Parameterization, ProblemSource, Target
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, in_python, requirement_of
+from falsifier.problem.source import Parameterization, ProblemSource, Target, source_of
 from falsifier.problem.spec import Spec, read_spec
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
@@ -77,7 +79,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
 
 
 def load_problem(
-    target: str,
+    target: str | PathLike[str],
     *,
     stl: str | None = None,
     profile: str | None = None,
@@ -127,22 +129,23 @@ def load_problem(
         allow=allow,
         deny=deny,
     )
-    return load_source(
-        ProblemSource(
-            target=target,
-            stl=stl,
-            profile=profile,
-            parameterization=parameterization,
-            shortest_piece=shortest_piece,
-            changes=changes,
-            context=tuple(context),
-        )
+    source = source_of(
+        target,
+        stl=stl,
+        profile=profile,
+        parameterization=parameterization,
+        shortest_piece=shortest_piece,
+        changes=changes,
+        context=texts("context", context),
     )
+    with in_python("stl"):
+        return load_source(source)
 
 
-def load_problems(target: str, *, profile: str | None = None) -> list[Problem]:
+def load_problems(target: str | PathLike[str], *, profile: str | None = None) -> list[Problem]:
     """Load one problem per requirement of a spec, or only the requirement that the target names."""
-    return [load_source(source) for source in sources_of(ProblemSource(target=target, profile=profile))]
+    with in_python("stl"):
+        return [load_source(source) for source in sources_of(source_of(target, profile=profile))]
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
@@ -192,7 +195,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         step = problem.experiment.step_size or problem.experiment.output_interval
         if source.shortest_piece < step:
             raise SpecError(
-                f"--parameterization free:{source.shortest_piece:g}: inputs change at communication steps, "
+                f"pieces of {source.shortest_piece:g} s: inputs change at communication steps, "
                 f"{step:g} s apart; give at least that, or a smaller --output-interval"
             )
         problem = replace(problem, space=problem.space.freed(source.shortest_piece))

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
-from falsifier.core.arguments import finite
+from falsifier.core.arguments import finite, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, in_python, requirement_of
 from falsifier.problem.source import STL_NAME, ProblemSource
 
 if TYPE_CHECKING:
@@ -142,13 +142,22 @@ class Problem:
             allow=allow,
             deny=deny,
         )
-        stated = requirement_of(formula)
-        model = fmu if isinstance(fmu, System) else Path(fmu)
-        problem = Problem.of(join_formula(model, stated, changes=changes, name=name))
+        model = (
+            fmu
+            if isinstance(fmu, System)
+            else path_of("fmu", fmu, "the path of an FMU or SSP package, or a System")
+        )
+        with in_python("formula"):
+            joined = join_formula(model, requirement_of(formula), changes=changes, name=name)
+        problem = Problem.of(joined)
         source = None
         if not isinstance(fmu, System):
             source = ProblemSource(
-                target=str(fmu), stl=formula, stl_name=name, changes=changes, context=tuple(context)
+                target=str(fmu),
+                stl=formula,
+                stl_name=name,
+                changes=changes,
+                context=texts("context", context),
             )
         return replace(problem, source=source, named_context=Named.of(context))
 

@@ -2,16 +2,17 @@
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from falsifier.core.arguments import instance
+from falsifier.core.arguments import instance, texts
 from falsifier.core.model import Interface
-from falsifier.errors import SpecError, in_section, rejected
+from falsifier.errors import SpecError, first_fault, in_section
 from falsifier.fmu import resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.spec import STL_OPTION, AnyRequirement, parse_spec
@@ -22,6 +23,11 @@ _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
+
+# Options in messages that problems made in Python may raise.
+_OPTION = re.compile(
+    r"--search (\S+?)=LOW:HIGH(\[:POINTS\])?|--(stl|stop-time|output-interval|interface|set)\b( (?=[A-Z']))?"
+)
 
 # A constant value; (low, high) to search, with the spec's control points or else a free parameterization;
 # (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
@@ -66,14 +72,33 @@ def changes_from(
     data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
     data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
-    rights = {"allow": resolved(allow, Path()), "deny": tuple(deny)}
+    rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
     data |= {name: words for name, words in rights.items() if words}
     try:
         return ModelChanges.model_validate(data)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise SpecError(f"{where}: {rejected(first['msg'], first['input'])}") from None
+        raise SpecError(": ".join(first_fault(error))) from None
+
+
+@contextmanager
+def in_python(stl: str) -> Iterator[None]:
+    """Let errors that are raised within speak of arguments in Python where they speak of options.
+
+    Args:
+        stl: the argument that stands for ``--stl``.
+    """
+
+    def argument(found: re.Match[str]) -> str:
+        if found[1]:
+            return f"inputs={{{found[1]!r}: (LOW, HIGH)}}"
+        name = {"stl": stl, "set": "a value"}.get(found[3]) or found[3].replace("-", "_")
+        return f"{name}=" if found[4] else name
+
+    try:
+        yield
+    except SpecError as error:
+        message, file = _OPTION.sub(argument, error.message), error.file and _OPTION.sub(argument, error.file)
+        raise SpecError(message, file=file, key=error.key) from None
 
 
 def changes_from_options(
@@ -234,8 +259,8 @@ def requirement_of(text: str) -> AnyRequirement:
         if beside := sorted(arguments.keys() & ModelChanges.model_fields.keys()):
             # It would shape the formula and not the simulation.
             raise SpecError(
-                "no argument of a template here; other options (--stop-time, --set, --search, ...) change "
-                "simulations, or write a spec with [requirements.NAME]",
+                "it changes simulations, and is no argument of a template here: state it beside the "
+                "requirement (--stop-time, ...), or write a spec with [requirements.NAME]",
                 key=beside[0],
             )
     try:

@@ -1,11 +1,13 @@
 """Sources of problems: what is needed to load a problem again, in another process or from a journal."""
 
 from dataclasses import dataclass
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_serializer
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_serializer
 
+from falsifier.errors import SpecError, first_fault
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import ModelChanges
 
@@ -100,3 +102,15 @@ class ProblemSource(BaseModel):
         """
         parts = self.parts
         return parts.requirement or Path(parts.file).stem or self.target
+
+
+def source_of(target: str | PathLike[str], **more: Any) -> ProblemSource:
+    """Return the source for values that a user gave.
+
+    Raises:
+        SpecError: naming the argument that is wrong.
+    """
+    try:
+        return ProblemSource(target=fspath(target) if isinstance(target, PathLike) else target, **more)
+    except ValidationError as error:
+        raise SpecError(": ".join(first_fault(error))) from None

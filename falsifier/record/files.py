@@ -17,7 +17,7 @@ from pydantic import BaseModel, ValidationError
 from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import JournalError, rejected
+from falsifier.errors import JournalError, first_fault
 
 _LOG = logging.getLogger(__name__)
 
@@ -58,9 +58,7 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
             raise JournalError(f"{path.parent}: no such directory; expected that of a {what}") from None
         raise JournalError(f"{path.parent}: not a {what} directory: it contains no {path.name}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        raise JournalError(f"{path}: {key}: {rejected(first['msg'], first['input'])}") from None
+        raise JournalError(": ".join((str(path), *first_fault(error)))) from None
     except (ValueError, OSError) as error:
         raise JournalError(
             f"{path} is damaged: {one_line(str(error))}; this {what} cannot be continued: start a new one"

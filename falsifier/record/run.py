@@ -7,7 +7,7 @@ from pathlib import Path
 from time import monotonic, perf_counter
 from typing import overload
 
-from falsifier.core.arguments import instance, whole
+from falsifier.core.arguments import instance, path_of, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
@@ -143,7 +143,7 @@ def falsify(
             jobs=jobs,
             start_from=tuple(fit(group[0].space, each).candidate.to_json() for each in known),
         )
-        place = None if directory is None else Path(directory)
+        place = None if directory is None else path_of("directory", directory)
         if place is not None and len(groups) > 1:
             place = place / file_name(group[0].name)
         found = carry_out(request, group, place, engine=made, chat=chat, listeners=listeners)
@@ -185,7 +185,7 @@ def resume(
         )
     for problem in problems:
         instance("problems", problem, Problem, "a list of Problem")
-    directory = Path(directory)
+    directory = path_of("directory", directory, "the directory of a run")
     places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
     by_name = {problem.name: problem for problem in problems}
     results: list[Result] = []
@@ -361,4 +361,6 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
 def _settings(llm: LLM | None) -> LLMSettings | None:
     if llm is None or isinstance(llm, LLMSettings):
         return llm
+    if not isinstance(llm, str) and not hasattr(llm, "llm"):
+        raise SpecError(f"llm: expected a name, LLMSettings or a chat, got {llm!r}")
     return LLMSettings(name=llm if isinstance(llm, str) else llm.llm)

@@ -83,11 +83,13 @@ def check_names(request: RunRequest) -> None:
     engine, llm = request.engine, request.llm
     if llm is None:
         if engine in _LLM_ENGINES:
-            raise SpecError(f"the engine {engine!r} needs a language model: add --llm NAME")
+            raise SpecError(
+                f"the engine {engine!r} needs a language model: name one (--llm NAME, in Python llm=NAME)"
+            )
         check_engine(engine or DEFAULT_ENGINE)
         return
     if (engine or "llm") not in _LLM_ENGINES:
-        raise SpecError(f"the engine {engine!r} does not use a language model: drop --llm or --engine")
+        raise SpecError(f"the engine {engine!r} does not use a language model: drop one of the two")
     from falsifier.llm.prompts.view import variant_named
 
     variant_named(llm.variant)
@@ -120,8 +122,8 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
     )
     if max_cost is not None and price_of(llm) is None:
         raise SpecError(
-            f"the price of {llm.name} is unknown, so --max-cost cannot be enforced: add "
-            "--llm-option price=SENT:RECEIVED, or use --max-tokens instead"
+            f"the price of {llm.name} is unknown, so its cost cannot be limited: state the price "
+            "(--llm-option price=SENT:RECEIVED, in Python price=(SENT, RECEIVED)), or limit the tokens"
         )
     return chat
 

@@ -9,6 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from falsifier.core.arguments import path_of
 from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import ModelError, did_you_mean
 from falsifier.fmu.description import archive
@@ -103,7 +104,7 @@ def read_description(path: str | Path) -> Description:
     Raises:
         ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
-    path = Path(path)
+    path = path_of("path", path, "the path of an FMU")
     return describe(path, archive.file_hash(path))
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
+from falsifier.core.arguments import path_of
 from falsifier.core.model import Interface, Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description.model_description import Description, describe
@@ -59,7 +60,9 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
     Raises:
         SpecError: in one line, naming the file and what is wrong with it.
     """
-    path = Path(path)
+    path = path_of("path", path, "the path of an .ssp or .ssd file")
+    if not is_package(path):
+        raise SpecError(f"{path}: expected the path of an .ssp or .ssd file; FmuModel takes that of an FMU")
     reader = _Reader(str(path))
     try:
         reader.walk_file(Package(path, str(path)), "", ())
