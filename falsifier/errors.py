@@ -181,8 +181,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     listing = f"known: {', '.join(shown) or 'none'}"
     # Also names that differ in the case of letters only.
     folded = {other.casefold(): other for other in reversed(names)}
-    near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
-    near = near or [folded[n] for n in difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)]
+    near = difflib.get_close_matches(name, names, n=1)
+    near = near or [folded[n] for n in difflib.get_close_matches(name.casefold(), folded, n=1)]
     found = folded.get(name.casefold()) or next(iter(near), None)
     return f"did you mean {found!r}? K{listing[1:]}" if found else listing
 

@@ -67,7 +67,8 @@ def join(
         if requirement not in spec.requirements:
             raise SpecError(f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}")
         if profile is not None and profile not in spec.profiles:
-            raise SpecError(f"no profile {profile!r}; {did_you_mean(profile, spec.profiles)}")
+            near = did_you_mean(profile, spec.profiles)
+            raise SpecError(f"no profile {profile!r}; {near}; without a profile: free or fixed")
         layers = spec.changes(requirement, profile)
         model = model or make_model(spec, [*layers, changes] if changes else layers, path)
         info = model.info

@@ -1,4 +1,4 @@
-from falsifier.views.html import Html, el, join
+from falsifier.views.html import Html, el, join, unbroken
 
 
 def test_texts_are_escaped_and_elements_are_not() -> None:
@@ -23,3 +23,10 @@ def test_numbers_are_short() -> None:
 def test_elements_without_content_are_closed_as_their_kind_is() -> None:
     assert (el("br"), el("td")) == ("<br>", "<td></td>")
     assert el("circle", el("title", "t")) == "<circle><title>t</title></circle>"
+
+
+def test_lines_do_not_end_within_the_name_of_an_option() -> None:
+    text = unbroken("try --api-base <b>, or a-b --x")
+    assert str(text) == (
+        'try <span class="option">--api-base</span> &lt;b&gt;, or a-b <span class="option">--x</span>'
+    )

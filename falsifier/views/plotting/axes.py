@@ -36,7 +36,7 @@ def caption(text: str) -> str:
 def wrapped(text: str, width: int) -> str:
     """Return a text for a picture, on as many lines of so many characters as it needs, within limits."""
     kept = one_line(text).replace(" = ", "\u00a0=\u00a0")  # not separated by the end of a line
-    lines = textwrap.wrap(kept, width, max_lines=_MOST_LINES, placeholder=" ...")
+    lines = textwrap.wrap(kept, width, max_lines=_MOST_LINES, placeholder=" ...", break_on_hyphens=False)
     return "\n".join(lines).replace("\u00a0", " ").replace("$", r"\$")
 
 
