@@ -26,7 +26,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
-from falsifier.errors import FalsifierError, SpecError, did_you_mean, rejected
+from falsifier.errors import FalsifierError, SpecError, did_you_mean, first_fault
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import find_spec, load_problem
 from falsifier.problem.problem import Problem
@@ -186,16 +186,19 @@ def read_rows(path: Path) -> list[Row]:
         SpecError: naming the row that is invalid, and why.
     """
     csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
-    with path.open(newline="", encoding="utf-8") as file:
-        table = csv.DictReader(file)
-        missing = [name for name in _READ if name not in (table.fieldnames or ())]
-        if missing:
-            raise SpecError(
-                f"expected a CSV file in the ARCH-COMP validation format, as falsifier report DIR "
-                f"--arch-comp FILE writes it; columns that are missing: {', '.join(missing)}",
-                file=str(path),
-            )
-        return [_row(number, cells, path) for number, cells in enumerate(table, start=1)]
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            table = csv.DictReader(file)
+            columns, rows = table.fieldnames or (), list(table)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise SpecError(f"cannot be read: expected a CSV file in UTF-8 ({error})", file=str(path)) from None
+    if missing := [name for name in _READ if name not in columns]:
+        raise SpecError(
+            f"expected a CSV file in the ARCH-COMP validation format, as falsifier report DIR "
+            f"--arch-comp FILE writes it; columns that are missing: {', '.join(missing)}",
+            file=str(path),
+        )
+    return [_row(number, cells, path) for number, cells in enumerate(rows, start=1)]
 
 
 def validate(rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS) -> list[Revalidated]:
@@ -269,9 +272,8 @@ def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
     try:
         return Row.model_validate(stated | {"number": number})
     except ValidationError as error:
-        first = error.errors()[0]
-        told = rejected(first["msg"], first["input"])
-        raise SpecError(f"row {number}: column {first['loc'][0]}: {told}", file=str(path)) from None
+        column, told = first_fault(error)
+        raise SpecError(f"row {number}: column {column}: {told}", file=str(path)) from None
 
 
 def _checked(row: Row, budget: int) -> Revalidated:

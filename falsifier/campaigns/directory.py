@@ -17,7 +17,7 @@ from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError
-from falsifier.record.files import CAMPAIGN, locked, read_sealed, write_sealed
+from falsifier.record.files import CAMPAIGN, can_be_a_folder, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -89,7 +89,7 @@ def run_directories(directory: Path) -> list[Path]:
     if below:
         return below
     if not directory.exists():
-        raise JournalError(f"{directory}: no such directory")
+        raise JournalError(f"{directory}: no such directory; expected that of a run or campaign")
     raise JournalError(
         f"{directory}: not a run or campaign directory: it contains neither {CAMPAIGN} nor a run's manifest"
     )
@@ -102,7 +102,8 @@ def campaign_lock(directory: Path) -> Iterator[None]:
     Raises:
         JournalError: if another process holds it.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    with can_be_a_folder(directory):
+        directory.mkdir(parents=True, exist_ok=True)
     busy = (
         f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
         f"falsifier watch {directory}"

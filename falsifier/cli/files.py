@@ -39,13 +39,13 @@ def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = 
     if not path.exists():
         return
     if not path.is_file():
-        raise SpecError(f"{path} is not a file that can be replaced: choose another --out")
+        raise SpecError(f"{path} is not a file that can be replaced: choose another name")
     if kept is not None and path.samefile(kept):
         raise SpecError(f"{path} is the original, which is kept: choose another --out")
     with path.open("rb") as file:
         begins = file.read(max(map(len, beginnings)))
     if begins and not begins.startswith(beginnings):
-        raise SpecError(f"{path} exists and is not such a file: choose another --out, or delete it")
+        raise SpecError(f"{path} exists and is not such a file: choose another name, or delete it")
 
 
 def checked_picture(path: Path) -> Path:
@@ -66,7 +66,7 @@ def in_existing_folder(path: Path) -> Path:
         SpecError: if its folder does not exist.
     """
     if not path.parent.is_dir():
-        raise SpecError(f"{path}: no such folder {path.parent}: choose another --out, or make it first")
+        raise SpecError(f"{path}: no such folder {path.parent}: choose another place, or make it first")
     return path
 
 

@@ -9,7 +9,7 @@ from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.analysis import load
 from falsifier.campaigns.archcomp import export
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import check_out, checked_picture, draw
+from falsifier.cli.files import check_out, checked_picture, draw, in_existing_folder
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, say
 from falsifier.core.literals import csv_text
@@ -52,6 +52,13 @@ def report(
     first, *others = directories
     if others:
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
+    path = out or first / "report.html"
+    written = [(arch_comp, b"system,"), (csv_file, b"requirement,")]
+    if out is not None or not markdown:
+        written.append((path, b"# " if markdown else b"<!DOCTYPE html>"))
+    for file, begins in written:  # before anything is drawn
+        if file is not None and in_existing_folder(file).exists() and not file.is_char_device():
+            check_out(file, beginnings=(begins,))
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
         warn(f"{arch_comp} written")
@@ -61,9 +68,6 @@ def report(
     if markdown and out is None:
         say(markdown_report(*directories), nl=False)
         return
-    path = out or first / "report.html"
-    if path.is_file():
-        check_out(path, beginnings=(b"# ",) if markdown else (b"<!DOCTYPE html>",))
     made = markdown_report(*directories) if markdown else html_report(*directories)
     path.write_text(made, encoding="utf-8")
     warn(f"{path} written")

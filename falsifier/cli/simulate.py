@@ -23,6 +23,7 @@ from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.files import can_be_a_folder
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, outcome_text
 
@@ -56,6 +57,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
                 "values; --inputs u.csv or --set NAME=VALUE gives some"
             )
+        if out is not None:
+            with can_be_a_folder(out):
+                out.mkdir(parents=True, exist_ok=True)
         evaluation = simulate_inputs(
             problem,
             signals,

@@ -11,6 +11,7 @@ from falsifier.campaigns.archcomp import PROTOCOL_SIMULATIONS, Revalidated, read
 from falsifier.campaigns.archcomp import validate as check_rows
 from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
 from falsifier.cli.command import command
+from falsifier.cli.files import check_out, in_existing_folder
 from falsifier.cli.inspect import one_fmu
 from falsifier.cli.options import PATH, budget_option, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, conclude, say
@@ -75,8 +76,10 @@ def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
     from falsifier.fmu.build import compile_sources
 
-    written = compile_sources(one_fmu(fmu), out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    say(f"{written} written")
+    source = one_fmu(fmu)
+    target = in_existing_folder(out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
+    check_out(target, beginnings=(b"PK",), kept=source)
+    say(f"{compile_sources(source, target)} written")
 
 
 @command()

@@ -69,6 +69,10 @@ def find_spec(target: str) -> tuple[Path, str | None]:
             f"falsifier resume {shlex.quote(target)} continues it, "
             f"falsifier llm prompt {shlex.quote(target)} --at N prints what was asked before sample N"
         )
+    if Path(target).is_file():
+        raise SpecError(
+            f"{target}: expected a file that ends in .toml, .fmu, .ssp or .ssd, or a bundled name"
+        )
     if Path(f"{name}.toml").is_file():
         meant = f"{name}.toml{target.removeprefix(name)}"
         raise SpecError(f"no spec file or bundled requirement {target!r}; did you mean {meant!r}?")

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from falsifier.core.arguments import instance, texts
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, first_fault, in_section
-from falsifier.fmu import resolved
+from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.spec import STL_OPTION, AnyRequirement, parse_spec
 from falsifier.stl.lexer import RESERVED
@@ -73,6 +73,7 @@ def changes_from(
     data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
     rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
+    Rights.of(**rights)  # so that no spec is named for what an option or argument states
     data |= {name: words for name, words in rights.items() if words}
     try:
         return ModelChanges.model_validate(data)

@@ -16,7 +16,7 @@ from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import ValueKind
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, did_you_mean
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
@@ -138,7 +138,7 @@ class Manifest(Surroundings):
             raise JournalError(f"this run searched {', '.join(self.names)}; choose one: --requirement NAME")
         name = name or self.names[0]
         if name not in self.names:
-            raise JournalError(f"this run searched {', '.join(self.names)}, not {name}")
+            raise JournalError(f"this run has searched no {name!r}; {did_you_mean(name, self.names)}")
         which = self.names.index(name)
         request = self.request.model_copy(update={"problems": self.request.problems[which : which + 1]})
         return self.model_copy(update={"requirements": (self.requirements[which],), "request": request})

@@ -116,6 +116,8 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["export", "."], "not a run directory"),
         (["explain", "run/manifest.json"], "not a counterexample file"),
         (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
+        (["report", "run", "--out", "gone/x.html"], "gone/x.html: no such folder gone"),
+        (["report", "run", "--csv", "run/x.csv", "--arch-comp", "gone/x.csv"], "no such folder gone"),
         (["coverage", "run", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["coverage", "run", "--out", "x"], "x: expected a file name that ends in .svg"),
     ],
@@ -171,6 +173,7 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         ),
         (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
+        (["report", "run", "--csv", "keep.fmu"], "exists and is not such a file"),
     ):
         done = run(folder, *arguments)
         assert (done.code, why in done.err) == (2, True), done.err

@@ -51,6 +51,11 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     assert "row 1, AT2: reproduced, robustness -" in result.stdout
     assert "row 2, AT2: not reproduced, robustness +" in result.stdout
     assert "1 of 2 counterexamples accepted" in result.stdout
+    (tmp_path / "v.csv").write_bytes(b"\x9c\x00")
+    unread = command("tools", "validate", "v.csv")
+    assert "v.csv: cannot be read: expected a CSV file in UTF-8" in str(unread.exception)
+    simulated = command("simulate", "v.csv")
+    assert "v.csv: expected a file that ends in .toml, .fmu" in str(simulated.exception)
 
 
 NEVER = "python:tests.problems:impossible"

@@ -32,7 +32,7 @@ def test_options_that_cannot_be_read_are_named(option: str, message: str) -> Non
         {"ranges": ["u=0:1:3"], "stop_time": 5.0},
         {"ranges": ["u=-0.1:0.3:3:linear", "w", "q=0:0.1"], "values": ["p=1e-07", "v=0.25"]},
         {"interface": "model-exchange", "output_interval": 0.01},
-        {"allow": ["write:/data/logs", "programs"], "deny": ["network"]},
+        {"allow": ["write:/tmp", "programs"], "deny": ["network"]},
         {},
     ],
 )

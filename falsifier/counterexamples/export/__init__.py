@@ -32,6 +32,7 @@ from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, sav
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel, System
 from falsifier.problem.problem import Problem
+from falsifier.record.files import can_be_a_folder
 
 __all__ = ["export_counterexample"]
 
@@ -50,7 +51,8 @@ def export_counterexample(
         evaluation: a current simulation of it.
         directory: where to write; created if missing.
     """
-    directory.mkdir(parents=True, exist_ok=True)
+    with can_be_a_folder(directory):
+        directory.mkdir(parents=True, exist_ok=True)
     table, start = input_table(problem, evaluation.candidate), start_values(problem, evaluation.candidate)
     files = [
         save(stored, directory / FILE_NAME),
