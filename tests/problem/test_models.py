@@ -141,7 +141,7 @@ def test_rights_that_do_not_exist_are_named(tmp_path: Path, allow: str, deny: st
     file = write(tmp_path, RIGHTS)
     with pytest.raises(SpecError, match=f"^(allow|deny).*{message}"):
         load_problem(file, allow=[allow] if allow else [], deny=[deny] if deny else [])
-    right, wrong = ("programs", allow) if allow else ("network", deny)
+    right, wrong = ("write:logs", allow) if allow else ("network", deny)
     with pytest.raises(SpecError, match=f"cruise.toml: model: .*{message}"):
         load_problem(write(tmp_path, RIGHTS.replace(f'"{right}"', f'"{wrong}"')))
 
