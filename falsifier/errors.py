@@ -9,6 +9,7 @@ import difflib
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ class SimulationError(FalsifierError):
 
     def __reduce__(self) -> tuple[object, ...]:
         """Preserve the keyword arguments: exceptions are otherwise unpickled from ``args`` alone."""
-        return _simulation_error, (str(self), self.status, self.time, self.log)
+        return partial(type(self), status=self.status, time=self.time, log=self.log), (str(self),)
 
 
 class MachineError(FalsifierError):
@@ -181,8 +182,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     listing = f"known: {', '.join(shown) or 'none'}"
     # Also names that differ in the case of letters only.
     folded = {other.casefold(): other for other in reversed(names)}
-    near = difflib.get_close_matches(name, names, n=1)
-    near = near or [folded[n] for n in difflib.get_close_matches(name.casefold(), folded, n=1)]
+    similar = partial(difflib.get_close_matches, n=1, cutoff=0.6 if len(name) > 2 else 0.5)
+    near = similar(name, names) or [folded[n] for n in similar(name.casefold(), folded)]
     found = folded.get(name.casefold()) or next(iter(near), None)
     return f"did you mean {found!r}? K{listing[1:]}" if found else listing
 
@@ -217,9 +218,3 @@ def first_fault(error: "ValidationError") -> tuple[str, str]:
     """Return the key of the first thing that pydantic has found wrong, and what is wrong in our words."""
     first = error.errors()[0]
     return ".".join(map(str, first["loc"])), rejected(first["msg"], first["input"])
-
-
-def _simulation_error(
-    message: str, status: FailureStatus, time: float | None, log: tuple[str, ...]
-) -> SimulationError:
-    return SimulationError(message, status=status, time=time, log=log)

@@ -23,6 +23,7 @@ def test_a_failed_simulation_travels_between_processes_with_what_it_knows() -> N
 
 def test_known_names_are_listed_with_the_nearest_first() -> None:
     assert "'speed'" in did_you_mean("sped", ["rpm", "speed"])
+    assert did_you_mean("po", ["pi", "plant"]).startswith("did you mean 'pi'")
     assert did_you_mean("foo", ["sobol", "cma"]) == "known: sobol, cma"
     far = did_you_mean("xyz", ["rpm", "speed"])
     assert "did you mean" not in far

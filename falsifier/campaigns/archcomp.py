@@ -28,6 +28,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, first_fault
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.evaluation.input_file import csv_rows
 from falsifier.problem.loading import find_spec, load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Parameterization, ProblemSource
@@ -186,19 +187,15 @@ def read_rows(path: Path) -> list[Row]:
         SpecError: naming the row that is invalid, and why.
     """
     csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            table = csv.DictReader(file)
-            columns, rows = table.fieldnames or (), list(table)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise SpecError(f"cannot be read: expected a CSV file in UTF-8 ({error})", file=str(path)) from None
+    (_, columns), *rows = csv_rows(path) or [(0, [])]
     if missing := [name for name in _READ if name not in columns]:
         raise SpecError(
             f"expected a CSV file in the ARCH-COMP validation format, as falsifier report DIR "
             f"--arch-comp FILE writes it; columns that are missing: {', '.join(missing)}",
             file=str(path),
         )
-    return [_row(number, cells, path) for number, cells in enumerate(rows, start=1)]
+    found = (dict(zip(columns, cells, strict=False)) for _, cells in rows)
+    return [_row(number, cells, path) for number, cells in enumerate(found, start=1)]
 
 
 def validate(rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS) -> list[Revalidated]:
@@ -244,7 +241,8 @@ def _exported(run: Run) -> dict[str, object]:
     if run.counterexample is not None:
         candidate = recorded_candidates(read_journal(run.directory))[run.counterexample]
         signals = {r.name: candidate.signals[r.name] for r in run.manifest.inputs}
-        row["input"] = _matrix_text(_sampled(signals, run.manifest.stop_time))
+        lines = (" ".join(f"{v:.12g}" for v in line) for line in _sampled(signals, run.manifest.stop_time))
+        row["input"] = f"[{'; '.join(lines)}]"
         values = (candidate.parameters[p.name] for p in run.manifest.parameters)
         row["parameters"] = f"[{' '.join(repr(v) for v in values)}]"
     return row
@@ -263,12 +261,8 @@ def _sampled(signals: Mapping[str, Signal], stop_time: float) -> Matrix:
     return np.column_stack([times, *(signal.sample(times) for signal in signals.values())])
 
 
-def _matrix_text(matrix: Matrix) -> str:
-    return f"[{'; '.join(' '.join(f'{v:.12g}' for v in row) for row in matrix)}]"
-
-
-def _row(number: int, cells: Mapping[str, str | None], path: Path) -> Row:
-    stated = {name: text.strip() for name, text in cells.items() if name and text and text.strip()}
+def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
+    stated = {name: text.strip() for name, text in cells.items() if text.strip()}
     try:
         return Row.model_validate(stated | {"number": number})
     except ValidationError as error:

@@ -177,7 +177,9 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
     names = COLUMNS if any(others.values()) else {}
     rows = []
     for (requirement, method), numbers in found.items():
-        row = [requirement, method.label, _rate(numbers), *(text(numbers) for text in _NUMBERS.values())]
+        rate = f"{numbers.falsified}/{numbers.runs}"
+        rate += f" +{numbers.unfinished}" if numbers.unfinished else ""
+        row = [requirement, method.label, rate, *(text(numbers) for text in _NUMBERS.values())]
         if names:
             known = others[requirement, method]
             place = _place(score(numbers), published.competitors(requirement)) if known else NONE
@@ -263,10 +265,6 @@ _LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulation
 _UNFINISHED = (
     "+n: n more runs failed or have not ended; of the other numbers, only best robustness includes them."
 )
-
-
-def _rate(s: Statistics) -> str:
-    return f"{s.falsified}/{s.runs}" + (f" +{s.unfinished}" if s.unfinished else "")
 
 
 def _number(value: float | None, decimals: int) -> str:

@@ -183,7 +183,9 @@ def _shrink(
             case.simulated(problem),
             budget=budget,
             at_most=at_most,
-            progress=lambda simpler, n: warn(f"simulation {n}: {_inputs_line(simpler)}"),
+            progress=lambda simpler, n: warn(
+                f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}"
+            ),
         )
         found = shrunk.evaluation
         confirmation = confirm(problem, found) if found.violated else None
@@ -298,7 +300,3 @@ def _loaded(case: Case, rights: Mapping[str, Any]) -> Iterator[Problem]:
         warn(f"not allowed, as when this was recorded: {', '.join(withheld)}; --allow grants it")
     with closing(problem.model):
         yield problem
-
-
-def _inputs_line(evaluation: Evaluation) -> str:
-    return f"{in_one_line(evaluation.candidate)}; robustness {signed(evaluation.robustness)}"

@@ -25,7 +25,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.files import can_be_a_folder
 from falsifier.views.terminal import warn
-from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, outcome_text
+from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
 
 
 @command()
@@ -66,7 +66,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
             {**stored.parameters, **{n: value for n, value in given.items() if n not in inputs}},
         )
     if evaluation.verdict is None:
-        raise SimulationError(f"{problem.name}: the simulation {outcome_text(evaluation)}")
+        raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     drawn = _with_own_ranges(problem, evaluation.candidate)
     files = _written(problem, drawn, evaluation, out) if out else []
     verdict = "violated" if evaluation.violated else "not violated"

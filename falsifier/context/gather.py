@@ -150,7 +150,8 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
     """
     forms = [readable.forms for _, readable in contents]
     chosen = [
-        next(i for i, (_, text) in enumerate(each) if _fits(text) or i == len(each) - 1) for each in forms
+        next(i for i, (_, text) in enumerate(each) if 0 < len(text) <= MAX_CHARACTERS or i == len(each) - 1)
+        for each in forms
     ]
     around = sum(len(file.name) + max(len(name) for name, _ in readable.forms) for file, readable in contents)
 
@@ -166,10 +167,6 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
             )
         chosen[max(shrinkable, key=size)] += 1
     return [(i, each[i][1]) for i, each in zip(chosen, forms, strict=True)]
-
-
-def _fits(text: str) -> bool:
-    return 0 < len(text) <= MAX_CHARACTERS
 
 
 def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -> list[Crossing]:

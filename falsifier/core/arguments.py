@@ -59,21 +59,13 @@ def instance(name: str, given: object, kind: type | tuple[type, ...], expected: 
 
 
 def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> Path:
-    """Return the path that a user gave.
-
-    Raises:
-        SpecError: naming the argument, if it is no path.
-    """
+    """Return the path that a user gave; SpecError naming the argument if it is none."""
     instance(name, given, (str, PathLike), expected)
     return Path(given)
 
 
 def texts(name: str, given: Iterable[str]) -> tuple[str, ...]:
-    """Return the texts of a list that a user gave; a single text is no list.
-
-    Raises:
-        SpecError: naming the argument, if it is no list of texts.
-    """
+    """Return the texts of a list that a user gave; SpecError naming the argument if it is no such list."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
     if found is None or not all(isinstance(each, str) for each in found):
         raise SpecError(f"{name}: expected a list of texts, got {given!r}")

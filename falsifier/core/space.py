@@ -298,7 +298,11 @@ class SearchSpace:
         times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
         outside = [
             *(_signal_outside(r, times[r.name], candidate.signals[r.name].values) for r in self.inputs),
-            *(_parameter_outside(p, candidate.parameters[p.name]) for p in self.parameters),
+            *(
+                f"{p.label}: {value:g} is {_outside(p)}"
+                for p in self.parameters
+                if _is_outside(p, value := candidate.parameters[p.name])
+            ),
         ]
         if any(outside):
             raise CandidateError("; ".join(filter(None, outside)))
@@ -387,11 +391,6 @@ def _signal_outside(r: InputRange, times: Sequence[float], values: Sequence[floa
     at, what = (", ".join(f"{pair[k]:g}" for pair in shown) for k in (0, 1))
     verb = "is" if len(found) == 1 else "are"
     return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {_outside(r)}"
-
-
-def _parameter_outside(p: ParameterRange, value: float) -> str:
-    """Whether a parameter is outside its range, in words; empty if it is not."""
-    return f"{p.label}: {value:g} is {_outside(p)}" if _is_outside(p, value) else ""
 
 
 def _outside(ranged: Range) -> str:

@@ -54,7 +54,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
         sum(_SIMPLEST_FIRST.index(s.interpolation) for _, s in signals),
         sum(_roughness(r, v, rests[r.name]) for r, v in numbers)
         + sum(digits(t) for r, s in signals if not problem.space.is_fixed(r, s) for t in s.times),
-        sum(_distance(r, v, rests[r.name]) for r, v in numbers),
+        sum(abs(v - x) / (r.high - r.low) for r, v in numbers if (x := rests[r.name]) is not None),
         tuple((s.times, s.values) for _, s in signals),
         tuple(v for _, v in parameters),
     )
@@ -90,10 +90,6 @@ def _roughness(ranged: InputRange | ParameterRange, value: float, rest: float | 
     if value == rest:
         return 0
     return 1 if value in (ranged.low, ranged.high) else 1 + digits(value)
-
-
-def _distance(ranged: InputRange | ParameterRange, value: float, rest: float | None) -> float:
-    return 0.0 if rest is None else abs(value - rest) / (ranged.high - ranged.low)
 
 
 def _range(problem: Problem, name: str) -> InputRange | ParameterRange:

@@ -290,8 +290,7 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
         return Replayed("does not fit", None, None, text)
     evaluation = evaluate(problem, candidate)
     if evaluation.robustness is None:
-        how = "timed out" if evaluation.status == "timeout" else evaluation.status
-        raise SimulationError(f"{problem.name}: the simulation {how}: {evaluation.reason}")
+        raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
     status, said = _STATUS[confirmation.outcome if confirmation else "refuted"]
     breach = evaluation.verdict.breach if evaluation.verdict else None

@@ -55,6 +55,11 @@ class Evaluation:
         """Whether the requirement is violated; False for a failed simulation."""
         return self.verdict is not None and self.verdict.violated
 
+    @property
+    def outcome(self) -> str:
+        """How a simulation that failed ended, and why."""
+        return f"{'timed out' if self.status == 'timeout' else self.status}: {self.reason}"
+
 
 def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     """Simulate one candidate and monitor its trajectory.

@@ -46,14 +46,18 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     Raises:
         SpecError: naming the file, the row or column and what is wrong.
     """
+    with in_section(file=str(path)):
+        return _read(csv_rows(path), info)
+
+
+def csv_rows(path: Path) -> list[tuple[int, list[str]]]:
+    """Return the rows of a CSV file that are not empty, numbered from 1; SpecError if it is none."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(c.strip() for c in row)]
+            return [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(c.strip() for c in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "expected a CSV file in UTF-8"
         raise SpecError(f"cannot be read: {reason}", file=str(path)) from None
-    with in_section(file=str(path)):
-        return _read(rows, info)
 
 
 def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:

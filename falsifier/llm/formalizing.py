@@ -67,9 +67,10 @@ def formalizing_messages(sentence: str, info: ModelInfo, experiment: Experiment)
         "You translate requirements on simulated systems from plain words, in any language, into formulas. "
         "Be exact about what the sentence says and do not add conditions that it does not contain."
     )
+    usual = (f"- {name}: {template.summary}; {_PATTERNS[name]}" for name, template in TEMPLATES.items())
     parts = [
         _LANGUAGE,
-        "\n".join(["Usual kinds of requirements:", *_usual()]),
+        "\n".join(["Usual kinds of requirements:", *usual]),
         "\n".join(_model(info, experiment)),
         f"The requirement:\n{sentence.strip()}",
         _ANSWER,
@@ -88,11 +89,6 @@ _PATTERNS = {
     "ramp_limit": "G[0,T] (abs(rate) <= limit), if a signal is the rate",
     "order": "G[0,T] not later or (not later or first) U[0,T] first",
 }
-
-
-def _usual() -> Iterator[str]:
-    for name, template in TEMPLATES.items():
-        yield f"- {name}: {template.summary}; {_PATTERNS[name]}"
 
 
 def _model(info: ModelInfo, experiment: Experiment) -> Iterator[str]:

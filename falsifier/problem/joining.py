@@ -272,11 +272,7 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
         SpecError: if the model has no such name, or cannot do with it what is asked.
     """
     inputs, parameters = dict[str, InputSection](), dict[str, ParameterSection]()
-    sections: list[tuple[str, InputSection | ParameterSection]] = [
-        *changes.inputs.items(),
-        *changes.parameters.items(),
-    ]
-    for name, section in sections:
+    for name, section in changes.variables:
         if name not in info:
             names = [v.name for v in info.variables if v.settable or v.causality == "input"]
             raise SpecError(

@@ -301,9 +301,8 @@ def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
         bare, fixed = replace(problem.experiment, outputs=()), sorted(problem.parameters.items())
         key = repr((problem.model, problem.space.inputs, problem.space.parameters, bare, fixed))
         groups.setdefault(key, []).append(problem)
-    return [_recording_alike(group) for group in groups.values()]
-
-
-def _recording_alike(group: list[Problem]) -> list[Problem]:
-    outputs = tuple(dict.fromkeys(name for p in group for name in p.experiment.outputs))
-    return [replace(p, experiment=replace(p.experiment, outputs=outputs)) for p in group]
+    found = []
+    for group in groups.values():
+        outputs = tuple(dict.fromkeys(name for p in group for name in p.experiment.outputs))
+        found.append([replace(p, experiment=replace(p.experiment, outputs=outputs)) for p in group])
+    return found

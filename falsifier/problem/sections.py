@@ -102,10 +102,6 @@ class InputSection(Strict):
         return all(each is None for each in stated)
 
 
-def _bare_value(section: object) -> object:
-    return {"value": section} if isinstance(section, int | float | bool | str) else section
-
-
 class ParameterSection(Strict):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
@@ -124,7 +120,8 @@ class ParameterSection(Strict):
 
 
 Inputs = dict[str, InputSection]
-Parameters = dict[str, Annotated[ParameterSection, BeforeValidator(_bare_value)]]
+_BARE = BeforeValidator(lambda found: {"value": found} if isinstance(found, int | float | str) else found)
+Parameters = dict[str, Annotated[ParameterSection, _BARE]]
 
 
 class ModelSection(Strict):
@@ -177,10 +174,6 @@ class ConnectionSection(Strict):
     )
 
 
-def _bare_source(section: object) -> object:
-    return {"from": section} if isinstance(section, str) else section
-
-
 class CouplingSection(Strict):
     """How the components of a system exchange values."""
 
@@ -228,7 +221,8 @@ class ContextSection(Strict):
 
 
 Components = dict[str, ComponentSection]
-Connections = dict[str, Annotated[ConnectionSection, BeforeValidator(_bare_source)]]
+_BARE_SOURCE = BeforeValidator(lambda found: {"from": found} if isinstance(found, str) else found)
+Connections = dict[str, Annotated[ConnectionSection, _BARE_SOURCE]]
 
 
 class ModelChanges(Strict):
@@ -245,6 +239,11 @@ class ModelChanges(Strict):
     deny: tuple[str, ...] = ()
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
+
+    @property
+    def variables(self) -> list[tuple[str, InputSection | ParameterSection]]:
+        """The sections of inputs and parameters, by name."""
+        return [*self.inputs.items(), *self.parameters.items()]
 
 
 class RequirementSection(ModelChanges):

@@ -83,11 +83,7 @@ def changes_from(
 
 @contextmanager
 def in_python(stl: str) -> Iterator[None]:
-    """Let errors that are raised within speak of arguments in Python where they speak of options.
-
-    Args:
-        stl: the argument that stands for ``--stl``.
-    """
+    """Let errors raised within speak of arguments in Python, not of options; ``stl`` is that of ``--stl``."""
 
     def argument(found: re.Match[str]) -> str:
         if found[1]:
@@ -136,11 +132,7 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     >>> options_from(changes_from_options(ranges=["u=0:1:3"], stop_time=5.0))
     [('--search', 'u=0:1:3'), ('--stop-time', '5.0')]
     """
-    sections: list[tuple[str, InputSection | ParameterSection]] = [
-        *changes.inputs.items(),
-        *changes.parameters.items(),
-    ]
-    options = [_option(name, section) for name, section in sections]
+    options = [_option(name, section) for name, section in changes.variables]
     for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))

@@ -105,11 +105,7 @@ class ProblemSource(BaseModel):
 
 
 def source_of(target: str | PathLike[str], **more: Any) -> ProblemSource:
-    """Return the source for values that a user gave.
-
-    Raises:
-        SpecError: naming the argument that is wrong.
-    """
+    """Return the source for values that a user gave; SpecError naming the argument that is wrong."""
     try:
         return ProblemSource(target=fspath(target) if isinstance(target, PathLike) else target, **more)
     except ValidationError as error:

@@ -26,7 +26,6 @@ from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
 from falsifier.views.terminal import error_console, live_line, unbroken
-from falsifier.views.text import outcome_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -166,7 +165,7 @@ class News:
             case Evaluated(evaluation=ended, spent=spent):
                 told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
-                    told.append(f"simulation {event.index + 1} {outcome_text(ended)}")
+                    told.append(f"simulation {event.index + 1} {ended.outcome}")
                 many = spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed
                 if many and self._is_new("mostly failed"):
                     told.append(

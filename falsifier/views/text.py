@@ -192,12 +192,6 @@ def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
     return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
 
 
-def outcome_text(evaluation: Evaluation) -> str:
-    """Say how a simulation that failed ended, and why."""
-    how = "timed out" if evaluation.status == "timeout" else evaluation.status
-    return f"{how}: {evaluation.reason}"
-
-
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """Convert an evaluation to a value that can be dumped as JSON."""
     verdict = evaluation.verdict

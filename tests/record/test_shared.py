@@ -80,7 +80,7 @@ def test_one_must_be_named(directory: Path, runs: dict[str, Run]) -> None:
     assert load_run(directory, "HARDER").simulations == runs["HARDER"].simulations
     with pytest.raises(JournalError, match="searched NEVER, HARD, HARDER; choose one"):
         load_run(directory)
-    with pytest.raises(JournalError, match="NEVER, HARD, HARDER, not OTHER"):
+    with pytest.raises(JournalError, match="no 'OTHER'; known: NEVER, HARD, HARDER"):
         load_run(directory, "OTHER")
 
 

@@ -139,7 +139,9 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] |
     sources = _sources(diagram)
     wanted = {name.rpartition(".")[2].strip("'") for name in signals} | set(signals)
     queue = [place for place in sources if place[-1] in wanted and place[0]]
-    queue += [place for name, place in _named_wires(diagram.root) if name in wanted]
+    for path, system in diagram.root.walk():
+        named = (wire for wire in system.wires if wire.name and wire.name in wanted)
+        queue += [(*path, wire.source.block) for wire in named if wire.source is not None]
     if not queue:
         return None
     found: set[BlockPath] = set()
@@ -181,10 +183,3 @@ def _sources(diagram: Diagram) -> Mapping[BlockPath, list[BlockPath]]:
 
 def _tag(block: Block) -> BlockPath:
     return ("", block.parameter("GotoTag") or block.parameter("DataStoreName"))
-
-
-def _named_wires(root: BlockSystem) -> Iterator[tuple[str, BlockPath]]:
-    for path, system in root.walk():
-        for wire in system.wires:
-            if wire.name and wire.source is not None:
-                yield wire.name, (*path, wire.source.block)

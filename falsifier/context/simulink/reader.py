@@ -117,7 +117,9 @@ class _Systems:
         instance = node.first("InstanceData")
         stated = {**node.values, **(instance.values if instance else {})}
         below = node.first("System")
-        is_chart = node.get("SFBlockType") not in ("", "NONE") or _is_old_chart(node)
+        # In older files, charts are masked subsystems around an S-function.
+        is_old = "Stateflow" in node.get("MaskType") or node.get("ErrorFcn").startswith("Stateflow")
+        is_chart = is_old or node.get("SFBlockType") not in ("", "NONE")
         return Block(
             type=kind,
             name=name,
@@ -131,11 +133,6 @@ class _Systems:
             inputs=_inputs(below) if is_chart else (),
             is_off=node.get("Commented") == "on",
         )
-
-
-def _is_old_chart(node: Node) -> bool:
-    """Whether a block of an older file is a chart: these are masked subsystems around an S-function."""
-    return "Stateflow" in node.get("MaskType") or node.get("ErrorFcn").startswith("Stateflow")
 
 
 def _inputs(below: Node | None) -> tuple[str, ...]:

@@ -57,13 +57,18 @@ def _chart(node: Node, items: list[_Item]) -> Chart:
     names = {key: _full_name(key, states) for key in states}
     junctions = [item.key for item in items if item.node.kind == "junction"]
     names |= {key: f"junction {i}" for i, key in enumerate(junctions, start=1) if key not in names}
-    code = next((text for item in items if (text := _script(item.node)) and _is_kernel(item.node)), "")
+    # The one state of a MATLAB Function block.
+    kernels = (item.node for item in items if item.node.get("labelString").startswith("eML_blk_kernel"))
+    code = next(filter(None, map(_script, kernels)), "")
+    data = (item.node for item in items if item.node.kind == "data")
+    # Not those of graphical functions.
+    own = (each for each in data if not each.get("scope").startswith("FUNCTION_"))
     sample = node.get("sampleTime")
     return Chart(
         name=" ".join(node.get("name").split()),
         states=() if code else tuple(_state(item, names[key]) for key, item in states.items()),
         transitions=() if code else tuple(_transitions(items, names)),
-        data=tuple(_data(item.node) for item in items if item.node.kind == "data" and _is_own(item.node)),
+        data=tuple(map(_data, own)),
         script=code,
         sample_time="" if sample == "-1" else sample,
     )
@@ -72,13 +77,10 @@ def _chart(node: Node, items: list[_Item]) -> Chart:
 def _full_name(key: str, states: Mapping[str, _Item]) -> str:
     names: list[str] = []
     while key in states and len(names) <= _MAX_NESTING:
-        names.append(_first_line(states[key].node))
+        first = states[key].node.get("labelString", "name").strip().split("\n")[0]
+        names.append(first.strip().rstrip("/"))
         key = states[key].parent
     return ".".join(reversed(names))
-
-
-def _first_line(node: Node) -> str:
-    return node.get("labelString", "name").strip().split("\n")[0].strip().rstrip("/")
 
 
 def _state(item: _Item, name: str) -> State:
@@ -91,15 +93,11 @@ def _transitions(items: list[_Item], names: Mapping[str, str]) -> Iterator[Trans
     for item in items:
         if item.node.kind != "transition":
             continue
-        source, target = (_where(item.node.first(side), names) for side in ("src", "dst"))
+        ends = (item.node.first(side) for side in ("src", "dst"))
+        source, target = ("" if end is None else names.get(end.get("SSID", "id"), "") for end in ends)
         label = item.node.get("labelString").strip()
         if target:
             yield Transition(source, target, "" if label == "?" else " ".join(label.split()))
-
-
-def _where(end: Node | None, names: Mapping[str, str]) -> str:
-    key = "" if end is None else end.get("SSID", "id")
-    return names.get(key, "")
 
 
 def _data(node: Node) -> ChartData:
@@ -108,19 +106,9 @@ def _data(node: Node) -> ChartData:
     return ChartData(node.get("name"), scope["scope"].lower() if scope else "", initial)
 
 
-def _is_own(node: Node) -> bool:
-    """Whether a variable belongs to the chart or one of its states, not to a graphical function."""
-    return not node.get("scope").startswith("FUNCTION_")
-
-
 def _script(node: Node) -> str:
     inner = node.first("eml")
     return ("" if inner is None else inner.get("script")).strip()
-
-
-def _is_kernel(node: Node) -> bool:
-    """Whether this is the one state of a MATLAB Function block."""
-    return node.get("labelString").startswith("eML_blk_kernel")
 
 
 def _is_note(node: Node) -> bool:

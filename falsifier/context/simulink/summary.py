@@ -53,15 +53,12 @@ def _structure(path: BlockPath, system: BlockSystem, only: Collection[BlockPath]
     told = [b for b in system.blocks if only is None or (*path, b.name) in only]
     if path:
         yield f"Subsystem {'/'.join(path)}"
-    for block in sorted(told, key=_ports_first):
+    order = {"Inport": 0, "Outport": 2}
+    for block in sorted(told, key=lambda block: (order.get(block.type, 1), block.number)):
         yield f"- {_block(block)}{_from(leading.get(block.name, {}))}"
     left_out = len(system.blocks) - len(told)
     if left_out:
         yield f"  ({counted(left_out, 'block')} left out: no influence on the requirement)"
-
-
-def _ports_first(block: Block) -> tuple[int, int]:
-    return ({"Inport": 0, "Outport": 2}.get(block.type, 1), block.number)
 
 
 def _block(block: Block) -> str:

@@ -153,7 +153,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         return None
     texts = {name: value if isinstance(value, str) else repr(value) for name, value in start.items()}
     overrides = ",".join(f"{name}={text}" for name, text in texts.items())
-    flags = ["-csvInput=input.csv"] if _has_inputs(problem) else []
+    flags = ["-csvInput=input.csv"] if any(v.kind != "string" for v in problem.info.inputs) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name
     return _OPENMODELICA.format(
@@ -165,7 +165,3 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         intervals=problem.experiment.samples - 1,
         flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
-
-
-def _has_inputs(problem: Problem) -> bool:
-    return any(v.kind != "string" for v in problem.info.inputs)

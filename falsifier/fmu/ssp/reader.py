@@ -277,20 +277,14 @@ class _Reader:
         self._bind(element, at, package)
 
     def _check_connector(self, title: str, kind: str, stated: str, unit: str, variable: Variable) -> None:
-        if variable.causality != kind:
-            raise self._wrong(
-                f"{title} is of kind {kind}, but the FMU's variable has the causality {variable.causality}; "
-                "use the FMU's"
-            )
-        if stated and _kind(stated) != ("integer" if variable.kind == "enumeration" else variable.kind):
-            raise self._wrong(
-                f"{title} is of type {stated}, but the FMU's variable of type "
-                f"{variable.type or variable.kind}; state the FMU's type"
-            )
-        if unit and variable.unit and unit != variable.unit:
-            raise self._wrong(
-                f"{title} is in {unit}, but the FMU's variable in {variable.unit}; state the FMU's unit"
-            )
+        type_ = "integer" if variable.kind == "enumeration" else variable.kind
+        for what, own, known, fits in (
+            ("of kind", kind, variable.causality, kind == variable.causality),
+            ("of type", stated, variable.type or type_, not stated or _kind(stated) == type_),
+            ("in", unit, variable.unit, unit == variable.unit or not (unit and variable.unit)),
+        ):
+            if not fits:
+                raise self._wrong(f"{title} is {what} {own}, the FMU's variable {what} {known}; state that")
 
     def _wire(self, wire: Element, at: str, children: Sequence[str]) -> None:
         """Note which end feeds the other; an input connector is a source inside of its own system."""

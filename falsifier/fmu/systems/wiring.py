@@ -56,7 +56,9 @@ def make_network(
     late = links if coupling.method == "jacobi" else tuple(late_links(links, order, loops))
     names = [members[m].name for m in order]
     notes = [_order_note(names, list(dict.fromkeys(full_name(members, link.target) for link in late)))]
-    notes += [_loop_note(names[first:last]) for first, last in loops]
+    for together in (names[first:last] for first, last in loops):
+        verb = "repeats its" if len(together) == 1 else "repeat their"
+        notes.append(f"{', '.join(together)} {verb} steps until the outputs no longer change")
     description, places = merged(name, members, links, frame, [*notes, *joiner.notes])
     return Network(name, members, links, order, loops, coupling, description, places)
 
@@ -251,11 +253,6 @@ def _check_restorable(loop: Sequence[Member]) -> None:
             'capability, or accept a delay of one communication step: loops = "delay"',
             key="coupling.loops",
         )
-
-
-def _loop_note(names: Sequence[str]) -> str:
-    verb = "repeats its" if len(names) == 1 else "repeat their"
-    return f"{', '.join(names)} {verb} steps until the outputs no longer change"
 
 
 def _order_note(names: Sequence[str], late: Sequence[str], most: int = 10) -> str:

@@ -280,7 +280,8 @@ class Questions:
         inputs = self._chosen(candidate)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
         if verdict is None:
-            text = _text(inputs, _failure(evaluation), *notes)
+            failure = f"no verdict, the simulation {evaluation.outcome}".rstrip(": ")
+            text = _text(inputs, failure, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         progress = (
             SampleProgress.of(self.view, evaluation.trajectory) if evaluation.trajectory else SampleProgress()
@@ -361,8 +362,3 @@ def _counting(view: View) -> dict[str, dict[int, str]]:
 def _shortened(why: str) -> str:
     why = " ".join(why.split())
     return why if len(why) <= _LONGEST_WHY else f"{why[:_LONGEST_WHY]} ..."
-
-
-def _failure(evaluation: Evaluation) -> str:
-    how = "timed out" if evaluation.status == "timeout" else evaluation.status
-    return f"no verdict, the simulation {how}: {evaluation.reason}".rstrip(": ")

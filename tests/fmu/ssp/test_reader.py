@@ -182,9 +182,11 @@ WRONG = {
     ),
     "nested more than 400 deep": structure(DEEP),
     "the FMU of plant has no variable for the connector plant.v; ": plant('"u"', '"v"'),
-    "plant.u is of kind output, but the FMU's variable has": plant('"u" kind="input"', '"u" kind="output"'),
-    "plant.u is of type Boolean, but the FMU's variable of type Real": plant('Real unit="m"', "Boolean"),
-    "the connector plant.u is in kg, but the FMU's variable in m": plant('unit="m"', 'unit="kg"'),
+    "plant.u is of kind output, the FMU's variable of kind input": plant(
+        '"u" kind="input"', '"u" kind="output"'
+    ),
+    "plant.u is of type Boolean, the FMU's variable of type Real": plant('Real unit="m"', "Boolean"),
+    "the connector plant.u is in kg, the FMU's variable in m": plant('unit="m"', 'unit="kg"'),
     "names the unknown connector 'plant.v'; known: u, y, T": feedback('Connector="u"', 'Connector="v"'),
     "names the unknown element 'po'; did you mean 'pi'": feedback('startElement="pi"', 'startElement="po"'),
     "names the unknown element 'inner.pi'": structure(system(PLANT + INNER, FROM_INNER)),
