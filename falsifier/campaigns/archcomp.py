@@ -106,11 +106,7 @@ def suite(name: str, *, profile: str | None = None) -> tuple[ProblemSource, ...]
 
 
 def _bundled_target(requirement: str) -> str:
-    """Target of a bundled requirement including its spec, such as ``NN:NN``: ``NN`` alone is the whole spec.
-
-    Raises:
-        SpecError: if there is none of that name.
-    """
+    """Target of a bundled requirement with its spec, such as ``NN:NN``: ``NN`` alone is the whole spec."""
     return f"{find_spec(requirement)[0].stem}:{requirement}"
 
 
@@ -293,11 +289,7 @@ def _checked(row: Row, budget: int) -> Revalidated:
 
 
 def _candidate(row: Row, problem: Problem) -> Candidate:
-    """Make the candidate of a row.
-
-    Raises:
-        ValueError: if the number of inputs or parameters is wrong, or a value is outside its range.
-    """
+    """Make the candidate of a row; ValueError if it does not fit the problem."""
     inputs, parameters = problem.space.inputs, problem.space.parameters
     columns, stated = max(row.input.shape[1] - 1, 0), row.parameters.ravel().tolist()
     if columns != len(inputs) or len(stated) != len(parameters):

@@ -6,7 +6,7 @@ from hashlib import sha256
 from itertools import product
 from math import inf
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from falsifier.core.files import readable_part
 from falsifier.core.words import counted
@@ -19,7 +19,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget
 from falsifier.search.parameterization import engine_parameterization
-from falsifier.search.request import LLMSettings, RunRequest
+from falsifier.search.request import LLMSettings, RunRequest, Strict
 
 _HASH_DIGITS = 10
 
@@ -64,15 +64,13 @@ class Method:
         return ", ".join([name, *(text for text, applies in apart.items() if applies)])
 
 
-class CampaignRequest(BaseModel):
+class CampaignRequest(Strict):
     """What a campaign runs and may spend.
 
     Attributes:
         runs: all runs.
         limits: what all runs together may spend; None: no limit in addition to the runs' own.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     runs: tuple[RunRequest, ...] = Field(min_length=1)
     limits: Budget | None = None

@@ -197,11 +197,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
-    """Load each problem once.
-
-    Raises:
-        SpecError: if two targets contain requirements of the same name: tables could not distinguish them.
-    """
+    """Load each problem once; SpecError for names that tables could not distinguish."""
     problems: dict[ProblemSource, Problem] = {}
     targets: dict[str, str] = {}
     for source in dict.fromkeys(r.problems[0] for r in requests):

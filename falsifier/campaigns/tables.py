@@ -96,7 +96,14 @@ def read_published() -> Published:
     data = tomllib.loads((bundled("specs") / "published.toml").read_text(encoding="utf-8"))
 
     def columns(found: Mapping[str, Any]) -> dict[str, dict[str, Score]]:
-        return {name: _scores(column, int(data["runs"])) for name, column in found.items()}
+        return {
+            name: {
+                requirement: Score(cell["falsified"], data["runs"], cell.get("mean"), cell.get("tool", ""))
+                for requirement, cell in column.items()
+                if requirement != "source"
+            }
+            for name, column in found.items()
+        }
 
     best, tools = {name: data[name] for name in COLUMNS}, data["tools"]
     return Published(
@@ -106,14 +113,6 @@ def read_published() -> Published:
         tools=columns(tools),
         sources={name: column.get("source", "") for name, column in (best | tools).items()},
     )
-
-
-def _scores(column: Mapping[str, Any], runs: int) -> dict[str, Score]:
-    return {
-        requirement: Score(cell["falsified"], runs, cell.get("mean"), cell.get("tool", ""))
-        for requirement, cell in column.items()
-        if requirement != "source"
-    }
 
 
 @dataclass(frozen=True, slots=True)

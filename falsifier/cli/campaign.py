@@ -246,11 +246,7 @@ def _agree(request: CampaignRequest, *, yes: bool) -> None:
 def _kinds(
     given: Sequence[Parameterized], default: Parameterization
 ) -> tuple[str | None, tuple[Parameterization, ...]]:
-    """Return the profile of all runs, and their parameterizations.
-
-    Raises:
-        click.UsageError: if there are several profiles, or pieces of a stated length.
-    """
+    """Return the profile of all runs, of which there may be one, and their parameterizations."""
     profiles = {chosen.profile for chosen in given}
     if len(profiles) > 1:
         raise click.UsageError("--parameterization: all runs of a campaign must have the same profile")

@@ -103,11 +103,7 @@ def _lessons(records: Sequence["Record"]) -> str:
 
 
 def _told_by(directory: Path, problem: "Problem") -> "Manifest":
-    """Return what a run was, whose samples are those of the problem's model and requirement.
-
-    Raises:
-        SpecError: if they are others.
-    """
+    """Return what a run was; SpecError unless its samples are of the problem's model and requirement."""
     from falsifier.record import manifest
 
     described = manifest.read(directory)

@@ -11,7 +11,7 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from falsifier import __version__
 from falsifier.core.arguments import path_of
@@ -28,6 +28,7 @@ from falsifier.record import manifest
 from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import RequirementRecord
 from falsifier.record.records import ConfirmedRecord
+from falsifier.search.request import Strict
 from falsifier.stl.margins import signed
 
 FILE_NAME = "counterexample.json"
@@ -44,10 +45,8 @@ _STATUS: dict[Outcome, tuple[ReplayStatus, str]] = {
 }
 
 
-class StoredCounterexample(BaseModel):
+class StoredCounterexample(Strict):
     """Content of a counterexample file."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     format: Literal[1] = 1
     requirement: str

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from falsifier import __version__
 from falsifier.context.values import Context
@@ -24,17 +24,13 @@ from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization
 from falsifier.record.files import read_sealed, write_sealed
 from falsifier.search.parameterization import parameterization_of, searched_space
-from falsifier.search.request import RunRequest
+from falsifier.search.request import RunRequest, Strict
 
 MANIFEST = "manifest.json"
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class InputRecord(_Strict):
+class InputRecord(Strict):
     """One searched input or parameter, so that reports can draw a run without its model."""
 
     name: str
@@ -46,7 +42,7 @@ class InputRecord(_Strict):
     items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
 
 
-class ModeRecord(_Strict):
+class ModeRecord(Strict):
     """One recorded signal of the model that is not real."""
 
     name: str
@@ -54,7 +50,7 @@ class ModeRecord(_Strict):
     items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
 
 
-class RequirementRecord(_Strict):
+class RequirementRecord(Strict):
     """One requirement."""
 
     name: str
@@ -69,7 +65,7 @@ class RequirementRecord(_Strict):
         )
 
 
-class Surroundings(_Strict):
+class Surroundings(Strict):
     """With what and when a run or a campaign was started."""
 
     falsifier: str = Field(description="Version of this package.")

@@ -20,11 +20,13 @@ _Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Keep = Literal["history", "best"]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """A value of a record that takes no other keys than its own."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-class LLMSettings(_Strict):
+class LLMSettings(Strict):
     """Which language model to ask, and how."""
 
     # An option that contains a key is rejected, and the error must not show it either.
@@ -75,7 +77,7 @@ class LLMSettings(_Strict):
         return options
 
 
-class RunRequest(_Strict):
+class RunRequest(Strict):
     """One run. Naming a language model without an engine means that it leads the search."""
 
     problems: tuple[ProblemSource, ...] = Field(

@@ -184,11 +184,7 @@ class Isolated:
         REGISTRY.drop(self.order.key)
 
     def _resolve_rights(self) -> None:
-        """Make the paths of what is allowed absolute.
-
-        Raises:
-            SpecError: if what is allowed or denied is unknown, or a path does not exist.
-        """
+        """Make the paths of what is allowed absolute; SpecError naming what is unknown or absent."""
         for name in ("allow", "deny"):
             object.__setattr__(self, name, resolved(getattr(self, name), Path()))
         _ = self.rights

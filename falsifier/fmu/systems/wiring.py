@@ -45,7 +45,14 @@ def make_network(
     dependencies = Dependencies(members, structures)
     loop = direct_loop(links, dependencies)
     if loop and coupling.loops == "refuse":
-        raise SpecError(_loop_text([full_name(members, place) for place in loop]), key="connections")
+        shown = " -> ".join(full_name(members, place) for place in (*loop, loop[0]))
+        raise SpecError(
+            f"{shown}: these depend directly on each other (an algebraic loop), as their FMUs declare; "
+            "export one of the components without the direct dependency, for example with a delay, or accept "
+            'a delay of one communication step: [coupling] loops = "delay"; or repeat their steps until they '
+            'agree: loops = "iterate"',
+            key="connections",
+        )
     loops: tuple[tuple[int, int], ...] = ()
     if coupling.loops == "iterate":
         order, loops = iterated_order(len(members), links, dependencies)
@@ -233,15 +240,6 @@ def _check_types(a: Variable, b: Variable) -> None:
 
 def _items(variable: Variable) -> str:
     return ", ".join(f"{number} = {name}" for name, number in variable.literals.items())
-
-
-def _loop_text(loop: Sequence[str]) -> str:
-    return (
-        f"{' -> '.join([*loop, loop[0]])}: these depend directly on each other (an algebraic loop), as "
-        "their FMUs declare; export one of the components without the direct dependency, for example with a "
-        'delay, or accept a delay of one communication step: [coupling] loops = "delay"; or repeat their '
-        'steps until they agree: loops = "iterate"'
-    )
 
 
 def _check_restorable(loop: Sequence[Member]) -> None:
