@@ -34,9 +34,8 @@ _VALIDATORS = (
     ("Input should be a valid tuple", "expected a list"),
     ("Input should be a valid dictionary", "expected a table of keys and values"),
     ("Input should be an object", "expected a table of keys and values"),
-    ("Input should be greater than or equal to", "expected a number {}"),
-    ("Input should be greater than", "expected a number {}"),
-    ("Input should be less than", "expected a number {}"),
+    ("Input should be greater", "expected a number {}"),
+    ("Input should be less", "expected a number {}"),
 )
 
 FailureStatus = Literal["failed", "crashed", "timeout"]

@@ -204,7 +204,9 @@ def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[Lin
     named = {p.name: set(p.requirement.formula.signals) for p in group}  # none: it is always decided
     suspects = [p for p in group if named[p.name] and not named[p.name] & set(p.space.names)]
     declared = {p.name: _is_declared_independent(p) for p in suspects}
-    asked = [p for p in suspects if declared[p.name] or _is_continuous(p)]
+    # A discrete signal may keep its value in all simulations and depend on inputs all the same.
+    shown = {p.name: {v.name for v in p.info.variables if v.is_continuous} for p in suspects}
+    asked = [p for p in suspects if declared[p.name] or shown[p.name] >= named[p.name]]
     simulated = _simulated(group[0], simulations) if asked and simulations else []
     for problem in asked:
         signals = problem.requirement.formula.signals
@@ -232,12 +234,6 @@ def _is_declared_independent(problem: Problem) -> bool:
     searched = set(problem.space.names)
     signals = problem.requirement.formula.signals
     return all(name in known and not known[name] & searched for name in signals)
-
-
-def _is_continuous(problem: Problem) -> bool:
-    """Whether every effect on its signals shows: a discrete one may keep its value in all simulations."""
-    known = {v.name for v in problem.info.variables if (v.kind, v.variability) == ("real", "continuous")}
-    return known >= set(problem.requirement.formula.signals)
 
 
 def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:

@@ -26,7 +26,7 @@ from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import ModelChanges, RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, in_python, requirement_of
 from falsifier.problem.source import Parameterization, ProblemSource, Target, source_of
-from falsifier.problem.spec import Spec, read_spec
+from falsifier.problem.spec import read_spec
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
 # loading it once more.
@@ -251,7 +251,8 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
                 f"{target}:{requirement}; falsifier run {target} falsifies all of them. Known: {names}",
                 file=str(path),
             )
-        if others and not _simulate_alike(spec):
+        first, *rest = (section.model_dump(include=_OVERRIDES) for section in spec.requirements.values())
+        if any(each != first for each in rest):
             raise SpecError(
                 f"the requirements of {target} simulate in different ways; say whose inputs and times hold: "
                 f"{target}:NAME, with one of {names}"
@@ -267,12 +268,6 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
         searches=searches,
     )
     return joined, named_context(source, spec, path)
-
-
-def _simulate_alike(spec: Spec) -> bool:
-    """Whether no requirement of a spec overrides something else than the others."""
-    first, *others = (section.model_dump(include=_OVERRIDES) for section in spec.requirements.values())
-    return all(other == first for other in others)
 
 
 def _python_problem(source: ProblemSource) -> Problem:

@@ -198,7 +198,8 @@ class Subject:
     @property
     def is_started(self) -> bool:
         """Whether its first requirement is a starter's, still without its number."""
-        return _has_placeholder(tomllib.loads(self.text))
+        formula = tomllib.loads(self.text)["requirements"].get(_STARTED, {}).get("formula")
+        return isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
 
     def parsed(self, text: str) -> tuple[Formula, Problem]:
         """Return a formula that fits, and the problem with the time grid on which it is judged.
@@ -224,7 +225,12 @@ def subject_of(target: str) -> Subject:
         ModelError: if the FMU cannot be read.
     """
     if target.endswith(MODEL_FILES):
-        return _of_model(Path(target))
+        fmu = Path(target)
+        if not fmu.is_file():
+            raise SpecError(f"{absent(fmu)}; give the path of an FMU or SSP package, or a spec")
+        info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
+        starter, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
+        return Subject(problem_of_starter(text, starter), starter, text, is_new=True, free_grid=True)
     path, requirement = find_spec(target)
     spec = read_spec(path)
     name = requirement or next(iter(spec.requirements))
@@ -235,14 +241,6 @@ def subject_of(target: str) -> Subject:
         is_new=False,
         free_grid=spec.model.output_interval is None and spec.requirements[name].output_interval is None,
     )
-
-
-def _of_model(fmu: Path) -> Subject:
-    if not fmu.is_file():
-        raise SpecError(f"{absent(fmu)}; give the path of an FMU or SSP package, or a spec")
-    info = read_package(fmu).info if is_package(fmu) else read_info(fmu)
-    path, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
-    return Subject(problem_of_starter(text, path), path, text, is_new=True, free_grid=True)
 
 
 def problem_of_starter(text: str, path: Path) -> Problem:
@@ -257,11 +255,6 @@ def problem_of_starter(text: str, path: Path) -> Problem:
     """
     spec, stated = parse_spec(tomllib.loads(text), file=str(path)), RequirementSection(formula=_ANY)
     return Problem.of(join(spec, _STARTED, path=path, stated=stated))
-
-
-def _has_placeholder(content: dict[str, Any]) -> bool:
-    formula = content["requirements"].get(_STARTED, {}).get("formula")
-    return isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
 
 
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:

@@ -41,7 +41,8 @@ def _diagram(tree: Node, shown: str) -> Diagram:
     root = top.first("System")
     if root is None:
         raise SpecError(f"{shown}: {top.kind} {top.get('Name')!r} has no system of blocks; save it again")
-    made = _Systems(_defaults(tree), shown)
+    defaults = (node for node in tree.walk() if node.kind == "BlockParameterDefaults")
+    made = _Systems({b.get("BlockType"): b.values for each in defaults for b in each.all("Block")}, shown)
     return Diagram(
         name=top.get("Name") or root.get("Name") or Path(shown).stem,
         root=made.system(root),
@@ -70,11 +71,6 @@ def _tree(path: Path) -> Node:
     if parts := text_parts(text):
         return ModelPackage(parts, str(path)).tree()
     return parse_mdl(text, str(path))
-
-
-def _defaults(tree: Node) -> Mapping[str, Mapping[str, str]]:
-    sections = (node for node in tree.walk() if node.kind == "BlockParameterDefaults")
-    return {block.get("BlockType"): block.values for each in sections for block in each.all("Block")}
 
 
 def _settings(tree: Node, top: Node) -> Iterator[tuple[str, str]]:

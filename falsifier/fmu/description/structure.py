@@ -49,9 +49,7 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
                     float(base.get("offset", "0")),
                 )
             except (LookupError, ValueError) as error:
-                raise ValueError(
-                    f"the unit {element.get('name')!r}: {type(error).__name__}: {error}"
-                ) from None
+                raise ValueError(f"unit {element.get('name')!r}: {type(error).__name__}: {error}") from None
     return found
 
 

@@ -57,6 +57,8 @@ def failure(
     """
     component = "" if reply.where in _OF_ALL else network.stepped(reply.component)
     words = reply.text.split()
+    loops = (range(first, last) for first, last in network.loops)
+    together = next((loop for loop in loops if reply.component in loop), ())
     said = _TEXTS.get(reply.where, _EVENT).format(
         text=reply.text,
         returned=f"returned {_status_name(reply.status)}",
@@ -65,7 +67,7 @@ def failure(
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),
-        loop=", ".join(_loop(network, reply.component)),
+        loop=", ".join(sorted(map(network.stepped, together))),
         changes=_changes(network, words),
         rounds=network.coupling.max_rounds,
     )
@@ -114,12 +116,6 @@ def _out_of_time(plan: Plan) -> str:
         return f"after the time limit of {plan.time_limit:g} s; slow models need a larger time_limit"
     share = f"{plan.time_limit:g} s without another tenth of the simulated time"
     return f"after {share}; slow models need a time_limit"
-
-
-def _loop(network: Network, position: int) -> list[str]:
-    """Return the names of the components that iterate with the one at a position of the order."""
-    inside = [range(first, last) for first, last in network.loops if first <= position < last]
-    return sorted(network.stepped(k) for k in (inside[0] if inside else ()))
 
 
 def _changes(network: Network, words: Sequence[str]) -> str:

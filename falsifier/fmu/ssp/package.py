@@ -185,9 +185,7 @@ def transformation(element: Element) -> Transformation:
         if tag(child) in _MAPPINGS:
             raise SpecError(f"the element {tag(child)} is not supported; map the values inside a component")
     stated = {k: v for each in element.findall("{*}LinearTransformation") for k, v in each.attrib.items()}
-    factor, offset = (
-        number(name, stated.get(name, start)) for name, start in (("factor", "1"), ("offset", "0"))
-    )
+    factor, offset = number("factor", stated.get("factor", "1")), number("offset", stated.get("offset", "0"))
     if factor == 0.0:
         raise SpecError("a LinearTransformation has the factor 0, which passes nothing on; set a parameter")
     return Transformation(factor, offset, is_true(element.get("suppressUnitConversion")))

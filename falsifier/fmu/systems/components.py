@@ -127,6 +127,7 @@ def merged(
             variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
             slots[other], places[other] = slots[meant], places[meant]
     infos = [m.description.info for m in members]
+    stop_times = {i.stop_time for i in infos if i.stop_time is not None}
     info = ModelInfo(
         name=name,
         description=_description(members, links),
@@ -134,7 +135,7 @@ def merged(
         interfaces=("co-simulation",),
         platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
-        stop_time=frame.stop_time or _only([i.stop_time for i in infos]),
+        stop_time=frame.stop_time or (stop_times.pop() if len(stop_times) == 1 else None),
         step_size=_step(
             [m.step for m in members], [m.description.info.step_size for m in members if not m.step]
         ),
@@ -168,12 +169,6 @@ def _description(members: Sequence[Member], links: Sequence[Link]) -> str:
 
 def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str, str], ...]:
     return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
-
-
-def _only(times: Iterable[float | None]) -> float | None:
-    """Return the time that all who state one agree on."""
-    stated = {time for time in times if time is not None}
-    return stated.pop() if len(stated) == 1 else None
 
 
 def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float | None:

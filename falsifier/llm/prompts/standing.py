@@ -97,9 +97,11 @@ def standing(
     """
     if not variant.has("context"):
         view = replace(view, context=Context())
+    info = view.info
+    described = f"System: {info.name}. {info.description}".rstrip(" .") + "."
     text = _STANDING.format(
         task=_TASK.format(what=view.chosen),
-        system=_system(view),
+        system=described if info.name or info.description else "",
         requirement="\n".join(_requirement(view)),
         outputs="\n".join(_outputs(view, start or {})),
         choice="\n".join(_choice(view)),
@@ -135,12 +137,6 @@ def _operand(formula: Formula, above: Formula) -> str:
     is_link = type(formula) is type(above) and isinstance(formula, And | Or)
     text = formula_text(formula)
     return text if isinstance(formula, Predicate) or is_link else f"({text})"
-
-
-def _system(view: View) -> str:
-    info = view.info
-    described = f"System: {info.name}. {info.description}".rstrip(" .") + "."
-    return described if info.name or info.description else ""
 
 
 def _requirement(view: View) -> Iterator[str]:

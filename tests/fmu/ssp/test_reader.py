@@ -174,10 +174,10 @@ WRONG = {
     "DefaultExperiment: stopTime: 'late' is not a": structure(
         system(PLANT), after='<ssd:DefaultExperiment stopTime="late"/>'
     ),
-    "SystemStructure.ssd: the unit 'mm': ValueError: could not": structure(
+    "SystemStructure.ssd: unit 'mm': ValueError: could not": structure(
         system(PLANT), after=MILLIMETRE.replace("0.001", "small")
     ),
-    "SystemStructure.ssd: the unit None: KeyError: 'name'": structure(
+    "SystemStructure.ssd: unit None: KeyError: 'name'": structure(
         system(PLANT), after=MILLIMETRE.replace('name="mm"', "")
     ),
     "nested more than 400 deep": structure(DEEP),
