@@ -52,12 +52,12 @@ def report(
     first, *others = directories
     if others:
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
-    path = out or first / "report.html"
-    written = [(arch_comp, b"system,"), (csv_file, b"requirement,")]
-    if out is not None or not markdown:
-        written.append((path, b"# " if markdown else b"<!DOCTYPE html>"))
-    for file, begins in written:  # before anything is drawn
-        if file is not None and in_existing_folder(file).exists() and not file.is_char_device():
+    path = out or (None if markdown else first / "report.html")
+    page = b"# " if markdown else b"<!DOCTYPE html>"
+    for file, begins in ((arch_comp, b"system,"), (csv_file, b"requirement,"), (path, page)):
+        if file is not None and file.parent != first:  # whether that is a run is seen when it is read
+            in_existing_folder(file)
+        if file is not None and (file.is_file() or file.is_dir()):
             check_out(file, beginnings=(begins,))
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
@@ -65,12 +65,12 @@ def report(
     if csv_file is not None:
         csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
         warn(f"{csv_file} written")
-    if markdown and out is None:
-        say(markdown_report(*directories), nl=False)
-        return
     made = markdown_report(*directories) if markdown else html_report(*directories)
-    path.write_text(made, encoding="utf-8")
-    warn(f"{path} written")
+    if path is None:
+        say(made, nl=False)
+    else:
+        path.write_text(made, encoding="utf-8")
+        warn(f"{path} written")
 
 
 @command()

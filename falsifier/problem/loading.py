@@ -102,7 +102,7 @@ def load_problem(
     """Load one problem.
 
     Args:
-        target: see ProblemSource; the requirement's name is optional if the spec has only one.
+        target: see ProblemSource; a path too. The requirement's name is optional if the spec has only one.
         stl: a formula, or a template with its arguments, to use instead of the spec's requirement.
         profile: name of a profile of the spec, e.g. ``instance2``.
         parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:

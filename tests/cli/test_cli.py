@@ -46,6 +46,8 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--budget", "many"], "many"),
         (["run", "AT1", "--variant", "MP4"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
+        (["report", "gone"], "gone: no such directory; expected that of a run or campaign"),
+        (["report", "/dev/null"], "/dev/null: not a run or campaign directory"),
         (["resume", "nowhere"], "nowhere: no such directory"),
         (["info", "gone.fmu"], "gone.fmu: no such file"),
         (["rn", "AT1"], "did you mean 'run'"),
