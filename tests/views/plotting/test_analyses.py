@@ -13,6 +13,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.manifest import InputRecord
 from falsifier.testing import START, lag_problem
 from falsifier.views.plotting import plot_coverage, plot_robustness_map, png, save_figure
+from falsifier.views.plotting.axes import wrapped
 from tests.analyses.test_coverage import TIMES, described
 from tests.pictures import CRITICAL, OUTPUT, colours
 from tests.views.plotting.support import xs, ys
@@ -20,6 +21,10 @@ from tests.views.plotting.support import xs, ys
 NEVER = "#f2b8b0"
 U = InputRecord(name="u", low=0.0, high=10.0)
 P = InputRecord(name="p", low=0.0, high=1.0)
+
+
+def test_lines_do_not_end_within_the_name_of_an_option() -> None:
+    assert wrapped("try --api-base", 12) == "try\n--api-base"
 
 
 def test_there_is_a_panel_of_each_input_parameter_pair_and_output() -> None:
