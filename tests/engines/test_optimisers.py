@@ -96,9 +96,16 @@ def test_one_huge_cost_does_not_hide_small_differences_and_equal_ones_are_no_tro
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_length_scales_that_shrink_from_fit_to_fit_leave_a_covariance_that_can_be_factored(seed: int) -> None:
+def test_points_that_nearly_coincide_leave_a_covariance_that_can_be_factored(seed: int) -> None:
     rng = np.random.default_rng(seed)
     apart = 10.0 ** -rng.uniform(3, 12) * rng.standard_normal((80, 8))
     points = rng.random((5, 8))[rng.integers(0, 5, 80)] + apart
-    process = fit_lengths(points, rng.standard_normal(80), np.full(8, 1e-8), rng, noise=1e-4)
+    process = fit_lengths(points, rng.standard_normal(80), noise=1e-4)
     assert np.isfinite(process.weights).all()
+
+
+def test_two_of_thirty_coordinates_that_matter_are_told_from_few_points() -> None:
+    points = np.random.default_rng(0).random((30, 30))
+    targets = standardised(np.sin(4 * points[:, 3]) + (points[:, 17] - 0.4) ** 2)
+    lengths = fit_lengths(points, targets, noise=1e-4).lengths
+    assert set(np.argsort(lengths)[:2]) == {3, 17}

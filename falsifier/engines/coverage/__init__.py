@@ -1,5 +1,6 @@
 """Search led by what trajectories did that no earlier one did, for robustness without a slope."""
 
 from falsifier.engines.coverage.explorer import CoverageEngine, Explorer
+from falsifier.engines.coverage.ladder import Ladder
 
-__all__ = ["CoverageEngine", "Explorer"]
+__all__ = ["CoverageEngine", "Explorer", "Ladder"]

@@ -8,14 +8,14 @@ Systems are causal: inputs that stay the same up to a time do what they did unti
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import inf, sqrt
+from math import sqrt
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Proposal
+from falsifier.engines.coverage.ladder import KeptInput
 from falsifier.engines.coverage.marks import MODES, Mark, Marker
 from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
@@ -24,31 +24,8 @@ from falsifier.problem.problem import Problem
 
 # Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
 _NEW_END, _REPEATED = 0.6, 0.2
-# Of what follows the lowest robustness: a small change, the same done again, a new end from an earlier time;
-# else one from then.
-_SLIGHT, _AGAIN, _EARLIER = 0.2, 0.25, 0.15
-# Of what is done again, the share without a stretch before it, and that with all that led there; the shortest
-# span otherwise, as a share of the time until then.
-_SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
-# Two values of robustness that differ by at most this share of their size are the same level.
-_SAME_LEVEL = 1e-6
 # Proposals, then random points, among which one that was not simulated is looked for.
 _IDEAS, _DRAWS = 10, 100
-
-
-@dataclass(slots=True, eq=False)
-class MarkedInput:
-    """The input that reached a mark first, or much earlier than the first one.
-
-    Attributes:
-        point: the input in the explorer's layout.
-        time: when it reached the mark, in s.
-        tries: how often the search has gone on from here.
-    """
-
-    point: Array
-    time: float
-    tries: int = 0
 
 
 class Explorer:
@@ -56,7 +33,7 @@ class Explorer:
 
     def __init__(self, problem: Problem, layout: Layout) -> None:
         self._marker = Marker(problem)
-        self._programs = Programs(layout)
+        self.programs = Programs(layout)
         self._interval = problem.experiment.output_interval
         levels: dict[str, list[float]] = defaultdict(list)
         searched = problem.space.names
@@ -65,25 +42,15 @@ class Explorer:
         self._aimed = Programs(layout, levels)
         # Whether levels are known at which something changes.
         self.has_levels = bool(levels)
-        self._reached: dict[Mark, MarkedInput] = {}
+        self._reached: dict[Mark, KeptInput] = {}
         self._by_source: dict[str, list[Mark]] = defaultdict(list)
         self._hits: Counter[Mark] = Counter()
-        self._lowest = inf
-        self._at_lowest: list[MarkedInput] = []
         self._new: Counter[str] = Counter()
         self._seen = 0
 
-    def learn(self, point: Array, trajectory: Trajectory, robustness: float, critical: float) -> bool:
-        """Add a simulation to the archive; return whether a discrete signal did something new.
-
-        The critical time is in s.
-        """
+    def learn(self, point: Array, trajectory: Trajectory) -> bool:
+        """Add a simulation to the archive; return whether a discrete signal did something new."""
         self._seen += 1
-        difference = robustness - self._lowest
-        if difference < -_SAME_LEVEL * abs(robustness):
-            self._lowest, self._at_lowest = robustness, []
-        if difference <= _SAME_LEVEL * abs(robustness):
-            self._at_lowest.append(MarkedInput(point, critical))
         marks = self._marker.marks(trajectory)
         new = [mark for mark in marks if mark not in self._reached]
         self._new.update({mark.source for mark in new})
@@ -93,9 +60,9 @@ class Explorer:
             if known is None:
                 self._by_source[mark.source].append(mark)
             if known is None and mark.what[0] == "changes" and mark.source in self._marker.kinds:
-                self._programs.remember(point, time, self._interval)
+                self.programs.remember(point, time, self._interval)
             if known is None or time < 0.95 * known.time:
-                self._reached[mark] = MarkedInput(point, time, known.tries if known else 0)
+                self._reached[mark] = KeptInput(point, time, known.tries if known else 0)
         events, sources = ("is", "changes", "after"), self._marker.kinds
         return any(m.source == MODES or (m.source in sources and m.what[0] in events) for m in new)
 
@@ -106,7 +73,7 @@ class Explorer:
             rng: random generator.
             aimed: whether new values are drawn between the levels at which something changes.
         """
-        programs = self._aimed if aimed else self._programs
+        programs = self._aimed if aimed else self.programs
         if not programs.has_inputs:
             return Proposal(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)
@@ -128,34 +95,6 @@ class Explorer:
             point = programs.repeated(rng, reached.point, reached.time, source.point, span)
             return Proposal(point, f"{where}, followed by what made {describe(other)}")
         return Proposal(programs.moved(rng, reached.point), f"{where}, slightly changed")
-
-    def propose_lower(self, rng: np.random.Generator) -> Proposal:
-        """Return an input that reached the lowest robustness, continued differently after that was decided.
-
-        Where robustness has few values, this is how the next lower one is reached from this one.
-        """
-        reached = min(self._at_lowest, key=lambda r: (r.tries, r.time))
-        reached.tries += 1
-        where = f"the input that made the robustness {self._lowest:.4g} at {reached.time:.3g} s"
-        kind = rng.random()
-        if kind < _SLIGHT:
-            return Proposal(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
-        if kind < _SLIGHT + _AGAIN:
-            return Proposal(self._again(rng, reached), f"{where}, done again and again")
-        # Now and then from an earlier time: it may have been too late.
-        time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
-        return Proposal(
-            self._programs.another_end(rng, reached.point, time), f"{where}, continued differently"
-        )
-
-    def _again(self, rng: np.random.Generator, reached: MarkedInput) -> Array:
-        """Return the input that goes on with what it did before the lowest robustness, until the end."""
-        point, time = reached.point, reached.time
-        if rng.random() < _SOONER:
-            point, time = self._programs.sooner(rng, point, time)
-        is_all = rng.random() < _FROM_START
-        span = time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
-        return self._programs.again(rng, point, time, span)
 
     def _choose(self, rng: np.random.Generator) -> Mark | None:
         """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""
@@ -212,7 +151,7 @@ class CoverageEngine:
             self._known.add(hash(evaluation.candidate.key))
             if evaluation.trajectory is not None:
                 point = self.layout.point(evaluation.candidate)
-                self._explorer.learn(point, evaluation.trajectory, 0.0, 0.0)
+                self._explorer.learn(point, evaluation.trajectory)
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])

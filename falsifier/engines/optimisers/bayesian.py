@@ -29,8 +29,6 @@ class Bayesian(Sobol):
         self._start = min(20, 2 * self.box.dimension + 2)
         self._points: list[Array] = []
         self._costs: list[float] = []
-        # Distances in the unit box grow with the square root of its dimension, and so must length scales.
-        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         if self._asked < self._start or len(self._costs) < 2:
@@ -54,8 +52,7 @@ class Bayesian(Sobol):
         return points[keep], costs[keep]
 
     def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
-        process = fit_lengths(points, targets, self._lengths, rng, noise=_NOISE)
-        self._lengths = process.lengths
+        process = fit_lengths(points, targets, noise=_NOISE)
         best = float(targets.min())
         d = self.box.dimension
         incumbent = process.points[int(np.argmin(targets))]

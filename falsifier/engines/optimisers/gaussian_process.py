@@ -4,11 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import minimize
 
 from falsifier.engines.layout import Array, learnable
 
 # Limits of length scales in the unit box: far beyond them rounding makes the covariance indefinite.
 _SHORTEST, _LONGEST = 1e-3, 1e3
+# Usual length scale of one coordinate, standard deviation of its logarithm, and steps of the optimisation.
+_USUAL, _SPREAD, _STEPS = 0.5, 1.5, 25
 
 
 def _correlation(x: Array, z: Array) -> Array:
@@ -30,14 +33,12 @@ class GaussianProcess:
         lengths: length scale of each coordinate, shape (d,).
         factor: lower Cholesky factor of the covariance, shape (n, n).
         weights: covariance^-1 targets, shape (n,).
-        evidence: log marginal likelihood, up to a constant.
     """
 
     points: Array
     lengths: Array
     factor: Array
     weights: Array
-    evidence: float
 
     @classmethod
     def fit(cls, points: Array, targets: Array, lengths: Array, *, noise: float) -> "GaussianProcess":
@@ -46,8 +47,7 @@ class GaussianProcess:
         covariance = _correlation(scaled, scaled) + noise * np.eye(len(points))
         factor = np.tril(cho_factor(covariance, lower=True)[0])
         weights = cho_solve((factor, True), targets)
-        evidence = -0.5 * float(targets @ weights) - float(np.log(np.diag(factor)).sum())
-        return cls(points, lengths, factor, weights, evidence)
+        return cls(points, lengths, factor, weights)
 
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (m,) each, at points, shape (m, d)."""
@@ -57,14 +57,33 @@ class GaussianProcess:
         return cross @ self.weights, np.sqrt(np.maximum(variance, 1e-12))
 
 
-def fit_lengths(
-    points: Array, targets: Array, start: Array, rng: np.random.Generator, *, noise: float
-) -> GaussianProcess:
-    """Fit with the most likely of several length scales near ``start``, scaled jointly and individually."""
-    tried = [np.clip(start * factor, _SHORTEST, _LONGEST) for factor in (1.0, 0.5, 0.8, 1.25, 2.0)]
-    tried += [np.clip(start * np.exp(0.4 * rng.standard_normal(len(start))), 0.1, 20.0) for _ in range(12)]
-    processes = [GaussianProcess.fit(points, targets, lengths, noise=noise) for lengths in tried]
-    return max(processes, key=lambda process: process.evidence)
+def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProcess:
+    """Fit with the length scales that are most probable given the data.
+
+    Before the data, their logarithms are normal; the centre grows with the square root of the number of
+    coordinates, as distances in the unit box do (Hvarfner et al., ICML 2024).
+    """
+    count, dimension = points.shape
+    squares = (points[:, None] - points) ** 2
+    centre = np.full(dimension, np.log(_USUAL * np.sqrt(dimension)))
+
+    def loss_and_slope(logs: Array) -> tuple[float, Array]:
+        """Return the negative log of the posterior density, up to a constant, and its gradient."""
+        inverse = np.exp(-2.0 * logs)
+        d = np.sqrt(5.0 * np.maximum(squares @ inverse, 0.0))
+        decay = np.exp(-d)
+        factor = cho_factor((1.0 + d + d * d / 3.0) * decay + noise * np.eye(count), lower=True)
+        inverted = cho_solve(factor, np.eye(count))
+        weights, deviations = inverted @ targets, (logs - centre) / _SPREAD
+        loss = 0.5 * (targets @ weights + deviations @ deviations) + np.log(np.diag(factor[0])).sum()
+        inner = (inverted - np.outer(weights, weights)) * (1.0 + d) * decay * (5.0 / 6.0)
+        return float(loss), np.einsum("ij,ijk->k", inner, squares) * inverse + deviations / _SPREAD
+
+    limits = [(np.log(_SHORTEST), np.log(_LONGEST))] * dimension
+    found = minimize(
+        loss_and_slope, centre, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": _STEPS}
+    )
+    return GaussianProcess.fit(points, targets, np.exp(found.x), noise=noise)
 
 
 def standardised(costs: Array) -> Array:

@@ -94,7 +94,6 @@ class TrustRegion(BoxEngine):
         self._points: list[Array] = []
         self._costs: list[float] = []
         self._own: list[Array] = []
-        self._lengths = np.full(self.box.dimension, 0.35 * np.sqrt(self.box.dimension))
         self._restart(first=0)
 
     def _restart(self, *, first: int) -> None:
@@ -118,10 +117,9 @@ class TrustRegion(BoxEngine):
         d = self.box.dimension
         best = points[int(np.argmin(costs))]
         near = np.argsort(np.abs(points - best).max(axis=1), kind="stable")[:_MOST_POINTS]
-        process = fit_lengths(points[near], standardised(costs[near]), self._lengths, rng, noise=_NOISE)
-        self._lengths = process.lengths
+        process = fit_lengths(points[near], standardised(costs[near]), noise=_NOISE)
         # Coordinates of which the cost depends little get a longer side.
-        weights = np.clip(self._lengths / np.exp(np.log(self._lengths).mean()), 0.25, 4.0)
+        weights = np.clip(process.lengths / np.exp(np.log(process.lengths).mean()), 0.25, 4.0)
         half = 0.5 * self._side * weights
         low, high = np.clip(best - half, 0.0, 1.0), np.clip(best + half, 0.0, 1.0)
         moved = rng.random((_CANDIDATES, d)) < min(1.0, _CHANGED / d)

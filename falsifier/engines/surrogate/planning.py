@@ -166,5 +166,5 @@ class Pushes:
         return push
 
     def succeeded(self, push: Push) -> None:
-        """Note that it made a discrete signal do something new: it is worth more tries."""
-        self._tries[push] = 0
+        """Note that it made a discrete signal do something new: that try does not count."""
+        self._tries[push] -= 1

@@ -8,7 +8,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import BoxEngine
-from falsifier.engines.coverage import Explorer
+from falsifier.engines.coverage import Explorer, Ladder
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
@@ -59,7 +59,7 @@ _PRIORS = {
     "cma": 0.1,
 }
 # Without inputs there is no time in which dynamics would tell more than the final robustness.
-_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8}
+_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The arms with a share of turns that no rating takes away.
@@ -104,6 +104,7 @@ class Surrogate:
         self.feasibility = Feasibility(self.layout, self.grid)
         self.forecasts = Forecasts()
         self._explorer = Explorer(problem, self.layout)
+        self._ladder = Ladder(problem, self._explorer.programs)
         self._corners = Corners(problem, seed=seed)
         self._engines: dict[str, BoxEngine] = {
             "region": TrustRegion(problem, seed=seed),
@@ -139,9 +140,9 @@ class Surrogate:
                 self._failed.append(point)
             else:
                 brought = worth(self._levels, sample.robustness)
-                assert evaluation.trajectory is not None, "a sample has one"
-                critical = evaluation.verdict.critical_time if evaluation.verdict else 0.0
-                is_new = self._explorer.learn(point, evaluation.trajectory, sample.robustness, critical)
+                assert evaluation.trajectory is not None and evaluation.verdict is not None, "it is judged"
+                is_new = self._explorer.learn(point, evaluation.trajectory)
+                self._ladder.learn(point, evaluation.trajectory, evaluation.verdict)
                 self._pushes.know(self.history.outputs, self.history.continuous)
             if pending is not None:
                 if pending.push and is_new:
@@ -248,7 +249,7 @@ class Surrogate:
                 point = random_points(self.layout, rng, 1)[0]
                 return self._made(arm, point, "random: too few simulations to learn from yet")
             case "levels":
-                idea = self._explorer.propose_lower(rng)
+                idea = self._ladder.propose(rng)
                 return self._made(arm, idea.point, idea.rationale)
         idea = self._explorer.propose(rng, aimed=arm == "context")
         why = f"levels of the context files: {idea.rationale}" if arm == "context" else idea.rationale

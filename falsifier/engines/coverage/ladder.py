@@ -1,0 +1,140 @@
+"""The way down where robustness has few values: what reached a step the soonest is continued differently.
+
+Time is what is short there: nothing can follow an input that reaches the last step at the end, and one that
+made the first step soon may make all of them.
+"""
+
+from collections import defaultdict
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.engines.box import Proposal
+from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.layout import Array, learnable
+from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
+
+# Probabilities of a small change, of the same done again, and of a new end from an earlier time; else it ends
+# differently from then.
+_SLIGHT, _AGAIN, _EARLIER = 0.1, 0.5, 0.1
+# Of what is done again, the share without a stretch before it, and that with all that led there; the shortest
+# span otherwise, as a share of the time until then.
+_SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
+# Mean rank, from 0, of the step that is gone on from, the lowest first.
+_MEAN_RANK = 1.0
+# Two values of robustness that differ by at most this share of their size are the same.
+_SAME = 1e-6
+# A predicate that has more margins than this in one trajectory has no steps.
+_MOST_STEPS = 32
+
+
+@dataclass(slots=True, eq=False)
+class KeptInput:
+    """An input that is kept for what it reached first, or sooner than others.
+
+    Attributes:
+        point: the input in the layout.
+        time: when it was there, in s.
+        tries: how often the search has gone on from here.
+    """
+
+    point: Array
+    time: float
+    tries: int = 0
+
+
+class Ladder:
+    """Proposes how to get further down.
+
+    Args:
+        problem: what is searched.
+        programs: changes of inputs.
+    """
+
+    def __init__(self, problem: Problem, programs: Programs) -> None:
+        driven = {r.name for r in problem.space.inputs}
+        predicates = problem.requirement.formula.predicates
+        self._predicates = {str(p): p for p in predicates if driven.isdisjoint(p.signals)}
+        self._programs = programs
+        self._duration = problem.experiment.stop_time
+        self._lowest = inf
+        self._at_lowest: list[KeptInput] = []
+        # For each predicate and each of its margins, the input that had that margin the soonest.
+        self._soonest: defaultdict[str, dict[float, KeptInput]] = defaultdict(dict)
+        # The predicate that decided the lowest robustness, and 1, or -1 if it counts negated.
+        self._decider: tuple[str, float] | None = None
+
+    def learn(self, point: Array, trajectory: Trajectory, verdict: Verdict) -> None:
+        """Add a simulation."""
+        robustness = float(learnable(verdict.robustness))
+        difference = robustness - self._lowest
+        if difference < -_SAME * abs(robustness):
+            self._lowest, self._at_lowest = robustness, []
+        for name, predicate in self._predicates.items():
+            margins = np.broadcast_to(learnable(predicate.margin(trajectory.columns)), len(trajectory))
+            steps, samples = np.unique(margins, return_index=True)
+            if len(steps) > _MOST_STEPS or np.isnan(margins).any():
+                continue
+            soonest = self._soonest[name]
+            for step, time in zip(steps.tolist(), trajectory.times[samples].tolist(), strict=True):
+                if step not in soonest or time < soonest[step].time:
+                    soonest[step] = KeptInput(point, time)
+        if difference <= _SAME * abs(robustness):
+            self._at_lowest.append(KeptInput(point, verdict.critical_time))
+            self._decider = self._deciding(verdict)
+
+    def propose(self, rng: np.random.Generator) -> Proposal:
+        """Return an input that reached a low step, continued differently after that."""
+        what, reached = self._base(rng)
+        reached.tries += 1
+        where = f"the input that made {what} at {reached.time:.3g} s"
+        kind = rng.random()
+        if kind < _SLIGHT:
+            return Proposal(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+        if kind < _SLIGHT + _AGAIN:
+            return Proposal(self._again(rng, reached), f"{where}, done again and again")
+        # Now and then from an earlier time: it may have been too late.
+        time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
+        return Proposal(
+            self._programs.another_end(rng, reached.point, time), f"{where}, continued differently"
+        )
+
+    def _deciding(self, verdict: Verdict) -> tuple[str, float] | None:
+        predicate = self._predicates.get(verdict.predicate)
+        if predicate is None or not verdict.values:
+            return None
+        is_negated = bool(predicate.margin(verdict.values) > 0) != (verdict.robustness > 0)
+        return verdict.predicate, -1.0 if is_negated else 1.0
+
+    def _base(self, rng: np.random.Generator) -> tuple[str, KeptInput]:
+        """Return what was reached, in words, and by which input.
+
+        The later the lowest robustness was reached, the more often it is what reached a step the soonest.
+        """
+        share = min(r.time for r in self._at_lowest) / self._duration
+        steps = self._steps() if rng.random() < share else []
+        if not steps:
+            lowest = min(self._at_lowest, key=lambda r: (r.tries, r.time))
+            return f"the robustness {self._lowest:.4g}", lowest
+        margin, reached = steps[min(int(rng.exponential(_MEAN_RANK)), len(steps) - 1)]
+        return f"a margin of {margin:.4g}", reached
+
+    def _steps(self) -> list[tuple[float, KeptInput]]:
+        """Return the margins of the predicate that decides, without the highest, the lowest first."""
+        if self._decider is None:
+            return []
+        name, sign = self._decider
+        steps = sorted((sign * margin, reached) for margin, reached in self._soonest[name].items())
+        return [(s, reached) for s, reached in steps[:-1] if s >= self._lowest - _SAME * abs(s)]
+
+    def _again(self, rng: np.random.Generator, reached: KeptInput) -> Array:
+        """Return the input that goes on with what it did before that until the end."""
+        point, time = reached.point, reached.time
+        if rng.random() < _SOONER:
+            point, time = self._programs.sooner(rng, point, time)
+        is_all = rng.random() < _FROM_START
+        span = time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
+        return self._programs.again(rng, point, time, span)
