@@ -29,9 +29,16 @@ _IDEAS, _DRAWS = 10, 100
 
 
 class Explorer:
-    """Proposes inputs that reach something that no simulation so far has reached."""
+    """Proposes inputs that reach something that no simulation so far has reached.
 
-    def __init__(self, problem: Problem, layout: Layout) -> None:
+    Args:
+        problem: what is searched.
+        layout: layout of the inputs.
+        repeats: whether spans of other inputs follow what was reached.
+    """
+
+    def __init__(self, problem: Problem, layout: Layout, *, repeats: bool) -> None:
+        self._repeated = _REPEATED if repeats else 0.0
         self._marker = Marker(problem)
         self.programs = Programs(layout)
         self._interval = problem.experiment.output_interval
@@ -85,7 +92,7 @@ class Explorer:
         reached.tries += 1
         kind = rng.random()
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
-        if kind < _NEW_END:
+        if kind < _NEW_END + _REPEATED - self._repeated:
             point = programs.another_end(rng, reached.point, reached.time)
             return Proposal(point, f"{where}, continued differently")
         if kind < _NEW_END + _REPEATED:
@@ -137,7 +144,7 @@ class CoverageEngine:
     def __init__(self, problem: Problem, *, seed: int) -> None:
         self.layout = planning_layout(problem.space, TimeGrid.of(problem))
         self.seed = seed
-        self._explorer = Explorer(problem, self.layout)
+        self._explorer = Explorer(problem, self.layout, repeats=True)
         self._known: set[int] = set()  # what was simulated or is about to be
         self._asked = 0
 

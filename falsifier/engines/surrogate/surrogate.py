@@ -103,7 +103,8 @@ class Surrogate:
         self.history = History(problem, self.grid, self.layout)
         self.feasibility = Feasibility(self.layout, self.grid)
         self.forecasts = Forecasts()
-        self._explorer = Explorer(problem, self.layout)
+        # Where repeating helps, the robustness has steps, and the ladder repeats.
+        self._explorer = Explorer(problem, self.layout, repeats=False)
         self._ladder = Ladder(problem, self._explorer.programs)
         self._corners = Corners(problem, seed=seed)
         self._engines: dict[str, BoxEngine] = {
