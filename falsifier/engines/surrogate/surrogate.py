@@ -59,7 +59,7 @@ _PRIORS = {
     "cma": 0.1,
 }
 # Without inputs there is no time in which dynamics would tell more than the final robustness.
-_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
+_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.5}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The arms with a share of turns that no rating takes away.
