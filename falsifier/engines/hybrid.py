@@ -69,16 +69,11 @@ class Turns:
     The LLM answers the first and the third time: two turns on trial. Each turn after that which does not help
     multiplies the number of turns that the surrogate gets before the LLM is asked again. After an answer that
     helped, it is asked again at once.
-
-    Attributes:
-        answers: number of answers of the LLM.
-        useless: number of answers since the last one that helped.
-        waited: number of the surrogate's simulations since the last answer.
     """
 
-    answers: int = 0
-    useless: int = 0
-    waited: int = 0
+    answers: int = 0  # number of answers of the LLM
+    useless: int = 0  # number of answers since the last one that helped
+    waited: int = 0  # number of the surrogate's simulations since the last answer
 
     def answered(self, *, helped: bool) -> None:
         """Note an answer of the LLM."""

@@ -30,17 +30,11 @@ def learnable(numbers: ArrayLike) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation.
+    """Evenly spaced times from 0 over the formula's horizon, and on to the end of the simulation."""
 
-    Attributes:
-        step: step in s.
-        cells: number of cells over the horizon.
-        all_cells: number of complete cells until the end of the simulation, at most twenty horizons.
-    """
-
-    step: float
-    cells: int
-    all_cells: int
+    step: float  # in s
+    cells: int  # number over the horizon
+    all_cells: int  # complete ones until the end of the simulation, at most twenty horizons
 
     @classmethod
     def of(cls, problem: Problem, *, cells: int = CELLS) -> "TimeGrid":
@@ -61,31 +55,21 @@ class TimeGrid:
 
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """The coordinates of one input.
+    """The coordinates of one input."""
 
-    Attributes:
-        times: control-point times in s.
-        interpolation: interpolation between them.
-        fine: whether it consists of many held cells, most of them equal to their neighbours, or of a few
-            control points that vary independently.
-    """
-
-    times: tuple[float, ...]
-    interpolation: Interpolation
+    times: tuple[float, ...]  # control-point times in s
+    interpolation: Interpolation  # interpolation between them
+    # Whether it consists of many held cells, most of them equal to their neighbours, or of a few control
+    # points that vary independently.
     fine: bool
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Codings of all inputs, in the space's order, followed by one coordinate per parameter.
-
-    Attributes:
-        space: the search space.
-        codings: one coding per input.
-    """
+    """Codings of all inputs, in the space's order, followed by one coordinate per parameter."""
 
     space: SearchSpace
-    codings: tuple[Coding, ...]
+    codings: tuple[Coding, ...]  # one coding per input
 
     @property
     def ranges(self) -> tuple[InputRange | ParameterRange, ...]:

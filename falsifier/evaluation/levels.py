@@ -30,17 +30,11 @@ _MOST_STEPS = 12
 
 @dataclass(slots=True)
 class Level:
-    """One value of robustness.
+    """One value of robustness."""
 
-    Attributes:
-        robustness: the value.
-        first: number of the first simulation that reached it, from 1.
-        simulations: number of simulations that had it.
-    """
-
-    robustness: float
-    first: int
-    simulations: int = 1
+    robustness: float  # the value
+    first: int  # number of the first simulation that reached it, from 1
+    simulations: int = 1  # number of simulations that had it
 
 
 @dataclass(slots=True)
@@ -92,19 +86,13 @@ class Levels:
 
 @dataclass(slots=True)
 class Climb:
-    """What simulations show of the way down a staircase of robustness: how far it led, and what is missing.
+    """What simulations show of the way down a staircase of robustness: how far it led, what is missing."""
 
-    Attributes:
-        labels: the discrete signals that may count up, and the names of their values as far as they have any.
-        noun: what a simulation is called.
-        levels: the values of robustness.
-        trajectories: number of simulations whose trajectory is known.
-    """
-
+    # The discrete signals that may count up, and the names of their values as far as they have any.
     labels: Mapping[str, Mapping[int, str]]
-    noun: str = "simulation"
-    levels: Levels = field(default_factory=Levels)
-    trajectories: int = 0
+    noun: str = "simulation"  # what a simulation is called
+    levels: Levels = field(default_factory=Levels)  # the values of robustness
+    trajectories: int = 0  # number of simulations whose trajectory is known
     _lowest: tuple[Predicate, Verdict] | None = None
     # Numbers of the simulations in which a predicate was so, and in which a signal had a value.
     _met: defaultdict[tuple[str, bool], list[int]] = field(default_factory=lambda: defaultdict(list))

@@ -31,10 +31,7 @@ _IDEAS, _DRAWS = 10, 100
 class Explorer:
     """Proposes inputs that reach something that no simulation so far has reached.
 
-    Args:
-        problem: what is searched.
-        layout: layout of the inputs.
-        repeats: whether spans of other inputs follow what was reached.
+    If it ``repeats``, spans of other inputs follow what was reached.
     """
 
     def __init__(self, problem: Problem, layout: Layout, *, repeats: bool) -> None:

@@ -33,26 +33,15 @@ _MOST_STEPS = 32
 
 @dataclass(slots=True, eq=False)
 class KeptInput:
-    """An input that is kept for what it reached first, or sooner than others.
+    """An input that is kept for what it reached first, or sooner than others."""
 
-    Attributes:
-        point: the input in the layout.
-        time: when it was there, in s.
-        tries: how often the search has gone on from here.
-    """
-
-    point: Array
-    time: float
-    tries: int = 0
+    point: Array  # the input in the layout
+    time: float  # when it was there, in s
+    tries: int = 0  # how often the search has gone on from here
 
 
 class Ladder:
-    """Proposes how to get further down.
-
-    Args:
-        problem: what is searched.
-        programs: changes of inputs.
-    """
+    """Proposes how to get further down, with programs of the inputs."""
 
     def __init__(self, problem: Problem, programs: Programs) -> None:
         driven = {r.name for r in problem.space.inputs}

@@ -26,19 +26,12 @@ def _correlation(x: Array, z: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianProcess:
-    """A process of zero mean and unit variance, conditioned on data.
+    """A process of zero mean and unit variance, conditioned on data."""
 
-    Attributes:
-        points: points of the data, shape (n, d).
-        lengths: length scale of each coordinate, shape (d,).
-        factor: lower Cholesky factor of the covariance, shape (n, n).
-        weights: covariance^-1 targets, shape (n,).
-    """
-
-    points: Array
-    lengths: Array
-    factor: Array
-    weights: Array
+    points: Array  # points of the data, shape (n, d)
+    lengths: Array  # length scale of each coordinate, shape (d,)
+    factor: Array  # lower Cholesky factor of the covariance, shape (n, n)
+    weights: Array  # covariance^-1 targets, shape (n,)
 
     @classmethod
     def fit(cls, points: Array, targets: Array, lengths: Array, *, noise: float) -> "GaussianProcess":

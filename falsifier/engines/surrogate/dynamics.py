@@ -36,16 +36,12 @@ _TRUSTED = 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trace:
-    """The trajectory of one simulation on the time grid.
+    """The trajectory of one simulation on the time grid."""
 
-    Attributes:
-        inputs: mean of each input in each cell, and the parameters, scaled to [0, 1], shape
-            (all_cells, inputs + parameters).
-        states: outputs at the grid points, shape (all_cells + 1, outputs).
-    """
-
+    # Mean of each input in each cell, and the parameters, scaled to [0, 1], shape (all_cells, inputs +
+    # parameters).
     inputs: Array
-    states: Array
+    states: Array  # outputs at the grid points, shape (all_cells + 1, outputs)
 
 
 class LinearDynamics:

@@ -21,39 +21,24 @@ _FINE = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimulatedPoint:
-    """One simulated candidate.
+    """One simulated candidate."""
 
-    Attributes:
-        point: its point in the layout.
-        trace: its trajectory on the grid.
-        margins: margins of the formula's predicates, shape (1, cells + 1) each.
-        robustness: robustness of the requirement.
-        critical: critical time as a share of the horizon.
-    """
-
-    point: Array
-    trace: Trace
-    margins: Margins
+    point: Array  # its point in the layout
+    trace: Trace  # its trajectory on the grid
+    margins: Margins  # margins of the formula's predicates, shape (1, cells + 1) each
     robustness: float
-    critical: float
+    critical: float  # critical time as a share of the horizon
 
 
 @dataclass
 class History:
-    """Samples of one problem; the first trajectory determines which signals are discrete.
-
-    Attributes:
-        problem: the problem.
-        grid: the grid of the traces.
-        layout: the layout of the points.
-        samples: what was simulated.
-        cost: the cost of predictions in the requirement's own unit; None before the first sample.
-    """
+    """Samples of one problem; the first trajectory determines which signals are discrete."""
 
     problem: Problem
-    grid: TimeGrid
-    layout: Layout
-    samples: list[SimulatedPoint] = field(default_factory=list)
+    grid: TimeGrid  # the grid of the traces
+    layout: Layout  # the layout of the points
+    samples: list[SimulatedPoint] = field(default_factory=list)  # what was simulated
+    # The cost of predictions in the requirement's own unit; None before the first sample.
     cost: PredictedCost | None = None
     _discrete: frozenset[str] = frozenset()
     _scaled: PredictedCost | None = None

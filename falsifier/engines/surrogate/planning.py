@@ -121,17 +121,11 @@ def is_seen(point: Array, seen: Array) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """An output and the direction in which it is driven.
+    """An output and the direction in which it is driven."""
 
-    Attributes:
-        output: name of the output.
-        column: its column in the states of traces.
-        sign: 1: up, -1: down.
-    """
-
-    output: str
-    column: int
-    sign: int
+    output: str  # name of the output
+    column: int  # its column in the states of traces
+    sign: int  # 1: up, -1: down
 
     def heights(self, states: Array) -> Array:
         """Return how far the output went at each time, shape (..., cells + 1), in states with columns."""

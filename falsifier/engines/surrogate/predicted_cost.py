@@ -42,24 +42,15 @@ _DISCRETE = 0.5
 
 @dataclass(frozen=True)
 class PredictedCost:
-    """Robustness of trajectories on the grid, with each predicate's margin divided by its scale.
+    """Robustness of trajectories on the grid, with each predicate's margin divided by its scale."""
 
-    Attributes:
-        space: the search space, for the ranges of inputs in the formula.
-        grid: the grid of the predictions.
-        outputs: names of the predicted outputs.
-        predicates: distinct predicates of the formula.
-        discrete: whether each predicate compares only signals with few values.
-        scales: scale of each predicate's margin.
-        constants: values of signals that the formula names and no candidate varies: inputs kept constant.
-    """
-
-    space: SearchSpace
-    grid: TimeGrid
-    outputs: tuple[str, ...]
-    predicates: tuple[Predicate, ...]
-    discrete: tuple[bool, ...]
-    scales: tuple[float, ...]
+    space: SearchSpace  # the search space, for the ranges of inputs in the formula
+    grid: TimeGrid  # the grid of the predictions
+    outputs: tuple[str, ...]  # names of the predicted outputs
+    predicates: tuple[Predicate, ...]  # distinct predicates of the formula
+    discrete: tuple[bool, ...]  # whether each predicate compares only signals with few values
+    scales: tuple[float, ...]  # scale of each predicate's margin
+    # Values of signals that the formula names and no candidate varies: inputs kept constant.
     constants: Mapping[str, float]
     _monitor: Monitor = field(repr=False)
 

@@ -5,38 +5,27 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How the engine opens, learns, plans and chooses who proposes.
+    """How the engine opens, learns, plans and chooses who proposes."""
 
-    Attributes:
-        cells: number of grid cells over the formula's horizon, on which outputs are predicted and free inputs
-            are held; enough for pieces of 1 % of the horizon, few enough for a roll-out in milliseconds.
-        constants: number of constant extremes among the first simulations of a formula that a single extreme
-            can violate; each reaches one steady state.
-        bangs: number of switching inputs among the first simulations of a formula with nested windows.
-        pauses: number of constant extremes between these.
-        probes: number of stepping inputs, instead of constant extremes, if a violation requires several
-            conditions at once: no single extreme causes it, and dynamics are worth more than steady states.
-        pool: number of first candidates of a plan.
-        children: number of new candidates per generation.
-        generations: number of generations of a plan, after the first candidates.
-        bound_steps: number of gradient steps towards bounds after the generations.
-        reserved: share of the turns that no rating takes away from each of the simple arms.
-        trial: number of simulations after the first ones in which nothing is reserved, so that dynamics that
-            predict well are not held up.
-        retries: number of further proposals if one will probably fail; the least risky one is simulated.
-        risk_weight: scaled robustness that a certain failure costs in planning.
-    """
-
+    # Number of grid cells over the formula's horizon, on which outputs are predicted and free inputs are
+    # held; enough for pieces of 1 % of the horizon, few enough for a roll-out in milliseconds.
     cells: int = 100
+    # Number of constant extremes among the first simulations of a formula that a single extreme can violate;
+    # each reaches one steady state.
     constants: int = 2
-    bangs: int = 2
-    pauses: int = 2
+    bangs: int = 2  # number of switching inputs among the first simulations of a formula with nested windows
+    pauses: int = 2  # number of constant extremes between these
+    # Number of stepping inputs, instead of constant extremes, if a violation requires several conditions at
+    # once: no single extreme causes it, and dynamics are worth more than steady states.
     probes: int = 2
-    pool: int = 500
-    children: int = 250
-    generations: int = 4
-    bound_steps: int = 4
-    reserved: float = 0.04
+    pool: int = 500  # number of first candidates of a plan
+    children: int = 250  # number of new candidates per generation
+    generations: int = 4  # number of generations of a plan, after the first candidates
+    bound_steps: int = 4  # number of gradient steps towards bounds after the generations
+    reserved: float = 0.04  # share of the turns that no rating takes away from each of the simple arms
+    # Number of simulations after the first ones in which nothing is reserved, so that dynamics that predict
+    # well are not held up.
     trial: int = 8
+    # Number of further proposals if one will probably fail; the least risky one is simulated.
     retries: int = 12
-    risk_weight: float = 5.0
+    risk_weight: float = 5.0  # scaled robustness that a certain failure costs in planning

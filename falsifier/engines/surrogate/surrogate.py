@@ -70,21 +70,13 @@ _BLIND = _SIMPLE[1:]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pending:
-    """What the engine remembers about a candidate until it is told its evaluation.
+    """What the engine remembers about a candidate until it is told its evaluation."""
 
-    Attributes:
-        arm: the arm that proposed it.
-        candidate: the candidate.
-        point: its point in the layout, in [0, 1]^d.
-        predicted: margins that the dynamics predicted, if they proposed it.
-        push: what it drives further than before, if that is its aim.
-    """
-
-    arm: str
+    arm: str  # the arm that proposed it
     candidate: Candidate
-    point: Array
-    predicted: Margins | None = None
-    push: Push | None = None
+    point: Array  # its point in the layout, in [0, 1]^d
+    predicted: Margins | None = None  # margins that the dynamics predicted, if they proposed it
+    push: Push | None = None  # what it drives further than before, if that is its aim
 
 
 class Surrogate:
