@@ -1,8 +1,8 @@
-"""Which engine finds the violations of 17 small systems that were written after the default engine?
+"""Which engine finds the violations of 17 small systems of states, counters, slopes and parameters?
 
 ``python -m bench.function_systems`` prints the table of ``bench/example_systems.py`` for 42 requirements: of
-the nine systems in this file and of the eight machines. The engine was finished before they were written;
-``bench/search.md`` says beside the table what was changed after them.
+the nine systems in this file and of the eight machines. They were written after an engine was
+finished; ``bench/search.md`` says beside the table what was changed after them.
 """
 
 from collections.abc import Callable, Mapping

@@ -27,8 +27,8 @@ _SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
 _MEAN_RANK = 1.0
 # Two values of robustness that differ by at most this share of their size are the same.
 _SAME = 1e-6
-# A predicate that has more margins than this in one trajectory has no steps.
-_MOST_STEPS = 32
+# A predicate that has more different margins than this in one trajectory, or in all, has no steps.
+_MOST_STEPS, _MOST_IN_ALL = 32, 1000
 
 
 @dataclass(slots=True, eq=False)
@@ -65,9 +65,9 @@ class Ladder:
         for name, predicate in self._predicates.items():
             margins = np.broadcast_to(learnable(predicate.margin(trajectory.columns)), len(trajectory))
             steps, samples = np.unique(margins, return_index=True)
-            if len(steps) > _MOST_STEPS or np.isnan(margins).any():
-                continue
             soonest = self._soonest[name]
+            if len(steps) > _MOST_STEPS or len(soonest) > _MOST_IN_ALL or np.isnan(margins).any():
+                continue
             for step, time in zip(steps.tolist(), trajectory.times[samples].tolist(), strict=True):
                 if step not in soonest or time < soonest[step].time:
                     soonest[step] = KeptInput(point, time)
@@ -113,9 +113,9 @@ class Ladder:
 
     def _steps(self) -> list[tuple[float, KeptInput]]:
         """Return the margins of the predicate that decides, without the highest, the lowest first."""
-        if self._decider is None:
+        name, sign = self._decider or ("", 1.0)
+        if name not in self._soonest or len(self._soonest[name]) > _MOST_IN_ALL:
             return []
-        name, sign = self._decider
         steps = sorted((sign * margin, reached) for margin, reached in self._soonest[name].items())
         return [(s, reached) for s, reached in steps[:-1] if s >= self._lowest - _SAME * abs(s)]
 

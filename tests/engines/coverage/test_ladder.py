@@ -54,9 +54,12 @@ def test_what_reached_the_lowest_step_in_time_is_gone_on_from() -> None:
     assert sum("the robustness 1 at" in why for why in asked) > 30
 
 
-def test_a_predicate_with_a_slope_has_no_steps() -> None:
+@pytest.mark.parametrize(("samples", "simulations"), [(100, 1), (20, 60)], ids=["in one", "in all"])
+def test_a_predicate_with_a_slope_has_no_steps(samples: int, simulations: int) -> None:
     ladder, points = ladder_of("G (stage <= 3)")
-    trajectory = Trajectory(np.arange(100.0) / 10, {"stage": np.linspace(0, 2, 100), "open": np.zeros(100)})
-    ladder.learn(points["soon"], trajectory, Verdict(1.0, 9.9, "stage <= 3", {"stage": 2.0}))
+    for top in np.linspace(1.9, 2.0, simulations):
+        stage = np.linspace(0, top, samples)
+        trajectory = Trajectory(np.linspace(0.0, 9.9, samples), {"stage": stage, "open": np.zeros(samples)})
+        ladder.learn(points["soon"], trajectory, Verdict(1.0, 9.9, "stage <= 3", {"stage": 2.0}))
     asked = {ladder.propose(np.random.default_rng(seed)).rationale.split(" at")[0] for seed in range(20)}
     assert asked == {"the input that made the robustness 1"}
