@@ -5,8 +5,10 @@ made the first step soon may make all of them.
 """
 
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,7 @@ from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Array, learnable
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
+from falsifier.stl.formula import Predicate
 
 # Probabilities of a small change, of the same done again, and of a new end from an earlier time; else it ends
 # differently from then.
@@ -63,7 +66,7 @@ class Ladder:
         if difference < -_SAME * abs(robustness):
             self._lowest, self._at_lowest = robustness, []
         for name, predicate in self._predicates.items():
-            margins = np.broadcast_to(learnable(predicate.margin(trajectory.columns)), len(trajectory))
+            margins = np.broadcast_to(_margin(predicate, trajectory.columns), len(trajectory))
             steps, samples = np.unique(margins, return_index=True)
             soonest = self._soonest[name]
             if len(steps) > _MOST_STEPS or len(soonest) > _MOST_IN_ALL or np.isnan(margins).any():
@@ -77,25 +80,24 @@ class Ladder:
 
     def propose(self, rng: np.random.Generator) -> Proposal:
         """Return an input that reached a low step, continued differently after that."""
+        programs = self._programs
         what, reached = self._base(rng)
         reached.tries += 1
         where = f"the input that made {what} at {reached.time:.3g} s"
         kind = rng.random()
         if kind < _SLIGHT:
-            return Proposal(self._programs.moved(rng, reached.point), f"{where}, slightly changed")
+            return Proposal(programs.moved(rng, reached.point), f"{where}, slightly changed")
         if kind < _SLIGHT + _AGAIN:
             return Proposal(self._again(rng, reached), f"{where}, done again and again")
         # Now and then from an earlier time: it may have been too late.
         time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
-        return Proposal(
-            self._programs.another_end(rng, reached.point, time), f"{where}, continued differently"
-        )
+        return Proposal(programs.another_end(rng, reached.point, time), f"{where}, continued differently")
 
     def _deciding(self, verdict: Verdict) -> tuple[str, float] | None:
         predicate = self._predicates.get(verdict.predicate)
         if predicate is None or not verdict.values:
             return None
-        is_negated = bool(predicate.margin(verdict.values) > 0) != (verdict.robustness > 0)
+        is_negated = bool(_margin(predicate, verdict.values) > 0) != (verdict.robustness > 0)
         return verdict.predicate, -1.0 if is_negated else 1.0
 
     def _base(self, rng: np.random.Generator) -> tuple[str, KeptInput]:
@@ -127,3 +129,7 @@ class Ladder:
         is_all = rng.random() < _FROM_START
         span = time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
         return self._programs.again(rng, point, time, span)
+
+
+def _margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:
+    return predicate.margin({name: learnable(columns[name]) for name in predicate.signals})

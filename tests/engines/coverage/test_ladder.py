@@ -63,3 +63,12 @@ def test_a_predicate_with_a_slope_has_no_steps(samples: int, simulations: int) -
         ladder.learn(points["soon"], trajectory, Verdict(1.0, 9.9, "stage <= 3", {"stage": 2.0}))
     asked = {ladder.propose(np.random.default_rng(seed)).rationale.split(" at")[0] for seed in range(20)}
     assert asked == {"the input that made the robustness 1"}
+
+
+@pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, 1.7e308])
+def test_no_number_warns(value: float) -> None:
+    ladder, points = ladder_of("G (stage <= open)")
+    columns = {"stage": np.where(TIMES == 3, value, 0.0), "open": np.where(TIMES == 3, -value, 0.0)}
+    values = {"stage": value, "open": -value}
+    ladder.learn(points["soon"], Trajectory(TIMES, columns), Verdict(1.0, 3.0, "stage <= open", values))
+    assert ladder.propose(np.random.default_rng(0)).rationale
