@@ -142,22 +142,16 @@ class Problem:
             allow=allow,
             deny=deny,
         )
-        model = (
-            fmu
-            if isinstance(fmu, System)
-            else path_of("fmu", fmu, "the path of an FMU or SSP package, or a System")
-        )
+        context = texts("context", context)
+        expected = "the path of an FMU or SSP package, or a System"
+        model = fmu if isinstance(fmu, System) else path_of("fmu", fmu, expected)
         with in_python("formula"):
             joined = join_formula(model, requirement_of(formula), changes=changes, name=name)
         problem = Problem.of(joined)
         source = None
         if not isinstance(fmu, System):
             source = ProblemSource(
-                target=str(fmu),
-                stl=formula,
-                stl_name=name,
-                changes=changes,
-                context=texts("context", context),
+                target=str(fmu), stl=formula, stl_name=name, changes=changes, context=context
             )
         return replace(problem, source=source, named_context=Named.of(context))
 

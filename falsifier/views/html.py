@@ -43,7 +43,7 @@ def join(*parts: str) -> Html:
     return Html("".join(part if isinstance(part, Html) else _escaped(part) for part in parts))
 
 
-def unbroken(text: str) -> Html:
+def whole_options(text: str) -> Html:
     """Escape a text whose lines do not end within the name of an option, as they do at other hyphens."""
     return Html(_OPTION.sub(r'<span class="option">\g<0></span>', _escaped(text)))
 

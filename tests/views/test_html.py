@@ -1,4 +1,4 @@
-from falsifier.views.html import Html, el, join, unbroken
+from falsifier.views.html import Html, el, join, whole_options
 
 
 def test_texts_are_escaped_and_elements_are_not() -> None:
@@ -26,7 +26,7 @@ def test_elements_without_content_are_closed_as_their_kind_is() -> None:
 
 
 def test_lines_do_not_end_within_the_name_of_an_option() -> None:
-    text = unbroken("try --api-base <b>, or a-b --x")
+    text = whole_options("try --api-base <b>, or a-b --x")
     assert str(text) == (
         'try <span class="option">--api-base</span> &lt;b&gt;, or a-b <span class="option">--x</span>'
     )

@@ -15,9 +15,8 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Proposal
-from falsifier.engines.coverage.ladder import KeptInput
 from falsifier.engines.coverage.marks import MODES, Mark, Marker
-from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.coverage.programs import KeptInput, Programs
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -35,7 +34,7 @@ class Explorer:
     """
 
     def __init__(self, problem: Problem, layout: Layout, *, repeats: bool) -> None:
-        self._repeated = _REPEATED if repeats else 0.0
+        self._new_end = _NEW_END if repeats else _NEW_END + _REPEATED
         self._marker = Marker(problem)
         self.programs = Programs(layout)
         self._interval = problem.experiment.output_interval
@@ -89,7 +88,7 @@ class Explorer:
         reached.tries += 1
         kind = rng.random()
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
-        if kind < _NEW_END + _REPEATED - self._repeated:
+        if kind < self._new_end:
             point = programs.another_end(rng, reached.point, reached.time)
             return Proposal(point, f"{where}, continued differently")
         if kind < _NEW_END + _REPEATED:

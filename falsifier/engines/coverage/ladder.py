@@ -6,7 +6,6 @@ made the first step soon may make all of them.
 
 from collections import defaultdict
 from collections.abc import Mapping
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.box import Proposal
-from falsifier.engines.coverage.programs import Programs
+from falsifier.engines.coverage.programs import KeptInput, Programs
 from falsifier.engines.layout import Array, learnable
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
@@ -32,15 +31,6 @@ _MEAN_RANK = 1.0
 _SAME = 1e-6
 # A predicate that has more different margins than this in one trajectory, or in all, has no steps.
 _MOST_STEPS, _MOST_IN_ALL = 32, 1000
-
-
-@dataclass(slots=True, eq=False)
-class KeptInput:
-    """An input that is kept for what it reached first, or sooner than others."""
-
-    point: Array  # the input in the layout
-    time: float  # when it was there, in s
-    tries: int = 0  # how often the search has gone on from here
 
 
 class Ladder:
@@ -66,10 +56,12 @@ class Ladder:
         if difference < -_SAME * abs(robustness):
             self._lowest, self._at_lowest = robustness, []
         for name, predicate in self._predicates.items():
+            soonest = self._soonest[name]
+            if len(soonest) > _MOST_IN_ALL:
+                continue
             margins = np.broadcast_to(_margin(predicate, trajectory.columns), len(trajectory))
             steps, samples = np.unique(margins, return_index=True)
-            soonest = self._soonest[name]
-            if len(steps) > _MOST_STEPS or len(soonest) > _MOST_IN_ALL or np.isnan(margins).any():
+            if len(steps) > _MOST_STEPS or np.isnan(margins).any():
                 continue
             for step, time in zip(steps.tolist(), trajectory.times[samples].tolist(), strict=True):
                 if step not in soonest or time < soonest[step].time:

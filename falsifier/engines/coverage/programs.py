@@ -1,6 +1,7 @@
 """Inputs as short programs: pieces that hold a value for some time, and changes of such programs."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -25,6 +26,15 @@ _EXACT = 0.15
 _TELLING, _MOST_TELLING = 0.5, 64
 # Probability that a parameter is drawn again: nothing of what followed is certain then.
 _PARAMETER_REDRAWN = 0.1
+
+
+@dataclass(slots=True, eq=False)
+class KeptInput:
+    """An input that is kept for what it reached first, or sooner than others."""
+
+    point: Array  # the input in the layout
+    time: float  # when it was there, in s
+    tries: int = 0  # how often the search has gone on from here
 
 
 class Programs:

@@ -12,7 +12,7 @@ from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
-from falsifier.views.html import Html, el, join, picture, table, unbroken
+from falsifier.views.html import Html, el, join, picture, table, whole_options
 from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
 from falsifier.views.report.wording import (
@@ -192,7 +192,9 @@ def _found(shown: Shown) -> list[str]:
 
 
 def _lines(title: str, lines: Sequence[str]) -> str:
-    return join(el("h3", title), el("ul", *(el("li", unbroken(line)) for line in lines))) if lines else ""
+    return (
+        join(el("h3", title), el("ul", *(el("li", whole_options(line)) for line in lines))) if lines else ""
+    )
 
 
 def _details(section: Section, most: int) -> Html:
@@ -245,7 +247,7 @@ def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     rationale = shown.candidate.rationale
     facts = [*margin_beside(shown.verdict, shown.units), *([("rationale", rationale)] if rationale else [])]
-    facts += [(name, el("code", unbroken(command))) for name, command in commands(shown)]
+    facts += [(name, el("code", whole_options(command))) for name, command in commands(shown)]
     return facts_html(facts)
 
 
