@@ -225,7 +225,9 @@ def _check_types(a: Variable, b: Variable) -> None:
             "of the other"
         )
     if a.literals and b.literals and dict(a.literals) != dict(b.literals):
-        raise SpecError(f"the enumerations differ: {_items(a)} and {_items(b)}; export both with the same")
+        raise SpecError(
+            f"the enumerations differ: {a.items_text} and {b.items_text}; export both with the same"
+        )
     limits, fits = a.limits, b.type_limits
     if a.kind == "integer" and fits is not None and a.type_limits is not None:
         low = a.type_limits[0] if limits[0] is None else limits[0]
@@ -236,10 +238,6 @@ def _check_types(a: Variable, b: Variable) -> None:
                 f"{fits[0]} to {fits[1]}; state min and max of the output, or export the input with a larger "
                 "type"
             )
-
-
-def _items(variable: Variable) -> str:
-    return ", ".join(f"{number} = {name}" for name, number in variable.literals.items())
 
 
 def _check_restorable(loop: Sequence[Member]) -> None:
