@@ -60,7 +60,7 @@ _PRIORS = {
     "cma": 0.1,
 }
 # Without inputs there is no time in which dynamics would tell more than the final robustness.
-_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.5}
+_PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The arms with a share of turns that no rating takes away.
@@ -261,6 +261,7 @@ class Surrogate:
         return Pending(arm, replace(candidate, origin=self.name), point)
 
     def _made(self, arm: str, point: Array, why: str) -> Pending:
+        point = self.layout.settled(point)  # so that equal candidates have equal points
         return Pending(arm, self.layout.candidate(point, origin=self.name, rationale=why), point)
 
     def _choose(self, rng: np.random.Generator) -> str:
@@ -272,8 +273,9 @@ class Surrogate:
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
-            # Where levels lead, going on from the lowest one does what a change would.
-            "changes": differs and not lead,
+            # Where levels lead, going on from the lowest one does what a change would; of parameters,
+            # no time decides.
+            "changes": differs and has_inputs and not lead,
             "region": differs,
             "cma": differs,
             "corners": not self._corners.is_done,

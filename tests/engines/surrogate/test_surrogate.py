@@ -227,9 +227,11 @@ def _entered(times: Array, inputs: dict[str, Array], parameters: dict[str, float
 
 def test_levels_of_context_files_are_tried() -> None:
     levels = (Crossing("u", 0.617), Crossing("u", 0.619))
-    told = [simulations_until_violation(narrow_problem(levels), seed=s, budget=100) for s in range(3)]
-    assert all(told)
-    assert simulations_until_violation(narrow_problem(), seed=0, budget=50) is None
+    told, untold = (
+        sum(simulations_until_violation(narrow_problem(known), seed=s, budget=200) or 200 for s in range(4))
+        for known in (levels, ())
+    )
+    assert told < 0.5 * untold
 
 
 def test_without_levels_nothing_changes() -> None:

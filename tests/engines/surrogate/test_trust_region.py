@@ -1,18 +1,23 @@
 """The trust region."""
 
+from functools import partial
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.engines.surrogate.trust_region import TrustRegion
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict, parse
 from falsifier.testing import drive, lag
 from tests.engines.support import flat
+
+Values = NDArray[np.float64]
 
 
 def parameters_problem(kind: str, count: int) -> Problem:
@@ -45,6 +50,29 @@ def test_the_trust_region_finds_the_bottom_of_a_bowl_in_few_simulations(kind: st
 
     found = [judge(c).robustness for c in drive(TrustRegion(problem, seed=0), judge, rounds=70)]
     assert min(d for d in found if d is not None) <= 6.0, "uniform points come within about 22"
+
+
+def test_two_conditions_of_different_size_are_met_at_once() -> None:
+    ranges = tuple(ParameterRange(f"p{i}", 0, 1) for i in range(8))
+    outputs = (Variable("near", causality="output"), Variable("far", causality="output"))
+    rest = tuple(Variable(r.name, causality="parameter", start=0.0, settable=True) for r in ranges)
+
+    def model(times: Values, inputs: dict[str, Values], parameters: dict[str, float]) -> dict[str, Values]:
+        p = np.array([parameters[r.name] for r in ranges])
+        near, far = 1e-4 * float(np.sum((p - 0.3) ** 2)), 1e4 * float(np.sum((p[:4] - 0.6) ** 2))
+        return {"near": np.full(len(times), near), "far": np.full(len(times), far)}
+
+    problem = Problem(
+        FunctionModel(model, ModelInfo("two", variables=(*rest, *outputs))),
+        # Of 250,000 uniform points, one violates it.
+        Requirement("TWO", parse("G (near >= 0.12e-4) or G (far >= 0.12e4)")),
+        SearchSpace((), ranges, 1.0),
+        Experiment(1.0, 0.1, ("near", "far")),
+    )
+    judged = partial(evaluate, problem)
+    for seed in range(3):
+        asked = drive(TrustRegion(problem, seed=seed), judged, rounds=50)
+        assert any(judged(candidate).violated for candidate in asked), "of the robustness alone, 54 and more"
 
 
 def test_the_trust_region_starts_again_where_nothing_improves() -> None:
