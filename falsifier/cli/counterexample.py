@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
+from falsifier.cli.files import (
+    DRAWN,
+    check_out,
+    checked_picture,
+    draw_evaluation,
+    made_folder,
+    write_counterexample,
+)
 from falsifier.cli.options import (
     PATH,
     budget_option,
@@ -44,6 +51,8 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
 
+# How a counterexample's file begins.
+_FORMAT = b'{\n  "format"'
 # What is printed: lines of text, and the content of the same as JSON.
 Told = tuple[list[str], dict[str, Any]]
 
@@ -157,12 +166,14 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
 
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
+    directory = None if store is not None and out is None else out or beside(case.file, "export")
+    if directory is not None:
+        made_folder(directory, holds=("counterexample.json", "start_values.json", "inputs.mat"))
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         if store is not None:
             say(str(Database(store).save(problem, case.stored)))
-        if store is None or out is not None:
-            directory = out or beside(case.file, "export")
+        if directory is not None:
             for path in export_counterexample(problem, case.stored, evaluation, directory):
                 say(str(path))
 
@@ -175,8 +186,10 @@ def _shrink(
     file = (
         beside(case.file, "shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
     )
-    begins = b'"time"' if case.is_miss else b'{\n  "format"'
-    check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.file)
+    check_out(file, beginnings=(b'"time"' if case.is_miss else _FORMAT,), kept=case.file)
+    check_out(file.with_suffix(".json"), beginnings=(_FORMAT,), kept=case.file)
+    check_out(file.with_suffix(".npz"), beginnings=(b"PK",))
+    check_out(file.with_suffix(".png"), holds=DRAWN)
     with _loaded(case, rights) as problem:
         shrunk = shrink(
             problem,

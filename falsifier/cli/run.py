@@ -96,6 +96,7 @@ def run(
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
+    from falsifier.cli.files import check_out, in_existing_folder
     from falsifier.problem.loading import load_source
     from falsifier.record.run import falsify
     from falsifier.views.progress import log_fmu, make_display
@@ -105,6 +106,7 @@ def run(
     budget = read_budget(options, asks=llm is not None)
     logs = [log_fmu(fmu_log)] if fmu_log else []
     if fmu_log:
+        check_out(in_existing_folder(fmu_log), beginnings=(b"simulation 1: ",))
         changes = source.changes.model_copy(update={"logging": True})
         source = source.model_copy(update={"changes": changes})
     sources = _sources(source)

@@ -219,11 +219,11 @@ class News:
 
 
 def log_fmu(path: Path) -> Listener:
-    """Make a listener that writes the FMU's messages of each simulation to a file, which it replaces."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("", encoding="utf-8")
+    """Make a listener that writes the FMU's messages of each simulation to a file, which a run replaces."""
 
     def append(event: Event) -> None:
+        if isinstance(event, RunStarted):
+            path.write_text("", encoding="utf-8")
         if isinstance(event, Evaluated):
             evaluation = event.evaluation
             why = "" if evaluation.status == "ok" else f": {evaluation.reason}"

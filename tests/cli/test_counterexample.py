@@ -165,6 +165,11 @@ def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
     own = folder / "keep.fmu"
     own.write_bytes(b"PK mine")
+    (folder / "s.png").write_bytes(b"\x89PNG mine")
+    (folder / "my.toml").write_text("# AT\n")
+    (folder / "others").mkdir()
+    (folder / "others" / "input.csv").write_text("mine")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     for arguments, why in (
         (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is not such a file"),
         (
@@ -174,10 +179,17 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
         (["report", "run", "--csv", "keep.fmu"], "exists and is not such a file"),
+        (["report", "run", "--markdown", "--out", "my.toml"], "exists and is not such a file"),
+        (["report", "run", "--markdown", "--out", "x.png"], "x.png: expected a file name that ends in .md"),
+        (["explain", "run", "--shrink", "--out", "s.json"], "s.png exists and is not such a file"),
+        (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is not such a file"),
+        (["export", "run", "--out", "run"], "run has other files, which are kept"),
+        (["export", "run", "--out", "others"], "others has other files, which are kept"),
     ):
         done = run(folder, *arguments)
         assert (done.code, why in done.err) == (2, True), done.err
-    assert own.read_bytes() == b"PK mine"
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert [run(folder, "export", "run", "--out", "again").code for _ in range(2)] == [0, 0]
     assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]
 
 
