@@ -84,10 +84,10 @@ def assess(
 
 @command()
 @problem_options
-@stl_option("Formula with {limit} in place of a threshold.")
+@stl_option("Formula or template with {limit} in place of a threshold.")
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
-@budget_option(note=" of all searches together")
+@budget_option(least=20, note=" of all searches together")
 @seed_option()
 @quiet_option
 @json_option
@@ -110,7 +110,7 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT
+    from falsifier.analyses.margin import LIMIT, formula_at
     from falsifier.analyses.margin import margin as find_margin
 
     low, high = _between(between)
@@ -123,9 +123,10 @@ def margin(
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:
             found = "falsified" if falsified else "not falsified"
-            warn(f"{threshold:.6g}: {found} ({count} of at most {budget} simulations used)")
+            warn(f"{threshold:.12g}: {found} ({count} of at most {budget} simulations used)")
 
     problem = load_source(problem_source(options | requirement))
+    formula_at(problem, stl, high)  # its errors name the option
     with closing(problem.model):
         found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
     content = {"stl": stl, "between": [low, high], **asdict(found)}
