@@ -30,7 +30,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import MANIFEST
+from falsifier.record.manifest import MANIFEST, check_in_sight, check_no_folder
 from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
@@ -150,6 +150,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         except SpecError:
             if not place.is_dir():
                 raise
+            check_no_folder(place)
             raise JournalError(
                 f"{place}: not a run directory: it contains no {MANIFEST}; expected a run, a spec, an "
                 "FMU or a bundled name"
@@ -169,6 +170,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
+    check_in_sight(place, [source])
     evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
     return load_source(source), list(evaluations.values())
 

@@ -155,6 +155,7 @@ def resume(
     from falsifier.campaigns.directory import is_campaign, run_directories
     from falsifier.cli.campaign import resume_campaign
     from falsifier.record.run import resume as resume_run
+    from falsifier.record.run import runs_in
     from falsifier.views.progress import make_display
 
     if is_campaign(directory):
@@ -163,7 +164,8 @@ def resume(
         )
         resume_campaign(directory, jobs=jobs, limits=totals, quiet=quiet, as_json=as_json)
         return
-    places = run_directories(directory)
+    run_directories(directory)  # raises if there is nothing to continue
+    places = runs_in(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
         "--budget",

@@ -202,6 +202,7 @@ def counterexample_file(path: Path) -> Path:
         "in its runs/)"
     )
     if not holds_run(path):
+        manifest.check_no_folder(path)
         raise SpecError(f"not a run directory; {expected}", file=str(path))
     raise SpecError(
         f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that found "

@@ -47,6 +47,12 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
     assert "--context: applies to language models and" in f"{useless.stderr} {useless.exception}"
 
 
+def test_a_limit_that_is_reached_by_a_complete_campaign_stops_nothing(command: Any) -> None:
+    assert bench(command, "--out", "c").exit_code == 0
+    again = command("resume", "c", "--total", "simulations=5", "--quiet")
+    assert (again.exit_code, "to continue" in again.stderr) == (0, False), again.output
+
+
 def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:
     stopped = bench(command, "--out", "c", "--total", "simulations=5")
     assert stopped.exit_code == 3

@@ -1,5 +1,6 @@
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -143,6 +144,35 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
     log = (tmp_path / "logs" / "fmu.txt").read_text()
     assert log.count("simulation ") == 8
     assert "  error: the solver did not converge: the valve is open too far" in log
+
+
+SEVERAL = """
+model = { fmu = 'AT.fmu', interface = 'co-simulation' }
+inputs.throttle = { range = [0, 100], control_points = 2 }
+requirements.A.formula = 'G[0,10] (speed <= 200)'
+requirements.B = { formula = 'G[0,10] (speed <= 200)', stop_time = 12.0 }
+"""
+
+
+def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
+    work = tmp_path / "work"
+    work.mkdir()
+    shutil.copy(bundled("fmus") / "AT.fmu", work)
+    (work / "several.toml").write_text(SEVERAL)
+    done = falsifier("run", "several.toml", "--budget", "1", "--quiet", "--out", "runs", cwd=work)
+    assert done.code == 0, done.err
+    for command in ("explain", "replay", "export", "coverage", "assess"):
+        refused = falsifier(command, "runs", cwd=work)
+        assert refused.code == 2
+        assert "runs is a folder of runs; give one of them: runs/A, runs/B" in refused.err
+    assert falsifier("resume", "runs", "--budget", "2", "--quiet", cwd=work).code == 0
+    falsify("AT1", "corners", budget=1, directory=work / "other")
+    shutil.copytree(work / "runs" / "A", work / "A")
+    refused = falsifier("resume", ".", cwd=work)
+    assert (refused.code, "is a folder of runs; give one of them: A, other" in refused.err) == (2, True)
+    elsewhere = falsifier("resume", "work/runs/A", cwd=tmp_path)
+    assert elsewhere.code == 2
+    assert "started with several.toml, which does not exist seen from this folder" in elsewhere.err
 
 
 def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) -> None:

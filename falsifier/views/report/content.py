@@ -8,7 +8,7 @@ from typing import Literal
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.analysis import Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
-from falsifier.campaigns.progress import total
+from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
@@ -146,12 +146,8 @@ def _side(directory: Path, title: str) -> Side:
 
 
 def spent_on(runs: Iterable[Run]) -> Spent:
-    """What runs have spent together; of those that share a search, the longest shows what that spent."""
-    longest: dict[Path, Spent] = {}
-    for run in runs:
-        known = longest.get(run.directory, run.spent)
-        longest[run.directory] = max(known, run.spent, key=lambda spent: spent.simulations)
-    return total(longest.values())
+    """What runs have spent together."""
+    return spent_together((run.directory, run.spent) for run in runs)
 
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
