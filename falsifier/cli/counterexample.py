@@ -191,9 +191,10 @@ def _shrink(
     check_out(file.with_suffix(".npz"), beginnings=(b"PK",))
     check_out(file.with_suffix(".png"), holds=DRAWN)
     with _loaded(case, rights) as problem:
+        original = case.simulated(problem)
         shrunk = shrink(
             problem,
-            case.simulated(problem),
+            original,
             budget=budget,
             at_most=at_most,
             progress=lambda simpler, n: warn(
@@ -224,10 +225,9 @@ def _shrink(
         "files": list(map(str, files)),
     }
     lines = [case.text] if case.is_miss else []
-    end = f"the budget of {counted(budget, 'simulation')} is used up"
-    if shrunk.minimal:
-        end = "no simpler one found nearby"
-    lines.append(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
+    end = "no simpler one nearby" if shrunk.minimal else "the budget is used up"
+    done = "not shrunk" if found.candidate.key == original.candidate.key else "shrunk"
+    lines.append(f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}")
     if confirmation is not None:
         simpler = "this simpler input violates the requirement: " if case.is_miss else ""
         lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")

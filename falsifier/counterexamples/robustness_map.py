@@ -18,6 +18,7 @@ from falsifier.counterexamples.shrink import stretches, with_parameter, with_sig
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import signed
 
 # Simulations of a map, and the share of them on its grid.
 BUDGET = 700
@@ -112,8 +113,8 @@ class RobustnessMap:
         tried = f"{changes} of up to {_percent(self.radius)} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
-        least = "" if self.smallest is None else f"; the smallest robustness is {self.smallest:+.4g}"
-        return f"{found}{least}, without a change it is {self.original:+.4g}. {self._followed}"
+        least = "" if self.smallest is None else f"; the smallest robustness is {signed(self.smallest)}"
+        return f"{found}{least}, without a change it is {signed(self.original)}. {self._followed}"
 
     @property
     def _followed(self) -> str:

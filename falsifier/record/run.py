@@ -23,7 +23,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.files import CAMPAIGN
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
-from falsifier.record.records import EvaluatedRecord
+from falsifier.record.records import EndedRecord, EvaluatedRecord
 from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
@@ -305,7 +305,9 @@ def carry_out(
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             if recorded is None:
                 manifest.write(directory, described)
-            elif recorded.request.budget != request.budget:
+            elif recorded.request.budget != request.budget and not any(
+                isinstance(r, EndedRecord) and r.status == "falsified" for r in journal.records
+            ):  # otherwise nothing is left to search with another one
                 manifest.write(directory, recorded.model_copy(update={"request": request}))
             steps = replayed(directory, journal.records, steps)
             stop = directory / STOP

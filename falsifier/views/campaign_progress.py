@@ -62,7 +62,7 @@ class Scoreboard:
 
 def run_line(run: RunProgress) -> str:
     """Describe an ended run in one line."""
-    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness, 4)}"
+    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness)}"
     count = run.spent.simulations_text
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"

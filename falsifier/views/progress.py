@@ -189,7 +189,7 @@ class News:
             if verdict is None or verdict.robustness >= self._least.get(name, inf):
                 continue
             self._least[name] = verdict.robustness
-            text = f"best robustness {signed(verdict.robustness, 5)} at t = {verdict.critical_time:.5g} s"
+            text = f"best robustness {signed(verdict.robustness)} at t = {verdict.critical_time:.5g} s"
             if self._is_new(f"{name}: {text}"):
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)

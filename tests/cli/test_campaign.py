@@ -27,6 +27,11 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
 
+def test_tables_of_language_models_need_one(command: Any) -> None:
+    refused = bench(command, "--table", "llms")
+    assert (refused.exit_code, "--table llms: shows language models" in refused.output) == (2, True)
+
+
 def test_json_is_alone_on_stdout(command: Any) -> None:
     result = bench(command, "--json", "--quiet")
     assert [row["label"] for row in json.loads(result.stdout)] == ["uniform", "uniform"]

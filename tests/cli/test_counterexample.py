@@ -113,7 +113,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["explain", "run", "--map", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["replay", "gone.json"], "no such file"),
-        (["export", "."], "not a run directory"),
+        (["export", "."], ". is a folder of runs; give one of them: run"),
         (["explain", "run/manifest.json"], "not a counterexample file"),
         (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["report", "run", "--out", "gone/x.html"], "gone/x.html: no such folder gone"),
@@ -153,6 +153,13 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert done.code == 1, done.err
     assert "2 of 2 falsified" in done.out
     return folder
+
+
+def test_what_cannot_be_shrunk_is_not_called_shrunk(tmp_path: Path) -> None:
+    assert run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
+    assert "AT1: shrunk with " in run(tmp_path, "explain", "run", "--shrink").out
+    again = run(tmp_path, "explain", "run/shrunk.json", "--shrink", "--out", "s.json", "--at-most", "0")
+    assert "AT1: not shrunk with " in again.out and "; no simpler one nearby" in again.out
 
 
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:

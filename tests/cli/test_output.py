@@ -74,13 +74,14 @@ def started(code: str) -> "subprocess.Popen[str]":
     )
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(("code", "interrupts", "ends_with"), [(STUBBORN, 2, 130), (ENDED, 1, 1)])
-def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int) -> None:
+def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int, number: int) -> None:
     process = started(code)
     assert process.stdout is not None
     for _ in range(interrupts):
         process.stdout.readline()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
     _, err = process.communicate(timeout=50)
     assert (process.returncode, err) == (ends_with, "")
 

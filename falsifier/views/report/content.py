@@ -48,6 +48,8 @@ class Shown:
         """What it is, in words."""
         if not self.run.falsified:
             return "simulation nearest to a violation"
+        if self.is_shrunk and self.candidate.key == _recorded(self.run).key:
+            return "counterexample, of which no simpler one was found nearby"
         return "shrunk counterexample" if self.is_shrunk else "counterexample"
 
     @property
@@ -177,8 +179,12 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
 
 
 def _shown(run: Run) -> Shown:
+    return _shrunk(run) or shown_of(run, _recorded(run))
+
+
+def _recorded(run: Run) -> Candidate:
     assert run.shown is not None
-    return _shrunk(run) or shown_of(run, recorded_candidates(read_journal(run.directory))[run.shown])
+    return recorded_candidates(read_journal(run.directory))[run.shown]
 
 
 def shown_of(run: Run, candidate: Candidate) -> Shown:

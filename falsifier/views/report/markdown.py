@@ -7,6 +7,7 @@ from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather
 from falsifier.views.report.wording import (
     advice,
+    advised,
     commands,
     differences,
     input_table,
@@ -83,12 +84,14 @@ def _found(shown: Shown) -> list[str]:
     if beside := margin_beside(shown.verdict, shown.units):
         parts.append(_facts(beside))
     if advice(shown):
-        parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
+        parts.append(f"{advised(shown)}: {markdown_code(advice(shown))}")
     return parts
 
 
 def _facts(facts: Iterable[Fact]) -> str:
-    return "\n".join(f"- {markdown_text(one_line(f'{name} {text}'.strip()))}" for name, text in facts)
+    return "\n".join(
+        f"- {markdown_text(one_line(f'{name}: {text}' if name else text))}" for name, text in facts
+    )
 
 
 def _listed(title: str, lines: Iterable[str]) -> list[str]:

@@ -17,6 +17,7 @@ from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
 from falsifier.views.report.wording import (
     advice,
+    advised,
     commands,
     differences,
     input_table,
@@ -187,7 +188,7 @@ def _found(shown: Shown) -> list[str]:
         facts_html(parameters) if parameters else "",
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
         facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
-        el("p", "To simplify and explain it: ", el("code", command), class_="note") if command else "",
+        el("p", f"{advised(shown)}: ", el("code", command), class_="note") if command else "",
     ]
 
 

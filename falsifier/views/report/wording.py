@@ -114,7 +114,7 @@ def _course(signal: Signal) -> str:
 def parameter_facts(shown: Shown) -> list[Fact]:
     """Return the parameters of a simulation with their values and units."""
     values = shown.candidate.parameters.items()
-    return [(f"{name} =", f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
+    return [(name, f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
 
 
 def tried(section: Section) -> list[Fact]:
@@ -165,6 +165,11 @@ def advice(shown: Shown) -> str:
         return ""
     place = str(run.counterexample_file if run.method.together else run.directory)
     return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
+
+
+def advised(shown: Shown) -> str:
+    """Say what the command of ``advice`` is for."""
+    return "To explain it" if shown.is_shrunk else "To simplify and explain it"
 
 
 def replay_command(run: Run, *, shrunk: bool = False) -> str:
