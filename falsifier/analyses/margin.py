@@ -1,8 +1,9 @@
 """Where a requirement starts to be violated: the threshold between what was falsified and what was not."""
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import ceil, floor, log2, log10
+from math import ceil, floor, inf, log2, log10
 
 from falsifier.analyses.lint import ranges_of
 from falsifier.core.arguments import finite, whole
@@ -116,19 +117,21 @@ def margin(
     if len(signs) != 1:
         what = "is the same" if not signs else "changes in either direction, depending on the signals,"
         raise SpecError(f"vary: the robustness {what} for {LIMIT} = {low:g} and {high:g}")
-    ends = (low, high) if signs == {-1} else (high, low)
-    state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None), *ends)
-    if lowest.windows != highest.windows:
-        state.step = step
+    finest = 10.0 ** floor(log10(_FINEST * RESOLUTION * (high - low)))
+    between_two = finest if lowest.windows == highest.windows else step
+    count = ceil(round((high - low) / between_two, 6))
+    thresholds = [*(float(f"{low + k * between_two:.12g}") for k in range(count)), high]
+    thresholds = thresholds if signs == {-1} else thresholds[::-1]
+    state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None), thresholds)
     complete = interrupted = False
     try:
         complete = state.narrowed()
     except KeyboardInterrupt:
         interrupted = True
-    falsified = None if state.reached < 0 else state.threshold(state.reached)
-    unfalsified = None if state.hard > state.last else state.threshold(state.hard)
-    searches, count = tuple(state.searches), len(state.history)
-    return Margin(falsified, unfalsified, count, searches, complete, interrupted)
+    falsified = None if state.reached < 0 else thresholds[state.reached]
+    unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
+    searches, simulations = tuple(state.searches), len(state.history)
+    return Margin(falsified, unfalsified, simulations, searches, complete, interrupted)
 
 
 def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
@@ -139,10 +142,7 @@ def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
 
 @dataclass(slots=True)
 class _Bisection:
-    """The state of a search for a threshold: everything that was simulated so far.
-
-    Thresholds are counted from the easiest to violate, 0, to the hardest.
-    """
+    """The state of a search among thresholds, the easiest to violate first: everything simulated so far."""
 
     problem: Problem
     vary: str
@@ -150,32 +150,16 @@ class _Bisection:
     budget: int
     seed: int
     searched: OnSearch
-    easiest: float
-    hardest: float
-    step: float = field(init=False)
+    thresholds: list[float]
     reached: int = -1  # the hardest that was falsified
     in_vain: set[int] = field(default_factory=set)
     history: list[Evaluation] = field(default_factory=list)
     searches: list[tuple[float, bool]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        self.step = 10.0 ** floor(log10(_FINEST * RESOLUTION * abs(self.hardest - self.easiest)))
-
-    @property
-    def last(self) -> int:
-        """The hardest threshold."""
-        return ceil(round(abs(self.hardest - self.easiest) / self.step, 6))
-
     @property
     def hard(self) -> int:
         """The easiest that was searched in vain and not reached since; beyond the last: none."""
-        return min((k for k in self.in_vain if k > self.reached), default=self.last + 1)
-
-    def threshold(self, k: int) -> float:
-        """Return a threshold, with no more digits than are shown."""
-        if k == self.last:
-            return self.hardest
-        return float(f"{self.easiest + (k if self.easiest < self.hardest else -k) * self.step:.12g}")
+        return min((k for k in self.in_vain if k > self.reached), default=len(self.thresholds))
 
     def narrowed(self) -> bool:
         """Search at both ends, then between the hardest falsified threshold and the easiest other one.
@@ -183,11 +167,12 @@ class _Bisection:
         Returns:
             Whether that is all there is to know; False: the budget is used up before.
         """
-        close = max(1, floor(RESOLUTION * abs(self.hardest - self.easiest) / self.step))
-        self._search(self.last, 2 + ceil(log2(1 / RESOLUTION)))
+        last = len(self.thresholds) - 1
+        close = max(1, floor(RESOLUTION * last))
+        self._search(last, 2 + ceil(log2(1 / RESOLUTION)))
         if self.reached < 0:
             self._search(0, 1)  # it ends with the first violation; without one there is nothing to narrow
-        while 0 <= self.reached < self.hard - close and self.reached < self.last:
+        while 0 <= self.reached < self.hard - close:
             if len(self.history) >= self.budget:
                 return False
             self._search((self.reached + self.hard) // 2, ceil(log2((self.hard - self.reached) / close)))
@@ -195,8 +180,7 @@ class _Bisection:
 
     def _search(self, k: int, searches: int) -> None:
         """Search at a threshold with its share of what is left of the budget; keep what that says."""
-        threshold, budget = self.threshold(k), (self.budget - len(self.history)) // max(searches, 1)
-        problem = self._at(threshold)
+        problem, budget = self._at(k), (self.budget - len(self.history)) // max(searches, 1)
         engine = make_engine(self.engine, problem, seed=self.seed + len(self.searches))
         if self.history:
             engine.tell(self._judged(k))
@@ -210,34 +194,27 @@ class _Bisection:
             raise KeyboardInterrupt
         if result.status == "failed":
             raise SimulationError(f"{problem.name}: {result.reason}")
-        self.searches.append((threshold, result.falsified))
+        self.searches.append((self.thresholds[k], result.falsified))
         if result.falsified:
             self.reached = max(self.reached, k)
         else:
             self.in_vain.add(k)
         self._judge_all()
-        self.searched(threshold, result.falsified, len(self.history))
+        self.searched(*self.searches[-1], len(self.history))
 
-    def _at(self, threshold: float) -> Problem:
-        """Return the problem with the formula in which the threshold has this value."""
-        formula = formula_at(self.problem, self.vary, threshold)
+    def _at(self, k: int) -> Problem:
+        """Return the problem with the formula that has this threshold."""
+        formula = formula_at(self.problem, self.vary, self.thresholds[k])
         return replace(self.problem, requirement=Requirement(self.problem.name, formula), source=None)
 
     def _judged(self, k: int) -> list[Evaluation]:
-        problem = self._at(self.threshold(k))
+        problem = self._at(k)
         return [judge(problem, evaluation) for evaluation in self.history]
 
     def _judge_all(self) -> None:
         """Look for a harder threshold that something simulated already violates, if that is confirmed."""
-        found, low, high = None, max(self.reached, 0), self.last + 1
-        k = low
-        while low <= k < high:
-            violating = [e for e in self._judged(k) if e.violated]
-            if violating:
-                found, low = min(violating, key=lambda e: e.robustness or 0.0), k
-            else:
-                high = k
-            k = (low + high) // 2 if high - low > 1 else high
-        if found is not None and low > self.reached:
-            confirmation = confirm(self._at(self.threshold(low)), found)
-            self.reached = low if confirmation.outcome == "confirmed" else self.reached
+        known = range(max(self.reached, 0), len(self.thresholds))
+        count = bisect_left(known, 1, key=lambda k: not any(e.violated for e in self._judged(k)))
+        if count and (k := known[count - 1]) > self.reached:
+            found = min(self._judged(k), key=lambda e: inf if e.robustness is None else e.robustness)
+            self.reached = k if confirm(self._at(k), found).outcome == "confirmed" else self.reached

@@ -78,10 +78,7 @@ def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
     if is_campaign(directory):
         for name, request in read_campaign(directory).request.named().items():
             run = RunProgress(
-                name=name,
-                requirement=request.problems[0].name,
-                method=method_of(request),
-                seed=request.seed,
+                name=name, requirement=request.problems[0].name, method=method_of(request), seed=request.seed
             )
             yield RunFollower(run_directory(directory, name), [run])
         return

@@ -53,11 +53,7 @@ class CampaignEnd:
 
 
 def run_campaign(
-    request: CampaignRequest,
-    directory: Path,
-    *,
-    jobs: int = 1,
-    listeners: Iterable[Listener] = (),
+    request: CampaignRequest, directory: Path, *, jobs: int = 1, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Start a campaign.
 
@@ -83,11 +79,7 @@ def run_campaign(
 
 
 def resume_campaign(
-    directory: Path,
-    *,
-    jobs: int = 1,
-    limits: Budget | None = None,
-    listeners: Iterable[Listener] = (),
+    directory: Path, *, jobs: int = 1, limits: Budget | None = None, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Continue a campaign: finished runs are kept, the others are resumed from their journals.
 

@@ -215,12 +215,7 @@ TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
 def statistics_json(runs: Iterable[Run]) -> str:
     """All statistics as JSON: a list of objects, one per requirement and method."""
     rows = [
-        {
-            "requirement": requirement,
-            "label": method.label,
-            **asdict(method),
-            **asdict(statistics(members)),
-        }
+        {"requirement": requirement, "label": method.label, **asdict(method), **asdict(statistics(members))}
         for (requirement, method), members in group(runs).items()
     ]
     return json.dumps(rows, indent=2) + "\n"

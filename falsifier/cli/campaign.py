@@ -98,10 +98,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Number of runs per requirement and method, each with its own seed.",
 )
 @seed_option("Random seed of the first run; the others count up.")
-@budget_option(
-    shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}",
-    note=" per run",
-)
+@budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}", note=" per run")
 @limit_options(note=" per run")
 @total_option
 @jobs_option("runs")
@@ -156,8 +153,7 @@ def bench(
     how = llm_settings({"llm": next(iter(llms), None), **options})
     searchers = _searchers(engines, llms, variants, how)
     request = CampaignRequest(
-        runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget),
-        limits=totals,
+        runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget), limits=totals
     )
     if table != "main" and not llms:
         raise click.UsageError(

@@ -51,8 +51,7 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
 
-# How a counterexample's file begins.
-_FORMAT = b'{\n  "format"'
+_FORMAT = b'{\n  "format"'  # how a counterexample's file begins
 # What is printed: lines of text, and the content of the same as JSON.
 Told = tuple[list[str], dict[str, Any]]
 

@@ -53,12 +53,7 @@ def check_out(
 
 
 def made_folder(directory: Path, *, holds: tuple[str, ...]) -> None:
-    """Make a folder to write to; one with other files than an earlier output, which ``holds`` these, is kept.
-
-    Raises:
-        SpecError: if other files are there.
-        JournalError: if no folder can be made.
-    """
+    """Make a folder to write to; SpecError if it has files, but not those (``holds``) of an earlier run."""
     with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
     if any(directory.iterdir()) and not all((directory / name).is_file() for name in holds):

@@ -32,10 +32,7 @@ from falsifier.views.terminal import warn
     help="Also write every evaluation: inputs, robustness, critical time, status.",
 )
 @click.option(
-    "--arch-comp",
-    type=PATH,
-    metavar="FILE",
-    help="Also write a CSV file in the ARCH-COMP validation format.",
+    "--arch-comp", type=PATH, metavar="FILE", help="Also write a CSV file in the ARCH-COMP validation format."
 )
 def report(
     *,

@@ -138,13 +138,7 @@ def run(
 @quiet_option
 @json_option
 def resume(
-    *,
-    directory: Path,
-    jobs: int,
-    budget: int | None,
-    totals: "Budget | None",
-    quiet: bool,
-    as_json: bool,
+    *, directory: Path, jobs: int, budget: int | None, totals: "Budget | None", quiet: bool, as_json: bool
 ) -> None:
     """Continue the run or campaign in DIRECTORY; no recorded simulation or question is repeated.
 
@@ -152,7 +146,7 @@ def resume(
     --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost include
     what was spent before.
     """
-    from falsifier.campaigns.directory import is_campaign, run_directories
+    from falsifier.campaigns.directory import is_campaign
     from falsifier.cli.campaign import resume_campaign
     from falsifier.record.run import resume as resume_run
     from falsifier.record.run import runs_in
@@ -164,7 +158,6 @@ def resume(
         )
         resume_campaign(directory, jobs=jobs, limits=totals, quiet=quiet, as_json=as_json)
         return
-    run_directories(directory)  # raises if there is nothing to continue
     places = runs_in(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "

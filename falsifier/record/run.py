@@ -218,11 +218,7 @@ def resume(
 
 
 def runs_in(directory: Path) -> list[Path]:
-    """Return a run directory, or those in a folder, which are continued together: of one spec and its FMUs.
-
-    Raises:
-        JournalError: if the folder's runs have nothing to do with each other; names them.
-    """
+    """Return a run directory, or those in a folder; JournalError if they are not of one spec and its FMUs."""
     found = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
     if any(manifest.read(place).hashes != manifest.read(found[0]).hashes for place in found):
         manifest.check_no_folder(directory)

@@ -262,10 +262,7 @@ class _Loop:
         self.waiting.extend((state, wait) for wait in started)
 
     def settle(
-        self,
-        asked: RequirementState,
-        wait: Callable[[], Evaluation],
-        standing: Sequence[RequirementState],
+        self, asked: RequirementState, wait: Callable[[], Evaluation], standing: Sequence[RequirementState]
     ) -> None:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
 

@@ -7,7 +7,6 @@ from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather
 from falsifier.views.report.wording import (
     advice,
-    advised,
     commands,
     differences,
     input_table,
@@ -83,8 +82,7 @@ def _found(shown: Shown) -> list[str]:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
     if beside := margin_beside(shown.verdict, shown.units):
         parts.append(_facts(beside))
-    if advice(shown):
-        parts.append(f"{advised(shown)}: {markdown_code(advice(shown))}")
+    parts += [f"{what}: {markdown_code(command)}" for what, command in advice(shown)]
     return parts
 
 

@@ -158,18 +158,15 @@ def run_name(run: Run) -> str:
     return f"{run.method.label}, seed {run.seed}"
 
 
-def advice(shown: Shown) -> str:
-    """Return the command that would simplify or explain a counterexample; empty if both are done."""
+def advice(shown: Shown) -> list[Fact]:
+    """Return what would simplify or explain a counterexample, and its command; empty if both are done."""
     run = shown.run
     if not run.falsified or (shown.is_shrunk and shown.explanation):
-        return ""
-    place = str(run.counterexample_file if run.method.together else run.directory)
-    return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
-
-
-def advised(shown: Shown) -> str:
-    """Say what the command of ``advice`` is for."""
-    return "To explain it" if shown.is_shrunk else "To simplify and explain it"
+        return []
+    command = ["falsifier", "explain", str(run.counterexample_file if run.method.together else run.directory)]
+    if shown.is_shrunk:
+        return [("To explain it", shlex.join(command))]
+    return [("To simplify and explain it", shlex.join([*command, "--shrink"]))]
 
 
 def replay_command(run: Run, *, shrunk: bool = False) -> str:
