@@ -154,6 +154,11 @@ class Table:
         """Format as comma-separated values."""
         return csv_text((self.header, *self.rows))
 
+    @property
+    def width(self) -> int:
+        """Number of characters in a row of text."""
+        return len(self.text().splitlines()[3])
+
     def text(self) -> str:
         """Format as plain text with aligned columns."""
         rows = [tuple(map(one_line, row)) for row in (self.header, *self.rows)]

@@ -1,5 +1,6 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
+import re
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -122,7 +123,14 @@ def margin(
     problem = load_source(problem_source(options | requirement))
     formula_at(problem, stl, high)  # its errors name the option
     with closing(problem.model):
-        found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
+        try:
+            found = find_margin(
+                problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said
+            )
+        except SpecError as error:  # which names arguments in Python
+            raise SpecError(
+                re.sub("^vary:", "--stl:", re.sub("^between:", "--between:", str(error)))
+            ) from None
     content = {"stl": stl, "between": [low, high], **asdict(found)}
     text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)

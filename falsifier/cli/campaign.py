@@ -1,6 +1,7 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
 import shlex
+import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -230,7 +231,12 @@ def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) 
     failed = outcome.progress.counts["failed"]
     if failed:
         warn(f"{counted(failed, 'run')} failed; to retry: {again}")
-    conclude(data if as_json else tables[table].text(), 3 if failed or outcome.reason else 0, nl=not as_json)
+    shown = tables[table]
+    while sys.stdout.isatty() and len(shown.header) > 3 and shown.width > shutil.get_terminal_size().columns:
+        shown = shown.only(*shown.header[:-1])
+    if cut := tables[table].header[len(shown.header) :]:
+        warn(f"too wide for this terminal: {', '.join(cut)}; in {directory / f'table-{table}.md'}")
+    conclude(data if as_json else shown.text(), 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _agree(request: CampaignRequest, *, yes: bool) -> None:

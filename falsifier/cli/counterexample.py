@@ -224,7 +224,7 @@ def _shrink(
         "files": list(map(str, files)),
     }
     lines = [case.text] if case.is_miss else []
-    end = "no simpler one nearby" if shrunk.minimal else "the budget is used up"
+    end = "no simpler one found nearby" if shrunk.minimal else "the budget is used up"
     done = "not shrunk" if found.candidate.key == original.candidate.key else "shrunk"
     lines.append(f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}")
     if confirmation is not None:

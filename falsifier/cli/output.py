@@ -5,8 +5,11 @@ Results go to stdout; messages for people go to stderr through ``views.terminal`
 
 import json
 import os
+import re
+import shutil
 import signal
 import sys
+import textwrap
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
@@ -32,8 +35,12 @@ def say(text: str, *, nl: bool = True) -> None:
 
 
 def as_shown(text: str, content: object, *, as_json: bool) -> str:
-    """Return a result as text, or its content as JSON."""
-    return json.dumps(content, indent=2) if as_json else text
+    """Return a result as text, whose long facts are wrapped on a terminal, or its content as JSON."""
+    if as_json or not sys.stdout.isatty():
+        return json.dumps(content, indent=2) if as_json else text
+    wrapper = textwrap.TextWrapper(shutil.get_terminal_size().columns, subsequent_indent=" " * 17)
+    wrapper.break_long_words = wrapper.break_on_hyphens = False
+    return re.sub(r"(?m)^ {2}.{14} \S.*$", lambda fact: wrapper.fill(fact[0]), text)
 
 
 def conclude(text: str, code: int, *, nl: bool = True) -> NoReturn:

@@ -76,10 +76,9 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
     fresh = _repeat(problem, evaluation.candidate)
     first, again = signed(evaluation.robustness), signed(fresh.robustness)
+    differs = f"equal inputs give different outputs: the robustness was {first} when it was found; "
     # As far as it is shown: some solvers keep a step size from the simulation before.
-    differs = "" if fresh.robustness is None or first == again else (
-        f"equal inputs give different outputs: the robustness was {first} when it was found; "
-    )  # fmt: skip
+    differs = "" if fresh.robustness is None or first == again else differs
     found = Confirmation(
         problem=problem,
         evaluation=evaluation,

@@ -23,7 +23,7 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     console = error_console()
 
     def write(text: str) -> None:
-        console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+        console.print(one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal)
 
     if quiet:
         yield lambda progress: None

@@ -76,7 +76,9 @@ def progress() -> Listener:
 
 
 def _writer(console: "Console") -> Callable[[str], None]:
-    return lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+    return lambda text: console.print(
+        one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal
+    )
 
 
 def _show_in_notebook(line: "_Line") -> None:

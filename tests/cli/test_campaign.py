@@ -32,6 +32,19 @@ def test_tables_of_language_models_need_one(command: Any) -> None:
     assert (refused.exit_code, "--table llms: shows language models" in refused.output) == (2, True)
 
 
+def test_a_table_that_is_too_wide_for_the_terminal_shows_the_columns_that_fit(
+    command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = bench(command, "--out", "c", "--quiet").stdout.splitlines()
+    monkeypatch.setattr("click.testing._NamedTextIOWrapper.isatty", lambda _: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    cut = command("resume", "c", "--quiet")
+    lines = cut.stdout.splitlines()
+    assert max(map(len, lines[:5])) <= 60 < max(map(len, whole[:5]))
+    assert whole[2].startswith(lines[2])
+    assert "too wide for this terminal: " in cut.stderr and "; in c/table-main.md" in cut.stderr
+
+
 def test_json_is_alone_on_stdout(command: Any) -> None:
     result = bench(command, "--json", "--quiet")
     assert [row["label"] for row in json.loads(result.stdout)] == ["uniform", "uniform"]

@@ -159,7 +159,7 @@ def test_what_cannot_be_shrunk_is_not_called_shrunk(tmp_path: Path) -> None:
     assert run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
     assert "AT1: shrunk with " in run(tmp_path, "explain", "run", "--shrink").out
     again = run(tmp_path, "explain", "run/shrunk.json", "--shrink", "--out", "s.json", "--at-most", "0")
-    assert "AT1: not shrunk with " in again.out and "; no simpler one nearby" in again.out
+    assert "AT1: not shrunk with " in again.out and "; no simpler one found nearby" in again.out
 
 
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:
