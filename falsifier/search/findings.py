@@ -130,9 +130,7 @@ def _remedy(problem: Problem, coarse: Sequence[InputRange], limits: FreeSection)
     if any(own[r.name].free for r in coarse):
         return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
     stated = {} if source is None else source.changes.inputs
-    points = any(
-        name in stated and stated[name].control_points is not None for name in (r.name for r in coarse)
-    )
+    points = any(r.name in stated and stated[r.name].control_points for r in coarse)
     if source is not None and source.parameterization == "fixed" and not points:
         return "--parameterization free"
     count, shortest = limits.max_control_points, limits.min_interval

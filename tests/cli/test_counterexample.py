@@ -157,9 +157,11 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_what_cannot_be_shrunk_is_not_called_shrunk(tmp_path: Path) -> None:
     assert run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
-    assert "AT1: shrunk with " in run(tmp_path, "explain", "run", "--shrink").out
-    again = run(tmp_path, "explain", "run/shrunk.json", "--shrink", "--out", "s.json", "--at-most", "0")
-    assert "AT1: not shrunk with " in again.out and "; no simpler one found nearby" in again.out
+    done = run(tmp_path, "explain", "run", "--shrink")  # the corner has been full throttle and no brake
+    assert "AT1: not shrunk with " in done.out and "; no simpler one found nearby" in done.out
+    text = run(tmp_path, "report", "run", "--markdown").out
+    assert "The counterexample, of which no simpler one was found nearby:" in text
+    assert "To explain it: `falsifier explain run`" in text
 
 
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:

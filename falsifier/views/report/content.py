@@ -11,6 +11,7 @@ from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
@@ -48,7 +49,7 @@ class Shown:
         """What it is, in words."""
         if not self.run.falsified:
             return "simulation nearest to a violation"
-        if self.is_shrunk and self.candidate.key == _recorded(self.run).key:
+        if self.is_shrunk and in_one_line(self.candidate) == in_one_line(_recorded(self.run)):
             return "counterexample, of which no simpler one was found nearby"
         return "shrunk counterexample" if self.is_shrunk else "counterexample"
 
