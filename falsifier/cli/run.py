@@ -106,9 +106,9 @@ def run(
     budget = read_budget(options, asks=llm is not None)
     logs = [log_fmu(fmu_log)] if fmu_log else []
     if fmu_log:
-        check_out(in_existing_folder(fmu_log), beginnings=(b"simulation 1: ",))
-        changes = source.changes.model_copy(update={"logging": True})
-        source = source.model_copy(update={"changes": changes})
+        if in_existing_folder(fmu_log).is_file() or fmu_log.is_dir():  # not: a stream such as /dev/stderr
+            check_out(fmu_log, beginnings=(b"simulation 1: ",))
+        source = source.model_copy(update={"changes": source.changes.model_copy(update={"logging": True})})
     sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources
     start_from = []

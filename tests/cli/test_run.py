@@ -188,6 +188,7 @@ def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) ->
     assert [falsifier(*arguments, "log", cwd=tmp_path).code for _ in range(2)] == [0, 0]
     log = (tmp_path / "log").read_text()
     assert log.count("simulation ") == 1
+    assert "simulation 1: ok" in falsifier(*arguments, "/dev/stderr", cwd=tmp_path).err
     assert falsifier(*arguments, "log", "--stl", "G[0,20] (nowhere < 3)", cwd=tmp_path).code == 2
     assert (tmp_path / "log").read_text() == log
 
