@@ -173,7 +173,7 @@ def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) 
         checked = check(
             loaded,
             engine=options["engine"],
-            budget=int(options["budget"] or _DEFAULT_BUDGET),
+            budget=int(_DEFAULT_BUDGET if options["budget"] is None else options["budget"]),
             seed=int(options["seed"] or 0),
             database=Database(folder),
         )

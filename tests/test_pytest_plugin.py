@@ -149,6 +149,12 @@ formula = "y >= -1"
 """
 
 
+def test_a_budget_of_nothing_is_refused_like_any_other_wrong_one(repository: Path) -> None:
+    for budget in ("0", "-5"):
+        done = run_pytest(repository, "--falsifier", "specs", "--falsifier-budget", budget)
+        assert done.code == 1 and f"at least 1, got {budget}" in done.out, done.out
+
+
 def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None:
     for name in ("fmus", "specs"):
         (tmp_path / name).mkdir()

@@ -110,7 +110,7 @@ class Assurance:
             if searched.smallest is None:
                 return f"{effort} has no verdict: all of them failed."
             nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
-            return f"{effort} {nearer}: its smallest robustness was {searched.smallest:+.6g}."
+            return f"{effort} {nearer}: its smallest robustness was {signed(searched.smallest)}."
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."

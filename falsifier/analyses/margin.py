@@ -1,9 +1,11 @@
 """Where a requirement starts to be violated: the threshold between what was falsified and what was not."""
 
+from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import ceil, log2
+from math import ceil, floor, inf, log2, log10
 
+from falsifier.analyses.lint import ranges_of
 from falsifier.core.arguments import finite, whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE, make_engine
@@ -11,16 +13,21 @@ from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement, parse_requirement
+from falsifier.problem.requirement import Requirement, formula_of
+from falsifier.problem.shorthand import in_python, requirement_of
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.loop import search
+from falsifier.search.make_engines import check_names
+from falsifier.search.request import RunRequest
+from falsifier.stl import Formula
+from falsifier.stl.tell_apart import differences
 
 LIMIT = "{limit}"
 # The search ends when the threshold is known to this share of the range.
 RESOLUTION = 0.01
-# Steps of the bisection over what is simulated already: more than a threshold has significant digits.
-_JUDGED_STEPS = 20
+# Thresholds are this share of that apart, or a power of ten below it, so that they can be told exactly.
+_FINEST = 0.01
 
 OnSearch = Callable[[float, bool, int], None]
 
@@ -50,14 +57,14 @@ class Margin:
         """The result in one sentence."""
         searches = "1 search" if len(self.searches) == 1 else f"{len(self.searches)} searches"
         effort = f"({counted(self.simulations, 'simulation')}, {searches})"
-        ends = [] if self.falsified is None else [f"falsified at {self.falsified:.6g}"]
-        ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.6g}"]
+        ends = [] if self.falsified is None else [f"falsified at {self.falsified:.12g}"]
+        ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.12g}"]
         if self.interrupted:
             return f"{', '.join(ends) or 'nothing is known yet'} {effort}; stopped by the user"
         if self.unfalsified is None:
-            ends = [f"falsified in the whole range, even at {self.falsified:.6g}"]
+            ends = [f"falsified in the whole range, even at {self.falsified:.12g}"]
         elif self.falsified is None:
-            ends = [f"not falsified in the whole range, not even at {self.unfalsified:.6g}"]
+            ends = [f"not falsified in the whole range, not even at {self.unfalsified:.12g}"]
         more = "" if self.complete else "; a larger budget narrows it"
         return f"{', '.join(ends)} {effort}{more}"
 
@@ -75,11 +82,11 @@ def margin(
     """Find the threshold at which a search starts to find violations, by bisection.
 
     Robustness must change in one direction with the threshold. All searches share their simulations: each is
-    judged for every threshold.
+    judged for every threshold. Thresholds in windows are those that fit the time grid.
 
     Args:
         problem: the model and what may be varied; its requirement is replaced.
-        vary: formula with ``{limit}`` in place of the threshold.
+        vary: formula, or a template and its arguments, with ``{limit}`` in place of the threshold.
         between: smallest and largest threshold.
         engine: name of the engine.
         budget: maximum number of simulations of all searches together.
@@ -91,7 +98,8 @@ def margin(
         The thresholds. Ctrl-C ends the searches early; then they are what was known by then.
 
     Raises:
-        SpecError: if the formula, the range or a number is not valid, or the threshold changes nothing.
+        SpecError: if the formula, the range, the engine or a number is not valid, or if the threshold changes
+            nothing, or not always in the same direction.
         SimulationError: if most simulations failed.
     """
     low, high = finite("between", between[0]), finite("between", between[1])
@@ -100,20 +108,41 @@ def margin(
     if low >= high:
         raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
-    state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None))
-    easy, hard = state.directed(low, high)
+    check_names(RunRequest(problems=(), engine=engine))
+    with in_python("vary"):
+        lowest, highest = (formula_at(problem, vary, threshold) for threshold in (low, high))
+    experiment = problem.experiment
+    step, samples = experiment.output_interval, experiment.samples
+    signs = differences(lowest, highest, step=step, samples=samples, ranges=ranges_of(problem))
+    if len(signs) != 1:
+        what = "is the same" if not signs else "changes in either direction, depending on the signals,"
+        raise SpecError(f"vary: the robustness {what} for {LIMIT} = {low:g} and {high:g}")
+    finest = 10.0 ** floor(log10(_FINEST * RESOLUTION * (high - low)))
+    between_two = finest if lowest.windows == highest.windows else step
+    count = ceil(round((high - low) / between_two, 6))
+    thresholds = [*(float(f"{low + k * between_two:.12g}") for k in range(count)), high]
+    thresholds = thresholds if signs == {-1} else thresholds[::-1]
+    state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None), thresholds)
     complete = interrupted = False
     try:
-        complete = state.narrowed(easy, hard)
+        complete = state.narrowed()
     except KeyboardInterrupt:
         interrupted = True
-    searches, count = tuple(state.searches), len(state.history)
-    return Margin(state.falsified, state.unfalsified, count, searches, complete, interrupted)
+    falsified = None if state.reached < 0 else thresholds[state.reached]
+    unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
+    searches, simulations = tuple(state.searches), len(state.history)
+    return Margin(falsified, unfalsified, simulations, searches, complete, interrupted)
+
+
+def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
+    """Return the formula in which the threshold has this value; SpecError if it does not fit the problem."""
+    stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"))
+    return formula_of(stated, problem.info, problem.experiment, key="")
 
 
 @dataclass(slots=True)
 class _Bisection:
-    """The state of a search for a threshold: everything that was simulated so far."""
+    """The state of a search among thresholds, the easiest to violate first: everything simulated so far."""
 
     problem: Problem
     vary: str
@@ -121,96 +150,71 @@ class _Bisection:
     budget: int
     seed: int
     searched: OnSearch
-    falsified: float | None = None
-    unfalsified: float | None = None
+    thresholds: list[float]
+    reached: int = -1  # the hardest that was falsified
+    in_vain: set[int] = field(default_factory=set)
     history: list[Evaluation] = field(default_factory=list)
     searches: list[tuple[float, bool]] = field(default_factory=list)
 
-    def directed(self, low: float, high: float) -> tuple[float, float]:
-        """Return the threshold that is easier to violate, then the other one, judged by one simulation."""
-        self._search(high, 1)
-        values = [e.robustness for x in (low, high) for e in self._judged(x) if e.robustness is not None]
-        self.searches.clear()
-        if len(values) < 2:
-            raise SimulationError(f"{self.problem.name}: the simulation failed: {self.history[0].reason}")
-        if values[0] == values[-1]:
-            raise SpecError(f"vary: the robustness is the same for {LIMIT} = {low:g} and {high:g}")
-        return (low, high) if values[0] < values[-1] else (high, low)
+    @property
+    def hard(self) -> int:
+        """The easiest that was searched in vain and not reached since; beyond the last: none."""
+        return min((k for k in self.in_vain if k > self.reached), default=len(self.thresholds))
 
-    def narrowed(self, easy: float, hard: float) -> bool:
+    def narrowed(self) -> bool:
         """Search at both ends, then between the hardest falsified threshold and the easiest other one.
 
         Returns:
             Whether that is all there is to know; False: the budget is used up before.
         """
-        close = RESOLUTION * abs(hard - easy)
-        steps = 2 + ceil(log2(1 / RESOLUTION))
-        if self._falsified(hard, steps):
-            return True
-        reached = self._reached(easy, hard)
-        if reached is None:
-            if not self._falsified(easy, steps - 1):
-                return True
-            reached = self._reached(easy, hard) or easy
-        easy = self.falsified = reached
-        while abs(hard - easy) > close and len(self.history) < self.budget:
-            middle = (easy + hard) / 2
-            if self._falsified(middle, ceil(log2(abs(hard - easy) / close))):
-                easy = self.falsified = self._reached(middle, hard) or middle
-            else:
-                hard = middle
-        return abs(hard - easy) <= close
+        last = len(self.thresholds) - 1
+        close = max(1, floor(RESOLUTION * last))
+        self._search(last, 2 + ceil(log2(1 / RESOLUTION)))
+        if self.reached < 0:
+            self._search(0, 1)  # it ends with the first violation; without one there is nothing to narrow
+        while 0 <= self.reached < self.hard - close:
+            if len(self.history) >= self.budget:
+                return False
+            self._search((self.reached + self.hard) // 2, ceil(log2((self.hard - self.reached) / close)))
+        return True
 
-    def _falsified(self, threshold: float, searches: int) -> bool:
+    def _search(self, k: int, searches: int) -> None:
         """Search at a threshold with its share of what is left of the budget; keep what that says."""
-        found = self._search(threshold, max(1, (self.budget - len(self.history)) // max(searches, 1)))
-        if found:
-            self.falsified = threshold
-        else:
-            self.unfalsified = threshold
-        self.searched(threshold, found, len(self.history))
-        return found
-
-    def _search(self, threshold: float, budget: int) -> bool:
-        problem = self._at(threshold)
+        problem, budget = self._at(k), (self.budget - len(self.history)) // max(searches, 1)
         engine = make_engine(self.engine, problem, seed=self.seed + len(self.searches))
         if self.history:
-            engine.tell(self._judged(threshold))
+            engine.tell(self._judged(k))
 
         def remember(event: Event) -> None:
             if isinstance(event, Evaluated):
                 self.history.append(event.evaluation)
 
-        (result,) = search([problem], [engine], Budget(budget), listeners=[remember])
+        (result,) = search([problem], [engine], Budget(max(1, budget)), listeners=[remember])
         if result.status == "interrupted":
             raise KeyboardInterrupt
         if result.status == "failed":
             raise SimulationError(f"{problem.name}: {result.reason}")
-        self.searches.append((threshold, result.falsified))
-        return result.falsified
+        self.searches.append((self.thresholds[k], result.falsified))
+        if result.falsified:
+            self.reached = max(self.reached, k)
+        else:
+            self.in_vain.add(k)
+        self._judge_all()
+        self.searched(*self.searches[-1], len(self.history))
 
-    def _at(self, threshold: float) -> Problem:
-        """Return the problem with the formula in which the threshold has this value."""
-        problem, text = self.problem, self.vary.replace(LIMIT, f"{threshold:.12g}")
-        formula = parse_requirement(text, problem.info, problem.experiment)
-        return replace(problem, requirement=Requirement(problem.name, formula), source=None)
+    def _at(self, k: int) -> Problem:
+        """Return the problem with the formula that has this threshold."""
+        formula = formula_at(self.problem, self.vary, self.thresholds[k])
+        return replace(self.problem, requirement=Requirement(self.problem.name, formula), source=None)
 
-    def _judged(self, threshold: float) -> list[Evaluation]:
-        problem = self._at(threshold)
+    def _judged(self, k: int) -> list[Evaluation]:
+        problem = self._at(k)
         return [judge(problem, evaluation) for evaluation in self.history]
 
-    def _reached(self, easy: float, hard: float) -> float | None:
-        """Return the hardest threshold that something simulated already violates, if that is confirmed."""
-        found, threshold = None, easy
-        for _ in range(_JUDGED_STEPS + 1):
-            violating = [e for e in self._judged(threshold) if e.violated]
-            if violating:
-                easy, found = threshold, min(violating, key=lambda e: e.robustness or 0.0)
-            elif found is None:
-                return None
-            else:
-                hard = threshold
-            threshold = (easy + hard) / 2
-        assert found is not None, "there is at least one step"
-        confirmation = confirm(self._at(easy), found)
-        return easy if confirmation.outcome == "confirmed" else None
+    def _judge_all(self) -> None:
+        """Look for a harder threshold that something simulated already violates, if that is confirmed."""
+        known = range(max(self.reached, 0), len(self.thresholds))
+        count = bisect_left(known, 1, key=lambda k: not any(e.violated for e in self._judged(k)))
+        if count and (k := known[count - 1]) > self.reached:
+            found = min(self._judged(k), key=lambda e: inf if e.robustness is None else e.robustness)
+            self.reached = k if confirm(self._at(k), found).outcome == "confirmed" else self.reached

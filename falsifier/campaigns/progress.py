@@ -47,11 +47,7 @@ class Progress:
     @property
     def spent(self) -> Spent:
         """What all runs together have spent; the cost is None if that of any run is unknown."""
-        searches: dict[str, Spent] = {}  # requirements that share a search also share what it has spent
-        for run in self.runs:
-            known = searches.setdefault(run.name, run.spent)
-            searches[run.name] = max(known, run.spent, key=lambda spent: spent.simulations)
-        return total(searches.values())
+        return spent_together((run.name, run.spent) for run in self.runs)
 
 
 class Follower:
@@ -82,10 +78,7 @@ def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
     if is_campaign(directory):
         for name, request in read_campaign(directory).request.named().items():
             run = RunProgress(
-                name=name,
-                requirement=request.problems[0].name,
-                method=method_of(request),
-                seed=request.seed,
+                name=name, requirement=request.problems[0].name, method=method_of(request), seed=request.seed
             )
             yield RunFollower(run_directory(directory, name), [run])
         return
@@ -102,6 +95,14 @@ def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
             for name in described.names
         ]
         yield RunFollower(place, runs)
+
+
+def spent_together(shares: Iterable[tuple[object, Spent]]) -> Spent:
+    """Return what searches have spent; of the shares that name the same search, the largest is all of it."""
+    longest: dict[object, Spent] = {}
+    for search, spent in shares:
+        longest[search] = max(longest.get(search, spent), spent, key=lambda s: (s.simulations, s.seconds))
+    return total(longest.values())
 
 
 def total(spent: Iterable[Spent]) -> Spent:

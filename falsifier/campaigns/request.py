@@ -94,11 +94,7 @@ Searcher = str | LLMSettings | tuple[str, LLMSettings]
 
 
 def cross(
-    problems: Iterable[ProblemSource],
-    searchers: Iterable[Searcher],
-    *,
-    seeds: Iterable[int],
-    budget: Budget,
+    problems: Iterable[ProblemSource], searchers: Iterable[Searcher], *, seeds: Iterable[int], budget: Budget
 ) -> tuple[RunRequest, ...]:
     """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
@@ -140,9 +136,7 @@ def method_of(request: RunRequest) -> Method:
 def method_of_run(described: Manifest) -> Method:
     """Method of a run that has begun: with the parameterization that was really searched."""
     return replace(
-        method_of(described.request),
-        parameterization=described.parameterization,
-        together=described.shared,
+        method_of(described.request), parameterization=described.parameterization, together=described.shared
     )
 
 

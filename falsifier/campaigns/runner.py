@@ -24,7 +24,14 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import STOP, holds_run, open_journal
-from falsifier.record.manifest import check_unchanged, describe, environment, file_hashes, write
+from falsifier.record.manifest import (
+    check_in_sight,
+    check_unchanged,
+    describe,
+    environment,
+    file_hashes,
+    write,
+)
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
@@ -46,11 +53,7 @@ class CampaignEnd:
 
 
 def run_campaign(
-    request: CampaignRequest,
-    directory: Path,
-    *,
-    jobs: int = 1,
-    listeners: Iterable[Listener] = (),
+    request: CampaignRequest, directory: Path, *, jobs: int = 1, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Start a campaign.
 
@@ -76,11 +79,7 @@ def run_campaign(
 
 
 def resume_campaign(
-    directory: Path,
-    *,
-    jobs: int = 1,
-    limits: Budget | None = None,
-    listeners: Iterable[Listener] = (),
+    directory: Path, *, jobs: int = 1, limits: Budget | None = None, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Continue a campaign: finished runs are kept, the others are resumed from their journals.
 
@@ -98,6 +97,7 @@ def resume_campaign(
     jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
+        check_in_sight(directory, (run.problems[0] for run in record.request.runs))
         problems = _load(record.request.runs)
         check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
@@ -166,7 +166,7 @@ def _work(
     for listener in listeners:
         listener(progress)
     stop.unlink(missing_ok=True)
-    return CampaignEnd(progress, reason)
+    return CampaignEnd(progress, reason if progress.finished < len(progress.runs) else "")
 
 
 def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:

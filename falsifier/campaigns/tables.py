@@ -154,6 +154,11 @@ class Table:
         """Format as comma-separated values."""
         return csv_text((self.header, *self.rows))
 
+    @property
+    def width(self) -> int:
+        """Number of characters in a row of text."""
+        return len(self.text().splitlines()[3])
+
     def text(self) -> str:
         """Format as plain text with aligned columns."""
         rows = [tuple(map(one_line, row)) for row in (self.header, *self.rows)]
@@ -215,12 +220,7 @@ TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
 def statistics_json(runs: Iterable[Run]) -> str:
     """All statistics as JSON: a list of objects, one per requirement and method."""
     rows = [
-        {
-            "requirement": requirement,
-            "label": method.label,
-            **asdict(method),
-            **asdict(statistics(members)),
-        }
+        {"requirement": requirement, "label": method.label, **asdict(method), **asdict(statistics(members))}
         for (requirement, method), members in group(runs).items()
     ]
     return json.dumps(rows, indent=2) + "\n"

@@ -1,5 +1,6 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
+import re
 from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
@@ -30,7 +31,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import MANIFEST
+from falsifier.record.manifest import MANIFEST, check_in_sight, check_no_folder
 from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
@@ -48,13 +49,7 @@ _SAID_EVERY = 100
 @quiet_option
 @json_option
 def assess(
-    *,
-    budget: int,
-    requirement: str | None,
-    seed: int,
-    quiet: bool,
-    as_json: bool,
-    **options: Any,
+    *, budget: int, requirement: str | None, seed: int, quiet: bool, as_json: bool, **options: Any
 ) -> None:
     """Bound the probability of a violation by simulating at random.
 
@@ -84,10 +79,10 @@ def assess(
 
 @command()
 @problem_options
-@stl_option("Formula with {limit} in place of a threshold.")
+@stl_option("Formula or template with {limit} in place of a threshold.")
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
-@budget_option(note=" of all searches together")
+@budget_option(least=20, note=" of all searches together")
 @seed_option()
 @quiet_option
 @json_option
@@ -110,7 +105,7 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT
+    from falsifier.analyses.margin import LIMIT, formula_at
     from falsifier.analyses.margin import margin as find_margin
 
     low, high = _between(between)
@@ -123,11 +118,19 @@ def margin(
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:
             found = "falsified" if falsified else "not falsified"
-            warn(f"{threshold:.6g}: {found} ({count} of at most {budget} simulations used)")
+            warn(f"{threshold:.12g}: {found} ({count} of at most {budget} simulations used)")
 
     problem = load_source(problem_source(options | requirement))
+    formula_at(problem, stl, high)  # its errors name the option
     with closing(problem.model):
-        found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
+        try:
+            found = find_margin(
+                problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said
+            )
+        except SpecError as error:  # which names arguments in Python
+            raise SpecError(
+                re.sub("^vary:", "--stl:", re.sub("^between:", "--between:", str(error)))
+            ) from None
     content = {"stl": stl, "between": [low, high], **asdict(found)}
     text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
@@ -149,6 +152,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
         except SpecError:
             if not place.is_dir():
                 raise
+            check_no_folder(place)
             raise JournalError(
                 f"{place}: not a run directory: it contains no {MANIFEST}; expected a run, a spec, an "
                 "FMU or a bundled name"
@@ -168,6 +172,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
+    check_in_sight(place, [source])
     evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
     return load_source(source), list(evaluations.values())
 

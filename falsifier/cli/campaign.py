@@ -1,6 +1,7 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
 import shlex
+import shutil
 import sys
 import time
 from collections.abc import Sequence
@@ -98,10 +99,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     help="Number of runs per requirement and method, each with its own seed.",
 )
 @seed_option("Random seed of the first run; the others count up.")
-@budget_option(
-    shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}",
-    note=" per run",
-)
+@budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}", note=" per run")
 @limit_options(note=" per run")
 @total_option
 @jobs_option("runs")
@@ -156,9 +154,12 @@ def bench(
     how = llm_settings({"llm": next(iter(llms), None), **options})
     searchers = _searchers(engines, llms, variants, how)
     request = CampaignRequest(
-        runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget),
-        limits=totals,
+        runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget), limits=totals
     )
+    if table != "main" and not llms:
+        raise click.UsageError(
+            f"--table {table}: shows language models; name one with --llm, or leave it out"
+        )
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     check_new(directory)
     check_request(request)
@@ -230,7 +231,12 @@ def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) 
     failed = outcome.progress.counts["failed"]
     if failed:
         warn(f"{counted(failed, 'run')} failed; to retry: {again}")
-    conclude(data if as_json else tables[table].text(), 3 if failed or outcome.reason else 0, nl=not as_json)
+    shown = tables[table]
+    while sys.stdout.isatty() and len(shown.header) > 3 and shown.width > shutil.get_terminal_size().columns:
+        shown = shown.only(*shown.header[:-1])
+    if cut := tables[table].header[len(shown.header) :]:
+        warn(f"too wide for this terminal: {', '.join(cut)}; in {directory / f'table-{table}.md'}")
+    conclude(data if as_json else shown.text(), 3 if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _agree(request: CampaignRequest, *, yes: bool) -> None:

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import check_out, checked_picture, draw_evaluation, write_counterexample
+from falsifier.cli.files import (
+    DRAWN,
+    check_out,
+    checked_picture,
+    draw_evaluation,
+    made_folder,
+    write_counterexample,
+)
 from falsifier.cli.options import (
     PATH,
     budget_option,
@@ -44,6 +51,7 @@ from falsifier.views.text import broken_facts, evaluation_json, fact_lines
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
 
+_FORMAT = b'{\n  "format"'  # how a counterexample's file begins
 # What is printed: lines of text, and the content of the same as JSON.
 Told = tuple[list[str], dict[str, Any]]
 
@@ -157,12 +165,14 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
 
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
+    directory = None if store is not None and out is None else out or beside(case.file, "export")
+    if directory is not None:
+        made_folder(directory, holds=("counterexample.json", "start_values.json", "inputs.mat"))
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         if store is not None:
             say(str(Database(store).save(problem, case.stored)))
-        if store is None or out is not None:
-            directory = out or beside(case.file, "export")
+        if directory is not None:
             for path in export_counterexample(problem, case.stored, evaluation, directory):
                 say(str(path))
 
@@ -175,12 +185,15 @@ def _shrink(
     file = (
         beside(case.file, "shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
     )
-    begins = b'"time"' if case.is_miss else b'{\n  "format"'
-    check_out(file, beginnings=(begins,), kept=None if case.is_miss else case.file)
+    check_out(file, beginnings=(b'"time"' if case.is_miss else _FORMAT,), kept=case.file)
+    check_out(file.with_suffix(".json"), beginnings=(_FORMAT,), kept=case.file)
+    check_out(file.with_suffix(".npz"), beginnings=(b"PK",))
+    check_out(file.with_suffix(".png"), holds=DRAWN)
     with _loaded(case, rights) as problem:
+        original = case.simulated(problem)
         shrunk = shrink(
             problem,
-            case.simulated(problem),
+            original,
             budget=budget,
             at_most=at_most,
             progress=lambda simpler, n: warn(
@@ -211,10 +224,9 @@ def _shrink(
         "files": list(map(str, files)),
     }
     lines = [case.text] if case.is_miss else []
-    end = f"the budget of {counted(budget, 'simulation')} is used up"
-    if shrunk.minimal:
-        end = "no simpler one found nearby"
-    lines.append(f"{problem.name}: shrunk with {counted(shrunk.simulations, 'simulation')}; {end}")
+    end = "no simpler one found nearby" if shrunk.minimal else "the budget is used up"
+    done = "not shrunk" if in_one_line(found.candidate) == in_one_line(original.candidate) else "shrunk"
+    lines.append(f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}")
     if confirmation is not None:
         simpler = "this simpler input violates the requirement: " if case.is_miss else ""
         lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")

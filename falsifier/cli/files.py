@@ -10,10 +10,13 @@ from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.record.files import can_be_a_folder
 from falsifier.views.terminal import warn
 
 # File name extensions of pictures that users name.
 PICTURES = (".svg", ".png", ".pdf")
+# Which every picture names, as what has drawn it.
+DRAWN = b"Matplotlib"
 
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
@@ -30,8 +33,10 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
     return [data, *draw_evaluation(confirmation.problem, confirmation.evaluation, picture)]
 
 
-def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = None) -> None:
-    """Check that writing a file destroys no ``kept`` one, and only what has a beginning of its kind.
+def check_out(
+    path: Path, *, beginnings: tuple[bytes, ...] = (b"",), holds: bytes = b"", kept: Path | None = None
+) -> None:
+    """Check that writing a file destroys no ``kept`` one, and only what begins and holds what its kind does.
 
     Raises:
         SpecError: if something else is there.
@@ -40,23 +45,37 @@ def check_out(path: Path, *, beginnings: tuple[bytes, ...], kept: Path | None = 
         return
     if not path.is_file():
         raise SpecError(f"{path} is not a file that can be replaced: choose another name")
-    if kept is not None and path.samefile(kept):
+    if kept is not None and kept.exists() and path.samefile(kept):
         raise SpecError(f"{path} is the original, which is kept: choose another --out")
-    with path.open("rb") as file:
-        begins = file.read(max(map(len, beginnings)))
-    if begins and not begins.startswith(beginnings):
+    content = path.read_bytes()
+    if content and not (content.startswith(beginnings) and holds in content):
         raise SpecError(f"{path} exists and is not such a file: choose another name, or delete it")
+
+
+def made_folder(directory: Path, *, holds: tuple[str, ...]) -> None:
+    """Make a folder to write to; SpecError if it has files, but not those (``holds``) of an earlier run."""
+    with can_be_a_folder(directory):
+        directory.mkdir(parents=True, exist_ok=True)
+    if any(directory.iterdir()) and not all((directory / name).is_file() for name in holds):
+        raise SpecError(f"{directory} has other files, which are kept: choose a new directory with --out")
 
 
 def checked_picture(path: Path) -> Path:
     """Return the path of a picture to write.
 
     Raises:
-        SpecError: if its ending states no format that can be drawn, or its folder does not exist.
+        SpecError: if its ending states no format that can be drawn, its folder does not exist, or it exists
+            and was not drawn here.
     """
-    if path.suffix.lower() not in PICTURES:
-        raise SpecError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    check_ending(path, PICTURES)
+    check_out(path, holds=DRAWN)
     return in_existing_folder(path)
+
+
+def check_ending(path: Path, endings: tuple[str, ...]) -> None:
+    """Refuse a name that promises another kind of file; SpecError naming the endings that are right."""
+    if path.suffix.lower() not in endings:
+        raise SpecError(f"{path}: expected a file name that ends in {', '.join(endings)}")
 
 
 def in_existing_folder(path: Path) -> Path:

@@ -86,6 +86,8 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     if spec := next((f for f in fmus if f.suffix == ".toml"), None):
         command = f"falsifier check {shlex.quote(str(spec))}"
         raise SpecError(f"{spec} is a spec, not an FMU; to check it: {command}")
+    for nameless in (f for f in fmus if not f.name):  # "." and "/", beside which no spec can be named
+        _existing_fmu(nameless)
     path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
     in_existing_folder(path)
     if path.exists():

@@ -5,8 +5,11 @@ Results go to stdout; messages for people go to stderr through ``views.terminal`
 
 import json
 import os
+import re
+import shutil
 import signal
 import sys
+import textwrap
 from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
@@ -17,6 +20,7 @@ from falsifier.core.literals import plain
 from falsifier.views.terminal import warn
 
 INTERRUPTED = 130
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # Moving displays hide the cursor of the terminal.
 _SHOW_CURSOR = b"\x1b[?25h\n"
 
@@ -31,8 +35,12 @@ def say(text: str, *, nl: bool = True) -> None:
 
 
 def as_shown(text: str, content: object, *, as_json: bool) -> str:
-    """Return a result as text, or its content as JSON."""
-    return json.dumps(content, indent=2) if as_json else text
+    """Return a result as text, whose long facts are wrapped on a terminal, or its content as JSON."""
+    if as_json or not sys.stdout.isatty():
+        return json.dumps(content, indent=2) if as_json else text
+    wrapper = textwrap.TextWrapper(shutil.get_terminal_size().columns, subsequent_indent=" " * 17)
+    wrapper.break_long_words = wrapper.break_on_hyphens = False
+    return re.sub(r"(?m)^ {2}.{14} \S.*$", lambda fact: wrapper.fill(fact[0]), text)
 
 
 def conclude(text: str, code: int, *, nl: bool = True) -> NoReturn:
@@ -81,19 +89,21 @@ def drop(descriptor: int) -> None:
 
 
 def stop_at_interrupts() -> None:
-    """Let the first Ctrl-C stop the command in an orderly way, and the second one at once."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have it ignored
-        signal.signal(signal.SIGINT, _interrupt)
+    """Let the first Ctrl-C, or end of a job or session, stop the command in good order, the next at once."""
+    for number in _STOPPING:
+        if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):  # a shell may ignore it
+            signal.signal(number, _interrupt)
 
 
 def end_at_interrupts(code: int) -> None:
     """Let Ctrl-C end the program at once with this exit code, which is settled."""
-    if signal.getsignal(signal.SIGINT) in (_interrupt, _end):
-        signal.signal(signal.SIGINT, lambda _signal, _frame: os._exit(code))
+    for number in _STOPPING:
+        if signal.getsignal(number) in (_interrupt, _end):
+            signal.signal(number, lambda _signal, _frame: os._exit(code))
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
-    signal.signal(signal.SIGINT, _end)
+def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
+    signal.signal(number, _end)
     raise KeyboardInterrupt
 
 

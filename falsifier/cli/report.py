@@ -9,7 +9,7 @@ from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.analysis import load
 from falsifier.campaigns.archcomp import export
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import check_out, checked_picture, draw, in_existing_folder
+from falsifier.cli.files import check_ending, check_out, checked_picture, draw, in_existing_folder
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, say
 from falsifier.core.literals import csv_text
@@ -32,10 +32,7 @@ from falsifier.views.terminal import warn
     help="Also write every evaluation: inputs, robustness, critical time, status.",
 )
 @click.option(
-    "--arch-comp",
-    type=PATH,
-    metavar="FILE",
-    help="Also write a CSV file in the ARCH-COMP validation format.",
+    "--arch-comp", type=PATH, metavar="FILE", help="Also write a CSV file in the ARCH-COMP validation format."
 )
 def report(
     *,
@@ -53,12 +50,15 @@ def report(
     if others:
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
     path = out or (None if markdown else first / "report.html")
-    page = b"# " if markdown else b"<!DOCTYPE html>"
-    for file, begins in ((arch_comp, b"system,"), (csv_file, b"requirement,"), (path, page)):
+    page, kind = (b"# Falsification report: ", ".md") if markdown else (b"<!DOCTYPE html>", ".html")
+    outputs = ((arch_comp, b"system,", ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
+    for file, begins, ending in outputs:
         if file is not None and file.parent != first:  # whether that is a run is seen when it is read
             in_existing_folder(file)
         if file is not None and (file.is_file() or file.is_dir()):
             check_out(file, beginnings=(begins,))
+        if file is not None and file.suffix not in ("", ".txt", ".htm", ".markdown"):
+            check_ending(file, (ending,))
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
         warn(f"{arch_comp} written")

@@ -96,6 +96,7 @@ def run(
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
+    from falsifier.cli.files import check_out, in_existing_folder
     from falsifier.problem.loading import load_source
     from falsifier.record.run import falsify
     from falsifier.views.progress import log_fmu, make_display
@@ -105,8 +106,9 @@ def run(
     budget = read_budget(options, asks=llm is not None)
     logs = [log_fmu(fmu_log)] if fmu_log else []
     if fmu_log:
-        changes = source.changes.model_copy(update={"logging": True})
-        source = source.model_copy(update={"changes": changes})
+        if in_existing_folder(fmu_log).is_file() or fmu_log.is_dir():  # not: a stream such as /dev/stderr
+            check_out(fmu_log, beginnings=(b"simulation 1: ",))
+        source = source.model_copy(update={"changes": source.changes.model_copy(update={"logging": True})})
     sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources
     start_from = []
@@ -136,13 +138,7 @@ def run(
 @quiet_option
 @json_option
 def resume(
-    *,
-    directory: Path,
-    jobs: int,
-    budget: int | None,
-    totals: "Budget | None",
-    quiet: bool,
-    as_json: bool,
+    *, directory: Path, jobs: int, budget: int | None, totals: "Budget | None", quiet: bool, as_json: bool
 ) -> None:
     """Continue the run or campaign in DIRECTORY; no recorded simulation or question is repeated.
 
@@ -150,9 +146,10 @@ def resume(
     --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost include
     what was spent before.
     """
-    from falsifier.campaigns.directory import is_campaign, run_directories
+    from falsifier.campaigns.directory import is_campaign
     from falsifier.cli.campaign import resume_campaign
     from falsifier.record.run import resume as resume_run
+    from falsifier.record.run import runs_in
     from falsifier.views.progress import make_display
 
     if is_campaign(directory):
@@ -161,7 +158,7 @@ def resume(
         )
         resume_campaign(directory, jobs=jobs, limits=totals, quiet=quiet, as_json=as_json)
         return
-    places = run_directories(directory)
+    places = runs_in(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
         "--budget",

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.cli.command import command
-from falsifier.cli.files import draw_evaluation
+from falsifier.cli.files import check_out, draw_evaluation, made_folder
 from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
 from falsifier.cli.output import as_shown, conclude
 from falsifier.core.candidate import Candidate
@@ -23,9 +23,11 @@ from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.files import can_be_a_folder
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
+
+# What is written into a directory, beside a picture.
+_FILES = ("trajectory.csv", "input.csv")
 
 
 @command()
@@ -58,8 +60,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
                 "values; --inputs u.csv or --set NAME=VALUE gives some"
             )
         if out is not None:
-            with can_be_a_folder(out):
-                out.mkdir(parents=True, exist_ok=True)
+            made_folder(out, holds=_FILES)
+            for name in _FILES:
+                check_out(out / name, kept=place)
         evaluation = simulate_inputs(
             problem,
             signals,
@@ -134,6 +137,7 @@ def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path
     trajectory = evaluation.trajectory
     assert trajectory is not None, "what was judged has a trajectory"
     rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
-    files = [write_whole(out / "trajectory.csv", csv_text([["time", *trajectory.names], *rows]))]
-    files.append(write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model))
+    outputs, inputs = (out / name for name in _FILES)
+    files = [write_whole(outputs, csv_text([["time", *trajectory.names], *rows]))]
+    files.append(write_csv(input_table(problem, evaluation.candidate), inputs, problem.model))
     return [*files, *draw_evaluation(drawn, evaluation, out / "trajectory.png")]

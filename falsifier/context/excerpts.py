@@ -49,11 +49,7 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
 
 
 def of_source(
-    source: Source,
-    library: Sequence[Source],
-    seeds: Collection[str],
-    *,
-    is_named: bool = True,
+    source: Source, library: Sequence[Source], seeds: Collection[str], *, is_named: bool = True
 ) -> Readable:
     """Return the forms of a source; constants of one may be declared in another one of the library.
 

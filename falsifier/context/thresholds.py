@@ -58,12 +58,7 @@ class Threshold:
 
 
 def thresholds(
-    text: str,
-    constants: Mapping[str, str],
-    place: str,
-    *,
-    is_dotted: bool = False,
-    has_lines: bool = False,
+    text: str, constants: Mapping[str, str], place: str, *, is_dotted: bool = False, has_lines: bool = False
 ) -> Iterator[Threshold]:
     """Return the comparisons of variables with numbers or named constants.
 

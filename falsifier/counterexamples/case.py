@@ -180,6 +180,7 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     if not misses:
         raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
     robustness, candidate = min(misses, key=lambda pair: pair[0])
+    manifest.check_in_sight(directory, described.request.problems)
     return Case(
         directory / file_of(name if described.shared else ""),
         candidate,

@@ -24,7 +24,7 @@ from falsifier.counterexamples.simplicity import rest_value
 from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, in_words
-from falsifier.stl.margins import is_on_limit, margin_words, shown, signed
+from falsifier.stl.margins import is_on_limit, margin_words, signed
 
 # Maximum number of stretches of one signal that are reset one at a time; the longest are chosen.
 _MAX_STRETCHES = 12
@@ -83,7 +83,7 @@ class Explanation:
         verdict, robustness = self.evaluation.verdict, self.diagnosis.robustness
         named = "robustness, the margin by which it holds"
         if verdict is None or verdict.breach is None:
-            found = f"It is not violated here; {shown(robustness):.5g} is missing to a violation ({named})"
+            found = f"It is not violated here: the {named}, is {signed(robustness)}"
             if is_on_limit(robustness):
                 found = f"It {margin_words(robustness, str(self.diagnosis.path[-1].formula))}"
             yield f"{found}: {self.diagnosis.text}"
@@ -91,7 +91,7 @@ class Explanation:
         yield f"What broke: {verdict.breach.text}."
         decided = f"decided by {verdict.predicate} at {verdict.critical_time:.5g} s"
         limit = f": {margin_words(robustness, verdict.predicate)}" if is_on_limit(robustness) else ""
-        yield f"The {named}, is {signed(robustness, 5)}, {decided}{limit}."
+        yield f"The {named}, is {signed(robustness)}, {decided}{limit}."
         yield from (vacuity.text for vacuity in self.diagnosis.vacuities)
 
     def _tried(self) -> Iterator[str]:

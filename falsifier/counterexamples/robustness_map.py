@@ -18,6 +18,7 @@ from falsifier.counterexamples.shrink import stretches, with_parameter, with_sig
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import signed
 
 # Simulations of a map, and the share of them on its grid.
 BUDGET = 700
@@ -112,8 +113,8 @@ class RobustnessMap:
         tried = f"{changes} of up to {_percent(self.radius)} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
-        least = "" if self.smallest is None else f"; the smallest robustness is {self.smallest:+.4g}"
-        return f"{found}{least}, without a change it is {self.original:+.4g}. {self._followed}"
+        least = "" if self.smallest is None else f"; the smallest robustness is {signed(self.smallest)}"
+        return f"{found}{least}, without a change it is {signed(self.original)}. {self._followed}"
 
     @property
     def _followed(self) -> str:
@@ -125,12 +126,7 @@ class RobustnessMap:
 
 
 def robustness_map(
-    problem: Problem,
-    evaluation: Evaluation,
-    *,
-    radius: float = 0.05,
-    budget: int = BUDGET,
-    seed: int = 0,
+    problem: Problem, evaluation: Evaluation, *, radius: float = 0.05, budget: int = BUDGET, seed: int = 0
 ) -> RobustnessMap:
     """Simulate around a counterexample or a near miss.
 
@@ -208,10 +204,7 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
 
 
 def _robustness(
-    problem: Problem,
-    candidate: Candidate,
-    coordinates: Sequence[Coordinate],
-    values: NDArray[np.float64],
+    problem: Problem, candidate: Candidate, coordinates: Sequence[Coordinate], values: NDArray[np.float64]
 ) -> float:
     changed = candidate
     for c, value in zip(coordinates, values.tolist(), strict=True):

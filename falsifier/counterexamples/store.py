@@ -108,10 +108,7 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
 
 
 def _content(
-    requirement: RequirementRecord,
-    source: ProblemSource | None,
-    evaluation: Evaluation,
-    **recorded: Any,
+    requirement: RequirementRecord, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
 ) -> StoredCounterexample:
     verdict = evaluation.verdict
     if verdict is None:
@@ -202,6 +199,7 @@ def counterexample_file(path: Path) -> Path:
         "in its runs/)"
     )
     if not holds_run(path):
+        manifest.check_no_folder(path)
         raise SpecError(f"not a run directory; {expected}", file=str(path))
     raise SpecError(
         f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that found "

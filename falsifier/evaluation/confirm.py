@@ -75,19 +75,22 @@ class _Opinion:
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
     fresh = _repeat(problem, evaluation.candidate)
+    first, again = signed(evaluation.robustness), signed(fresh.robustness)
+    differs = f"equal inputs give different outputs: the robustness was {first} when it was found; "
+    # As far as it is shown: some solvers keep a step size from the simulation before.
+    differs = "" if fresh.robustness is None or first == again else differs
     found = Confirmation(
         problem=problem,
         evaluation=evaluation,
         outcome="refuted",
         robustness=fresh.robustness,
         reference=fresh.reference,
-        reason=f"the second simulation {fresh.doubt}",
+        reason=f"{differs}the second simulation {fresh.doubt}",
     )
     if fresh.doubt:
         return found
     reason = (
-        f"a fresh simulation gives {signed(fresh.robustness)}, the second monitor (rtamt) "
-        f"{signed(fresh.reference)}"
+        f"{differs}a fresh simulation gives {again}, the second monitor (rtamt) {signed(fresh.reference)}"
     )
     finer = half_step(problem)
     halved = _repeat(finer, evaluation.candidate, known=fresh)

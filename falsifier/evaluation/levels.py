@@ -100,11 +100,7 @@ class Climb:
     _rises: defaultdict[str, set[tuple[int, int]]] = field(default_factory=lambda: defaultdict(set))
 
     def add(
-        self,
-        number: int,
-        verdict: Verdict,
-        trajectory: Trajectory | None,
-        predicates: Sequence[Predicate],
+        self, number: int, verdict: Verdict, trajectory: Trajectory | None, predicates: Sequence[Predicate]
     ) -> None:
         """Add a simulation.
 

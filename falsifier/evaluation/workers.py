@@ -162,7 +162,7 @@ def _start_silent_tracker() -> None:
 
 
 def _prepare_worker(log_level: int, ending: _End) -> None:
-    """Make a worker end with its parent, however that ends, and ignore Ctrl-C, which the parent handles.
+    """Make a worker end with its parent, however that ends, and leave signals such as Ctrl-C to it.
 
     Args:
         log_level: the parent's level of the logger for simulations.
@@ -175,7 +175,8 @@ def _prepare_worker(log_level: int, ending: _End) -> None:
     from threading import Thread
 
     logging.getLogger(_FMU_LOGGER).setLevel(log_level)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     parent = parent_process()
     if parent is None:
         return

@@ -131,12 +131,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
 
 
 def classify(
-    error: Exception,
-    *,
-    llm: str,
-    api_base: str | None,
-    secrets: Iterable[str],
-    options: Iterable[str] = (),
+    error: Exception, *, llm: str, api_base: str | None, secrets: Iterable[str], options: Iterable[str] = ()
 ) -> ChatError:
     """Translate what the client library raised into an error of this package, without secrets.
 

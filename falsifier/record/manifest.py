@@ -2,7 +2,7 @@
 
 import platform
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from functools import cache
 from hashlib import sha256
@@ -21,7 +21,7 @@ from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.source import Parameterization
+from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
 from falsifier.search.parameterization import parameterization_of, searched_space
 from falsifier.search.request import RunRequest, Strict
@@ -146,7 +146,25 @@ def read(directory: Path) -> Manifest:
     Raises:
         JournalError: if there is none, or it is invalid.
     """
+    check_no_folder(directory)
     return read_sealed(directory / MANIFEST, Manifest, what="run")
+
+
+def check_no_folder(directory: Path) -> None:
+    """Refuse a folder of runs where one run is expected; JournalError naming the runs."""
+    below = sorted(str(path.parent) for path in directory.glob(f"*/{MANIFEST}"))
+    if below and not (directory / MANIFEST).exists():
+        raise JournalError(f"{directory} is a folder of runs; give one of them: {', '.join(below)}")
+
+
+def check_in_sight(directory: Path, sources: Iterable[ProblemSource]) -> None:
+    """Check that the files of recorded problems exist; JournalError saying where they are relative to."""
+    for source in sources:
+        if source.parts.file and not Path(source.parts.file).exists():
+            raise JournalError(
+                f"{directory}: started with {source.parts.file}, which does not exist seen from this folder: "
+                "change to the folder in which it was started, and name its directory from there"
+            )
 
 
 def write(directory: Path, manifest: Manifest) -> None:

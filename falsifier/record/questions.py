@@ -10,13 +10,7 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
-from falsifier.record.records import (
-    AskedRecord,
-    ConfirmedRecord,
-    EvaluatedRecord,
-    ExchangeRecord,
-    Record,
-)
+from falsifier.record.records import AskedRecord, ConfirmedRecord, EvaluatedRecord, ExchangeRecord, Record
 from falsifier.stl.margins import signed
 
 

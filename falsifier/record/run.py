@@ -23,7 +23,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.files import CAMPAIGN
 from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
-from falsifier.record.records import EvaluatedRecord
+from falsifier.record.records import EndedRecord, EvaluatedRecord
 from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
@@ -164,7 +164,7 @@ def resume(
     """Continue a recorded run; nothing that is recorded is simulated or asked again.
 
     Args:
-        directory: run directory, or a folder of run directories, which are continued one after the other.
+        directory: run directory, or a folder of runs of one spec, which are continued one after the other.
         problems: what is searched, if it was made in Python: the problems of all these runs.
         engine: the engine, if it was made in Python: a new instance in its initial state.
         chat: chat with the language model, if it was made in Python.
@@ -186,10 +186,10 @@ def resume(
     for problem in problems:
         instance("problems", problem, Problem, "a list of Problem")
     directory = path_of("directory", directory, "the directory of a run")
-    places = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
+    places = runs_in(directory)
     by_name = {problem.name: problem for problem in problems}
     results: list[Result] = []
-    for place in places or [directory]:
+    for place in places:
         described = manifest.read(place)
         request = described.request
         if budget is not None:
@@ -203,6 +203,7 @@ def resume(
                 f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
             )
         if not problems:
+            manifest.check_in_sight(place, request.problems)
             loaded = load_sources(request.problems)
         elif by_name.keys() >= set(described.names):
             loaded = [by_name[name] for name in described.names]
@@ -214,6 +215,14 @@ def resume(
             request, loaded, place, engine=engine, chat=chat, listeners=listeners, resume=True
         )
     return results
+
+
+def runs_in(directory: Path) -> list[Path]:
+    """Return a run directory, or those in a folder; JournalError if they are not of one spec and its FMUs."""
+    found = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
+    if any(manifest.read(place).hashes != manifest.read(found[0]).hashes for place in found):
+        manifest.check_no_folder(directory)
+    return found or [directory]
 
 
 class StopFile:
@@ -292,7 +301,9 @@ def carry_out(
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             if recorded is None:
                 manifest.write(directory, described)
-            elif recorded.request.budget != request.budget:
+            elif recorded.request.budget != request.budget and not any(
+                isinstance(r, EndedRecord) and r.status == "falsified" for r in journal.records
+            ):  # otherwise nothing is left to search with another one
                 manifest.write(directory, recorded.model_copy(update={"request": request}))
             steps = replayed(directory, journal.records, steps)
             stop = directory / STOP

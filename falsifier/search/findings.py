@@ -107,8 +107,7 @@ def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
     remedy = _remedy(problem, coarse, limits)
     return Finding(
-        kind="parameterization",
-        text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}.",
+        kind="parameterization", text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}."
     )
 
 
@@ -130,7 +129,9 @@ def _remedy(problem: Problem, coarse: Sequence[InputRange], limits: FreeSection)
     source, own = problem.source, {r.name: r for r in problem.space.inputs}
     if any(own[r.name].free for r in coarse):
         return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
-    if source is not None and source.parameterization == "fixed":
+    stated = {} if source is None else source.changes.inputs
+    points = any(r.name in stated and stated[r.name].control_points for r in coarse)
+    if source is not None and source.parameterization == "fixed" and not points:
         return "--parameterization free"
     count, shortest = limits.max_control_points, limits.min_interval
     if source is None or source.parts.kind == "python":

@@ -186,9 +186,13 @@ class _Loop:
         return "all requirements are falsified"
 
     def limit_reached(self) -> str | None:
-        """Which limit is reached, in words. The record of a run is repeated even if its time is used up."""
+        """Which limit is reached, in words.
+
+        The record of a run is repeated even if its time is used up, and one simulation made even if the start
+        took all of it; a language model is not asked then.
+        """
         spent = self.clock()
-        if self.count < self.steps.replayed:
+        if self.count < max(self.steps.replayed, not self.asks_llm):
             spent = replace(spent, seconds=0.0)
         return self.budget.exceeded(spent)
 
@@ -258,10 +262,7 @@ class _Loop:
         self.waiting.extend((state, wait) for wait in started)
 
     def settle(
-        self,
-        asked: RequirementState,
-        wait: Callable[[], Evaluation],
-        standing: Sequence[RequirementState],
+        self, asked: RequirementState, wait: Callable[[], Evaluation], standing: Sequence[RequirementState]
     ) -> None:
         """Wait for the oldest simulation, judge it against each requirement not yet falsified, and count it.
 

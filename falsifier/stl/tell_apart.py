@@ -1,6 +1,6 @@
 """Trajectories that tell two formulas apart: one of them satisfies a formula and violates the other."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 
 import numpy as np
@@ -46,24 +46,46 @@ def tell_apart(
         FormulaError: if a formula does not fit the time grid.
     """
     formulas = (satisfied, violated)
-    names = list(dict.fromkeys(name for f in formulas for name in f.signals))
     wanted, unwanted = (Monitor(f, step, samples) for f in formulas)
-    levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
-    moments = _moments(formulas, step, samples)
-    rng = np.random.default_rng(seed)
-    for switches, count in ((s, c) for s in range(_ROUNDS) for c in _batches(samples)):
-        cuts = {n: rng.choice(moments, size=(count, switches)) for n in names}
-        columns = {n: _steps(rng, levels[n], cuts[n], samples) for n in names}
+    for cuts, columns in _random(formulas, step, samples, ranges, seed):
         kept, broken = _robustness(wanted, columns), -_robustness(unwanted, columns)
         valid = np.flatnonzero((kept >= 0) & (broken > 0))
         if len(valid):
             # Long pieces first: a spike of one sample tells readers little.
-            shortest = np.min([_shortest(cuts[n][valid], samples) for n in names], axis=0)
+            shortest = np.min([_shortest(c[valid], samples) for c in cuts.values()], axis=0)
             margin = np.minimum(kept, broken)[valid]
             best = int(valid[np.lexsort((margin, shortest, margin > 0))[-1]])
             times = np.linspace(0.0, step * (samples - 1), samples)
             return Trajectory(times, {n: column[best].copy() for n, column in columns.items()})
     return None
+
+
+def differences(
+    first: Formula, second: Formula, *, step: float, samples: int, ranges: Mapping[str, Interval]
+) -> set[int]:
+    """Return which signs the first formula's robustness less the second's has; empty: none but 0 was found.
+
+    The arguments are those of ``tell_apart``.
+    """
+    one, other = (Monitor(f, step, samples) for f in (first, second))
+    found: set[int] = set()
+    for _, columns in _random((first, second), step, samples, ranges, 0):
+        signs = np.sign(_robustness(one, columns) - _robustness(other, columns))
+        found |= {int(sign) for sign in signs[np.isfinite(signs) & (signs != 0)]}
+    return found
+
+
+def _random(
+    formulas: tuple[Formula, ...], step: float, samples: int, ranges: Mapping[str, Interval], seed: int
+) -> Iterator[tuple[dict[str, NDArray[np.int64]], dict[str, Floats]]]:
+    """Yield random trajectories, each signal of shape (m, samples), and the samples where they change."""
+    names = list(dict.fromkeys(name for f in formulas for name in f.signals))
+    levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
+    moments = _moments(formulas, step, samples)
+    rng = np.random.default_rng(seed)
+    for switches, count in ((s, c) for s in range(_ROUNDS) for c in _batches(samples)):
+        cuts = {n: rng.choice(moments, size=(count, switches)) for n in names}
+        yield cuts, {n: _steps(rng, levels[n], cuts[n], samples) for n in names}
 
 
 def _batches(samples: int) -> list[int]:

@@ -23,7 +23,7 @@ def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     console = error_console()
 
     def write(text: str) -> None:
-        console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+        console.print(one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal)
 
     if quiet:
         yield lambda progress: None
@@ -62,7 +62,7 @@ class Scoreboard:
 
 def run_line(run: RunProgress) -> str:
     """Describe an ended run in one line."""
-    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness, 4)}"
+    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness)}"
     count = run.spent.simulations_text
     reason = f": {run.reason}" if run.status == "failed" else ""
     return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"

@@ -47,10 +47,7 @@ def problem_html(problem: Problem) -> str:
         ("requirement", el("code", str(requirement.formula))),
         ("in words", requirement.description or in_words(requirement.formula)),
         ("model", ": ".join(part for part in (problem.info.name, problem.info.description) if part)),
-        (
-            "simulated",
-            f"for {experiment.stop_time:g} s, recorded every {experiment.output_interval:g} s",
-        ),
+        ("simulated", f"for {experiment.stop_time:g} s, recorded every {experiment.output_interval:g} s"),
         *((f"fixed {name}", f"{value:g}") for name, value in problem.parameters.items()),
     ]
     header = ("searched", "unit", "range", "control points", "description")

@@ -76,7 +76,9 @@ def progress() -> Listener:
 
 
 def _writer(console: "Console") -> Callable[[str], None]:
-    return lambda text: console.print(one_line(text), highlight=False, markup=False, soft_wrap=True)
+    return lambda text: console.print(
+        one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal
+    )
 
 
 def _show_in_notebook(line: "_Line") -> None:
@@ -189,7 +191,7 @@ class News:
             if verdict is None or verdict.robustness >= self._least.get(name, inf):
                 continue
             self._least[name] = verdict.robustness
-            text = f"best robustness {signed(verdict.robustness, 5)} at t = {verdict.critical_time:.5g} s"
+            text = f"best robustness {signed(verdict.robustness)} at t = {verdict.critical_time:.5g} s"
             if self._is_new(f"{name}: {text}"):
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)
@@ -219,11 +221,11 @@ class News:
 
 
 def log_fmu(path: Path) -> Listener:
-    """Make a listener that writes the FMU's messages of each simulation to a file, which it replaces."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("", encoding="utf-8")
+    """Make a listener that writes the FMU's messages of each simulation to a file, which a run replaces."""
 
     def append(event: Event) -> None:
+        if isinstance(event, RunStarted):
+            path.write_text("", encoding="utf-8")
         if isinstance(event, Evaluated):
             evaluation = event.evaluation
             why = "" if evaluation.status == "ok" else f": {evaluation.reason}"

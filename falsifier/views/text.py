@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
+from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted
 from falsifier.counterexamples.store import file_of
@@ -96,8 +97,8 @@ def results_text(results: Sequence[Result]) -> str:
     held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
     lines += [f"not searched: {text}" for text in held if text]
     falsified = sum(result.counterexample is not None for result in results)
-    total = max((result.spent for result in results), key=lambda spent: (spent.simulations, spent.seconds))
-    lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(total)})")
+    spent = spent_together((result.directory, result.spent) for result in results)
+    lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(spent)})")
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
         lines.append(_continue_line(results[0].directory))

@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.analyses.margin import margin
+from falsifier.analyses.margin import Margin, margin
 from falsifier.errors import SimulationError, SpecError
 from falsifier.problem.problem import Problem
 from falsifier.testing import BIAS, lag_problem
@@ -30,6 +30,48 @@ def test_ends_of_the_range_are_said_to_be_so() -> None:
     nothing = margin(system(), "G[0,10] (x <= {limit})", (1.5, 3), engine="corners", budget=40)
     assert (nothing.falsified, nothing.unfalsified) == (None, 1.5)
     assert "not even at 1.5" in nothing.text
+    assert nothing.simulations == 40  # what is left is spent at the easy end before this is said
+
+
+def test_a_threshold_that_decides_nothing_here_is_searched_all_the_same() -> None:
+    implied = "(G[0,10] (u >= 2)) -> (G[0,10] (x <= {limit}))"
+    found = margin(lag_problem(), implied, (0, 3), engine="corners", budget=20)
+    assert (found.falsified, found.unfalsified, found.simulations) == (None, 0, 20)
+
+
+def test_thresholds_are_exactly_those_that_are_shown() -> None:
+    found = margin(system(), "G[0,10] (x <= {limit})", (-3, 3), engine="uniform", budget=60)
+    assert found.falsified is not None and found.unfalsified is not None
+    for threshold in (found.falsified, found.unfalsified):
+        assert f" at {threshold:.4f}".rstrip("0") in found.text
+        assert threshold == round(threshold, 4)
+    assert found.falsified < 1 and found.falsified < found.unfalsified
+
+
+def test_what_was_searched_in_vain_is_not_named_after_another_search_has_reached_it() -> None:
+    def at(seed: int) -> Margin:
+        return margin(system(), "G[0,10] (x <= {limit})", (0.5, 0.9), engine="uniform", budget=20, seed=seed)
+
+    found = [at(seed) for seed in range(12)]
+    overtaken = [f for f in found if f.searches[0] == (0.9, False) and f.falsified == 0.9]
+    assert overtaken and all(f.unfalsified is None for f in overtaken)
+
+
+def test_thresholds_in_windows_fit_the_time_grid() -> None:
+    problem = lag_problem()
+    found = margin(problem, "G[0,{limit}] (x <= 0.5)", (0.1, 8), engine="corners", budget=40)
+    assert found.falsified is not None and found.unfalsified is not None
+    assert found.unfalsified < found.falsified
+    for threshold in (found.falsified, found.unfalsified):
+        steps = threshold / problem.experiment.output_interval
+        assert steps == pytest.approx(round(steps))
+
+
+def test_templates_are_taken_like_formulas() -> None:
+    found = margin(
+        system(), "stays_within signal=x low=-3 high={limit}", (-3, 3), engine="corners", budget=60
+    )
+    assert found.falsified is not None and found.falsified <= 1.0
 
 
 def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
@@ -45,11 +87,19 @@ def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
         ("G[0,10] (x <= 1)", (0, 1), "in place of the threshold"),
         ("G[0,10] (x <= {limit})", (1, 0), "LOW < HIGH"),
         ("G[0,10] (x <= {limit} - {limit})", (0, 1), "robustness is the same"),
+        ("G[0,10] (abs(x - {limit}) <= 1)", (0, 1), "changes in either direction"),
+        ("G[0,10] (x <= {limit}", (0, 1), r"vary: expected '\)' before the end"),
+        ("G[0,{limit}] (x <= 1)", (5, 50), "vary: .*50"),
     ],
 )
 def test_wrong_questions_are_refused(vary: str, between: tuple[float, float], said: str) -> None:
     with pytest.raises(SpecError, match=said):
         margin(system(), vary, between, engine="corners")
+
+
+def test_an_engine_that_needs_a_language_model_is_refused() -> None:
+    with pytest.raises(SpecError, match="needs a language model"):
+        margin(system(), "G[0,10] (x <= {limit})", (0, 1), engine="hybrid")
 
 
 def test_a_model_that_fails_is_an_error() -> None:

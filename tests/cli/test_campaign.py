@@ -27,6 +27,24 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
 
+def test_tables_of_language_models_need_one(command: Any) -> None:
+    refused = bench(command, "--table", "llms")
+    assert (refused.exit_code, "--table llms: shows language models" in refused.output) == (2, True)
+
+
+def test_a_table_that_is_too_wide_for_the_terminal_shows_the_columns_that_fit(
+    command: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = bench(command, "--out", "c", "--quiet").stdout.splitlines()
+    monkeypatch.setattr("click.testing._NamedTextIOWrapper.isatty", lambda _: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    cut = command("resume", "c", "--quiet")
+    lines = cut.stdout.splitlines()
+    assert max(map(len, lines[:5])) <= 60 < max(map(len, whole[:5]))
+    assert whole[2].startswith(lines[2])
+    assert "too wide for this terminal: " in cut.stderr and "; in c/table-main.md" in cut.stderr
+
+
 def test_json_is_alone_on_stdout(command: Any) -> None:
     result = bench(command, "--json", "--quiet")
     assert [row["label"] for row in json.loads(result.stdout)] == ["uniform", "uniform"]
@@ -45,6 +63,12 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
     assert missing.stderr == "" and not (tmp_path / "d").exists(), "nothing was announced or written"
     useless = command(*asked, "--context", "a.c", "--engine", "uniform", "--out", "e")
     assert "--context: applies to language models and" in f"{useless.stderr} {useless.exception}"
+
+
+def test_a_limit_that_is_reached_by_a_complete_campaign_stops_nothing(command: Any) -> None:
+    assert bench(command, "--out", "c").exit_code == 0
+    again = command("resume", "c", "--total", "simulations=5", "--quiet")
+    assert (again.exit_code, "to continue" in again.stderr) == (0, False), again.output
 
 
 def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["explain", "run", "--map", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["replay", "gone.json"], "no such file"),
-        (["export", "."], "not a run directory"),
+        (["export", "."], ". is a folder of runs; give one of them: run"),
         (["explain", "run/manifest.json"], "not a counterexample file"),
         (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["report", "run", "--out", "gone/x.html"], "gone/x.html: no such folder gone"),
@@ -155,6 +155,15 @@ def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+def test_what_cannot_be_shrunk_is_not_called_shrunk(tmp_path: Path) -> None:
+    assert run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
+    done = run(tmp_path, "explain", "run", "--shrink")  # the corner has been full throttle and no brake
+    assert "AT1: not shrunk with " in done.out and "; no simpler one found nearby" in done.out
+    text = run(tmp_path, "report", "run", "--markdown").out
+    assert "The counterexample, of which no simpler one was found nearby:" in text
+    assert "To explain it: `falsifier explain run`" in text
+
+
 def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:
     for name in ("AT1", "AT2"):
         assert run(together, "export", f"run/counterexample-{name}.json").code == 0
@@ -165,6 +174,11 @@ def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
     own = folder / "keep.fmu"
     own.write_bytes(b"PK mine")
+    (folder / "s.png").write_bytes(b"\x89PNG mine")
+    (folder / "my.toml").write_text("# AT\n")
+    (folder / "others").mkdir()
+    (folder / "others" / "input.csv").write_text("mine")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     for arguments, why in (
         (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is not such a file"),
         (
@@ -174,10 +188,17 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
         (["report", "run", "--csv", "keep.fmu"], "exists and is not such a file"),
+        (["report", "run", "--markdown", "--out", "my.toml"], "exists and is not such a file"),
+        (["report", "run", "--markdown", "--out", "x.png"], "x.png: expected a file name that ends in .md"),
+        (["explain", "run", "--shrink", "--out", "s.json"], "s.png exists and is not such a file"),
+        (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is not such a file"),
+        (["export", "run", "--out", "run"], "run has other files, which are kept"),
+        (["export", "run", "--out", "others"], "others has other files, which are kept"),
     ):
         done = run(folder, *arguments)
         assert (done.code, why in done.err) == (2, True), done.err
-    assert own.read_bytes() == b"PK mine"
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+    assert [run(folder, "export", "run", "--out", "again").code for _ in range(2)] == [0, 0]
     assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]
 
 

@@ -47,6 +47,12 @@ def test_info_takes_a_bundled_requirement_or_a_spec_for_its_fmu(tmp_path: Path) 
     assert spec == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
 
 
+@pytest.mark.parametrize("given", [["."], ["/"], [".", "car.fmu"]])
+def test_init_refuses_folders(tmp_path: Path, given: list[str]) -> None:
+    done = falsifier("init", *given, cwd=tmp_path)
+    assert (done.code, f"{given[0]} is a folder; expected the path of an FMU" in done.err) == (2, True)
+
+
 def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path: Path) -> None:
     shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "car.fmu")
     assert falsifier("init", "car.fmu", cwd=tmp_path).code == 0

@@ -1,3 +1,4 @@
+import json
 import os
 import signal
 import subprocess
@@ -6,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import as_shown, conclude, say
+from falsifier.views.text import fact_lines
 from tests.command import ROOT, listen_to_interrupts
 
 
@@ -27,6 +29,21 @@ def test_a_result_that_cannot_be_printed_keeps_its_code(
     monkeypatch.undo()
     assert end.value.code == 1
     assert "the result cannot be printed: No space left" in capsys.readouterr().err
+
+
+def test_long_facts_are_wrapped_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "\n".join(
+        ["AT1: falsified", *fact_lines([("confirmed", "a well-known cause " * 6), ("gear", "4")])]
+    )
+    assert as_shown(text, {}, as_json=False) == text
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "60")
+    first, *facts, last = as_shown(text, {}, as_json=False).splitlines()
+    assert (first, last) == ("AT1: falsified", "  gear           4")
+    assert facts[0].startswith("  confirmed      a well-known cause")
+    assert len(facts) > 2 and max(map(len, facts)) <= 60
+    assert all(line.startswith(" " * 17 + "a well-known") or line[17] != " " for line in facts)
+    assert json.loads(as_shown(text, {"a": "b " * 90}, as_json=True)) == {"a": "b " * 90}
 
 
 # A command that takes the first Ctrl-C badly: it goes on for a minute.
@@ -74,13 +91,14 @@ def started(code: str) -> "subprocess.Popen[str]":
     )
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(("code", "interrupts", "ends_with"), [(STUBBORN, 2, 130), (ENDED, 1, 1)])
-def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int) -> None:
+def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int, number: int) -> None:
     process = started(code)
     assert process.stdout is not None
     for _ in range(interrupts):
         process.stdout.readline()
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
     _, err = process.communicate(timeout=50)
     assert (process.returncode, err) == (ends_with, "")
 

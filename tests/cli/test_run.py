@@ -1,5 +1,6 @@
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -135,6 +136,7 @@ def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
 def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
     search = ("--search", "u=4.9:10:1", "--budget", "8", "--engine", "uniform")
     arguments = ("--stl", "G[0,10] (y <= 100)", *search)
+    (tmp_path / "logs").mkdir()
     done = falsifier("run", str(fixture("Silent_2")), *arguments, "--fmu-log", "logs/fmu.txt", cwd=tmp_path)
     assert done.code == 3, done.out
     assert re.search(r"stl: failed after 8 simulations, \d of them failed", done.out)
@@ -142,6 +144,53 @@ def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) ->
     log = (tmp_path / "logs" / "fmu.txt").read_text()
     assert log.count("simulation ") == 8
     assert "  error: the solver did not converge: the valve is open too far" in log
+
+
+SEVERAL = """
+model = { fmu = 'AT.fmu', interface = 'co-simulation' }
+inputs.throttle = { range = [0, 100], control_points = 2 }
+requirements.A.formula = 'G[0,10] (speed <= 200)'
+requirements.B = { formula = 'G[0,10] (speed <= 200)', stop_time = 12.0 }
+"""
+
+
+def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
+    work = tmp_path / "work"
+    work.mkdir()
+    shutil.copy(bundled("fmus") / "AT.fmu", work)
+    (work / "several.toml").write_text(SEVERAL)
+    done = falsifier("run", "several.toml", "--budget", "1", "--quiet", "--out", "runs", cwd=work)
+    assert done.code == 0, done.err
+    for command in ("explain", "replay", "export", "coverage", "assess"):
+        refused = falsifier(command, "runs", cwd=work)
+        assert refused.code == 2
+        assert "runs is a folder of runs; give one of them: runs/A, runs/B" in refused.err
+    assert falsifier("resume", "runs", "--budget", "2", "--quiet", cwd=work).code == 0
+    falsify("AT1", "corners", budget=1, directory=work / "other")
+    shutil.copytree(work / "runs" / "A", work / "A")
+    refused = falsifier("resume", ".", cwd=work)
+    assert (refused.code, "is a folder of runs; give one of them: A, other" in refused.err) == (2, True)
+    elsewhere = falsifier("resume", "work/runs/A", cwd=tmp_path)
+    assert elsewhere.code == 2
+    assert "started with several.toml, which does not exist seen from this folder" in elsewhere.err
+
+
+def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) -> None:
+    arguments = ("run", "AT1", "--budget", "1", "--quiet", "--fmu-log")
+    own = tmp_path / "my.fmu"
+    own.write_bytes(b"PK mine")
+    refused = falsifier(*arguments, "my.fmu", cwd=tmp_path)
+    assert (refused.code, own.read_bytes()) == (2, b"PK mine")
+    assert "my.fmu exists and is not such a file: choose another name" in refused.err
+    refused = falsifier(*arguments, "gone/log", cwd=tmp_path)
+    assert (refused.code, "no such folder gone" in refused.err) == (2, True)
+    assert {path.name for path in tmp_path.iterdir()} == {"my.fmu"}
+    assert [falsifier(*arguments, "log", cwd=tmp_path).code for _ in range(2)] == [0, 0]
+    log = (tmp_path / "log").read_text()
+    assert log.count("simulation ") == 1
+    assert "simulation 1: ok" in falsifier(*arguments, "/dev/stderr", cwd=tmp_path).err
+    assert falsifier(*arguments, "log", "--stl", "G[0,20] (nowhere < 3)", cwd=tmp_path).code == 2
+    assert (tmp_path / "log").read_text() == log
 
 
 def test_the_option_that_is_advised_finds_what_slow_inputs_cannot_express(tmp_path: Path) -> None:

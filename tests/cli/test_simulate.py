@@ -38,6 +38,21 @@ def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path)
     assert (tmp_path / "out" / "trajectory.png").is_file()
 
 
+def test_own_files_in_the_directory_are_kept(tmp_path: Path) -> None:
+    own = tmp_path / "input.csv"
+    own.write_text("time,u\n0,1\n10,1\n")
+    (tmp_path / "o").mkdir()
+    (tmp_path / "o" / "trajectory.csv").write_text("mine")
+    for out in (".", "o"):
+        done = falsifier("simulate", EASY, "--inputs", "input.csv", "--out", out, cwd=tmp_path)
+        assert (done.code, f"{out} has other files, which are kept" in done.err) == (2, True), done.err
+    assert own.read_text().startswith("time,u") and (tmp_path / "o" / "trajectory.csv").read_text() == "mine"
+    for _ in range(2):
+        assert falsifier("simulate", EASY, "--inputs", "input.csv", "--out", "p", cwd=tmp_path).code == 1
+    kept = falsifier("simulate", EASY, "--inputs", "p/input.csv", "--out", "p", cwd=tmp_path)
+    assert (kept.code, "p/input.csv is the original, which is kept" in kept.err) == (2, True), kept.err
+
+
 def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:
     lag = fixture("Lag_2")
     (tmp_path / "lag.toml").write_text(f"""

@@ -94,7 +94,7 @@ def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> 
     candidate = problem.space.decode([1.0] * 4 + [-0.5] * 4)
     found = explain(problem, evaluate(problem, candidate))
     assert not found.violated
-    assert "It is not violated here; " in found.text
+    assert "It is not violated here: the robustness, the margin by which it holds, is +" in found.text
     assert "With u at rest (0 V) alone: +2, farther from a violation." in found.text
     assert "With v at rest (0 V) alone: +1, nearer to one." in found.text
     assert "counterexample" not in found.text

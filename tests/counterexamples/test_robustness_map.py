@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.stl.margins import on_limit
 from falsifier.testing import lag_problem
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
@@ -38,6 +41,12 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     u, x0 = found.influences
     assert u < -0.99 and abs(x0) < 0.3
     assert f"the robustness follows u [V] ({u:+.2f}) and x0 ({x0:+.2f}) most (rank correlation)" in found.text
+
+
+def test_a_margin_of_nothing_is_shown_as_everywhere_else() -> None:
+    found = robustness_map(problem(), at(problem(), 0.54, 0.0), budget=20)
+    on = replace(found, original=on_limit("<="), robustness=np.full(20, on_limit("<=")))
+    assert "the smallest robustness is +0, without a change it is +0." in on.text
 
 
 def test_what_moves_nothing_has_no_influence() -> None:

@@ -80,7 +80,17 @@ def test_what_does_not_happen_again_is_refuted() -> None:
     found = confirm(replace(problem, parameters={"gain": 0.5}), highest(problem))
     assert (found.outcome, found.halved) == ("refuted", None)
     assert found.robustness == pytest.approx(0.9 - 0.5 * (1 - 0.9**100))
-    assert "does not violate" in found.reason
+    assert "does not violate" in found.reason and "equal inputs give different outputs" in found.reason
+
+
+def test_a_violation_that_recurs_with_other_numbers_says_so() -> None:
+    problem = lag_problem()
+    assert "equal inputs" not in confirm(problem, highest(problem)).reason
+    found = confirm(replace(problem, parameters={"gain": 0.95}), highest(problem))
+    assert found.outcome == "confirmed"
+    assert found.reason.startswith(
+        f"equal inputs give different outputs: the robustness was {highest(problem).robustness:+.6g} when "
+    )
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,12 @@ def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None
     assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
 
 
+def test_the_budget_of_a_run_that_has_falsified_stays_as_it_was_given(tmp_path: Path) -> None:
+    assert falsify(EASY, "corners", budget=9, directory=tmp_path).falsified
+    resume(tmp_path, budget=50)
+    assert manifest.read(tmp_path).request.budget.simulations == 9
+
+
 def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:
     falsify([impossible(), lag_problem(points=2, name="APART")], "corners", budget=2, directory=tmp_path)
     assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}

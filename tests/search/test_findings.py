@@ -46,6 +46,9 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
         "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
         "formula's smallest window is 1 s. To try them: --parameterization free:0.05."
     )
+    assert stated.source is not None
+    asked = stated.source.model_copy(update={"parameterization": "fixed"})
+    assert told(replace(stated, source=asked)).endswith("To try them: --parameterization free:0.05.")
     assert told(replace(stated, source=None)).endswith(" InputRange(..., free=Freedom(200, 0.05)).")
 
 

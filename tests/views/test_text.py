@@ -107,6 +107,13 @@ def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:
     assert lines[-1].endswith(whole), "the time of the whole run"
 
 
+def test_the_time_of_searches_one_after_the_other_is_their_sum(tmp_path: Path) -> None:
+    problems = [impossible(), lag_problem(points=2, name="APART")]
+    results = falsify(problems, "corners", budget=1, directory=tmp_path)
+    timed = [replace(r, spent=Spent(simulations=1, seconds=1.5)) for r in results]
+    assert "(3.0 s; simulator" in results_text(timed)
+
+
 def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
     data = json.loads(json.dumps(result_json(found)))
     assert (data["requirement"], data["status"]) == ("EASY", "falsified")

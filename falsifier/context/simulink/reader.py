@@ -6,13 +6,7 @@ from pathlib import Path
 
 from falsifier.context.simulink.diagram import Block, BlockSystem, Diagram, End, Wire
 from falsifier.context.simulink.parameters import meaningful
-from falsifier.context.simulink.sections import (
-    ModelPackage,
-    Node,
-    parse_mdl,
-    read_parts,
-    text_parts,
-)
+from falsifier.context.simulink.sections import ModelPackage, Node, parse_mdl, read_parts, text_parts
 from falsifier.context.simulink.stateflow import read_charts
 from falsifier.errors import SpecError
 

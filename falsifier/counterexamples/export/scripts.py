@@ -77,9 +77,10 @@ with (HERE / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
 
 shown = {shown}
 marked = int(abs(result["time"] - {moment!r}).argmin())
-print("".join(f"{{name:>14}}" for name in shown))
+widths = [max(14, len(name) + 2) for name in shown]
+print("".join(name.rjust(width) for name, width in zip(shown, widths)))
 for k in range(max(marked - {around}, 0), min(marked + {around} + 1, len(result))):
-    values = "".join(f"{{float(columns[name][k]):14.6g}}" for name in shown)
+    values = "".join(f"{{float(columns[name][k]):{{width}}.6g}}" for name, width in zip(shown, widths))
     print(values + ({mark} if k == marked else ""))
 print(f"all {{len(result)}} rows are in outputs.csv next to this script")
 '''

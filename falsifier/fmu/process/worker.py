@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 from falsifier.core.posix import exit_text
 from falsifier.errors import ModelError
 from falsifier.fmu.description.libraries import HOW_TO_INSTALL
-from falsifier.fmu.process.connection import (
-    QUICK_SECONDS,
-    Garbled,
-    Reply,
-    Request,
-    Where,
-    receive,
-    send,
-)
+from falsifier.fmu.process.connection import QUICK_SECONDS, Garbled, Reply, Request, Where, receive, send
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import HEADER, Plan

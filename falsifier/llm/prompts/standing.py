@@ -85,11 +85,7 @@ _LESSONS_NOTE = (
 
 
 def standing(
-    view: View,
-    variant: Variant,
-    *,
-    count: int = 1,
-    start: Mapping[str, tuple[float, float]] | None = None,
+    view: View, variant: Variant, *, count: int = 1, start: Mapping[str, tuple[float, float]] | None = None
 ) -> str:
     """Return the constant part of a question for so many candidates.
 

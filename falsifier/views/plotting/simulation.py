@@ -126,7 +126,7 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
 
 def _decided(verdict: Verdict) -> list[str]:
     by, at = verdict.predicate, f"{verdict.critical_time:.5g} s"
-    decided = f"robustness {signed(verdict.robustness, 5)}, decided by {by} at {at}"
+    decided = f"robustness {signed(verdict.robustness)}, decided by {by} at {at}"
     if verdict.breach is not None:
         return [*verdict.breach.lines, decided]
     return [f"{'violated' if verdict.violated else 'not violated'}, {decided}"]

@@ -8,9 +8,10 @@ from typing import Literal
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.analysis import Run, Table, load, main_table, read_published
 from falsifier.campaigns.directory import is_campaign
-from falsifier.campaigns.progress import total
+from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
@@ -48,6 +49,8 @@ class Shown:
         """What it is, in words."""
         if not self.run.falsified:
             return "simulation nearest to a violation"
+        if self.is_shrunk and in_one_line(self.candidate) == in_one_line(_recorded(self.run)):
+            return "counterexample, of which no simpler one was found nearby"
         return "shrunk counterexample" if self.is_shrunk else "counterexample"
 
     @property
@@ -146,12 +149,8 @@ def _side(directory: Path, title: str) -> Side:
 
 
 def spent_on(runs: Iterable[Run]) -> Spent:
-    """What runs have spent together; of those that share a search, the longest shows what that spent."""
-    longest: dict[Path, Spent] = {}
-    for run in runs:
-        known = longest.get(run.directory, run.spent)
-        longest[run.directory] = max(known, run.spent, key=lambda spent: spent.simulations)
-    return total(longest.values())
+    """What runs have spent together."""
+    return spent_together((run.directory, run.spent) for run in runs)
 
 
 def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
@@ -181,8 +180,12 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
 
 
 def _shown(run: Run) -> Shown:
+    return _shrunk(run) or shown_of(run, _recorded(run))
+
+
+def _recorded(run: Run) -> Candidate:
     assert run.shown is not None
-    return _shrunk(run) or shown_of(run, recorded_candidates(read_journal(run.directory))[run.shown])
+    return recorded_candidates(read_journal(run.directory))[run.shown]
 
 
 def shown_of(run: Run, candidate: Candidate) -> Shown:

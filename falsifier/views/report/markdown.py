@@ -82,13 +82,14 @@ def _found(shown: Shown) -> list[str]:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
     if beside := margin_beside(shown.verdict, shown.units):
         parts.append(_facts(beside))
-    if advice(shown):
-        parts.append(f"To simplify and explain it: {markdown_code(advice(shown))}")
+    parts += [f"{what}: {markdown_code(command)}" for what, command in advice(shown)]
     return parts
 
 
 def _facts(facts: Iterable[Fact]) -> str:
-    return "\n".join(f"- {markdown_text(one_line(f'{name} {text}'.strip()))}" for name, text in facts)
+    return "\n".join(
+        f"- {markdown_text(one_line(f'{name}: {text}' if name else text))}" for name, text in facts
+    )
 
 
 def _listed(title: str, lines: Iterable[str]) -> list[str]:

@@ -177,7 +177,6 @@ def _found(shown: Shown) -> list[str]:
     if len(inputs.rows) > _MOST_ROWS:
         listed = el("details", el("summary", f"Table of {counted(len(inputs.rows), 'row')}"), listed)
     parameters = parameter_facts(shown)
-    command = advice(shown)
     return [
         el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else "",
         el("h3", named),
@@ -187,7 +186,7 @@ def _found(shown: Shown) -> list[str]:
         facts_html(parameters) if parameters else "",
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
         facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
-        el("p", "To simplify and explain it: ", el("code", command), class_="note") if command else "",
+        *(el("p", f"{what}: ", el("code", command), class_="note") for what, command in advice(shown)),
     ]
 
 

@@ -114,7 +114,7 @@ def _course(signal: Signal) -> str:
 def parameter_facts(shown: Shown) -> list[Fact]:
     """Return the parameters of a simulation with their values and units."""
     values = shown.candidate.parameters.items()
-    return [(f"{name} =", f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
+    return [(name, f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
 
 
 def tried(section: Section) -> list[Fact]:
@@ -158,13 +158,15 @@ def run_name(run: Run) -> str:
     return f"{run.method.label}, seed {run.seed}"
 
 
-def advice(shown: Shown) -> str:
-    """Return the command that would simplify or explain a counterexample; empty if both are done."""
+def advice(shown: Shown) -> list[Fact]:
+    """Return what would simplify or explain a counterexample, and its command; empty if both are done."""
     run = shown.run
     if not run.falsified or (shown.is_shrunk and shown.explanation):
-        return ""
-    place = str(run.counterexample_file if run.method.together else run.directory)
-    return shlex.join(["falsifier", "explain", place, *([] if shown.is_shrunk else ["--shrink"])])
+        return []
+    command = ["falsifier", "explain", str(run.counterexample_file if run.method.together else run.directory)]
+    if shown.is_shrunk:
+        return [("To explain it", shlex.join(command))]
+    return [("To simplify and explain it", shlex.join([*command, "--shrink"]))]
 
 
 def replay_command(run: Run, *, shrunk: bool = False) -> str:

@@ -1,6 +1,7 @@
 import ast
 import csv
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -49,6 +50,17 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
     )
     assert shown[3].endswith("<- decided by: speed <= 120")
     assert "all 5001 rows are in outputs.csv" in where
+
+
+def test_the_replay_script_parts_long_names(capsys: pytest.CaptureFixture[str]) -> None:
+    problem = load_problem("AT1")
+    script = replay_script(problem, evaluate(problem, problem.space.admit(AT_INPUTS["held"])), [])
+    assert script is not None
+    names, table = ["time", "car.wheels.left.speed"], np.zeros(3, [("time", float)])
+    end = re.sub(r"(?m)^shown = .*$", f"shown = {names}", script[script.index("shown = ") :])
+    exec(end, {"result": table, "columns": dict.fromkeys(names, table["time"])})
+    header, row, *_ = capsys.readouterr().out.splitlines()
+    assert header.split() == names and len(row.partition("  <-")[0]) == len(header)
 
 
 def test_the_replay_script_shows_what_broke_and_not_the_condition_that_decided() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.store import save, to_store
+from falsifier.counterexamples.store import load_counterexample, save, to_store
 from falsifier.engines import make_engine
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
@@ -93,6 +93,7 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     assert simpler.trajectory is not None and simpler.verdict is not None
     save(to_store(confirm(hard(), simpler)), tmp_path / "shrunk.json")
     simpler.trajectory.save(tmp_path / "shrunk.npz")
+    assert f"To explain it: `falsifier explain {tmp_path}`" in markdown_report(tmp_path)
     (tmp_path / "explanation.txt").write_text("Because of u.\n")
     shown = gather(tmp_path)[0].sections[0].shown[0]
     assert shown.is_shrunk and shown.verdict == simpler.verdict and shown.candidate == simpler.candidate
@@ -102,6 +103,9 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     text = markdown_report(tmp_path)
     assert "The shrunk counterexample:" in text
     assert all(f"falsifier replay {tmp_path / 'shrunk.json'}" in report for report in (page, text))
+    found = load_counterexample(tmp_path)  # as if no simpler one had been found
+    save(found, tmp_path / "shrunk.json")
+    assert "The counterexample, of which no simpler one was found nearby:" in markdown_report(tmp_path)
     os.utime(tmp_path / "explanation.txt", (0, 0))
     assert not gather(tmp_path)[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
@@ -113,7 +117,7 @@ def test_markdown_has_a_verdict_for_each_requirement_and_then_the_statistics(cam
     assert text.startswith("# Falsification report: nightly\n")
     parts = [
         "## HARD: violated",
-        "what broke x \\<= 0.6 was violated from ",
+        "- what broke: x \\<= 0.6 was violated from ",
         "falsifier replay",
         "## NEVER: no violation found",
         "What was tried:",

@@ -101,7 +101,7 @@ def test_inputs_are_a_table_of_their_control_points(tmp_path: Path) -> None:
     assert run.falsified
     table = every(card, "table", "numbers")[0]
     assert "u [V]" in content(every(table, "thead")[0])
-    assert "x0 =" in [content(e) for e in every(card, "dt")]
+    assert "x0" in [content(e) for e in every(card, "dt")]
     assert "values then" in [content(e) for e in every(card, "dt")]
     assert re.search(r"x = [\d.]+ m, u = [-\d.]+ V", content(card)), "values have units"
 
