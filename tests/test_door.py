@@ -62,13 +62,39 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "what templates lack": (
         lambda: untyped.Problem.from_fmu(AT, "rise signal=speed"),
-        "^formula: reference: this key is missing",
+        "^stl: reference: this key is missing",
     ),
     "no range": (
         lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", inputs={"throttle": 3, "brake": 0}),
         r"a value keeps throttle and brake constant.* add inputs=\{'NAME': \(LOW, HIGH\)\}",
     ),
-    "no requirement": (lambda: untyped.load_problem(AT), r"no requirement; add stl='G\[0,10\]"),
+    "no requirement": (
+        lambda: untyped.load_problem(AT),
+        r"no requirement; use load_problem\('.*AT\.fmu', stl='G\[0,10\]",
+    ),
+    "a search without a requirement": (lambda: untyped.falsify(str(AT)), r"use load_problem\('.*', stl='G"),
+    "several requirements": (lambda: untyped.falsify("AT"), r"falsify\(load_problems\('AT'\)\) falsifies"),
+    "no target": (lambda: untyped.load_problem(""), "the target is empty; give a spec file"),
+    "a folder": (lambda: untyped.load_problem("."), r"resume\('\.'\) continues it"),
+    "no language model": (lambda: untyped.falsify(easy(), engine="hybrid"), r"name one \(llm=NAME\)"),
+    "units that differ": (
+        lambda: untyped.System({"a": AT}, {"a.throttle": "a.speed"}),
+        "state factor and offset of this connection$",
+    ),
+    "a text to search": (
+        lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", parameters={"wheelRadius": "big"}),
+        r"^parameters\.wheelRadius: .*: parameters=\{'wheelRadius': \(LOW, HIGH\)\}",
+    ),
+    "a name given twice": (
+        lambda: untyped.Problem.from_fmu(
+            AT, "G (speed <= 1)", inputs={"throttle": (0, 100)}, parameters={"throttle": (0, 1)}
+        ),
+        "throttle: given in inputs and in parameters; drop one",
+    ),
+    "a step longer than the interval": (
+        lambda: untyped.Problem.from_fmu(AT, "speed <= 1", output_interval=0.01, step_size=0.02),
+        "^output_interval: .* is not an integer multiple of step_size = 0.02 s; try step_size = 0.01",
+    ),
     "a result to explain": (lambda: untyped.explain(easy(), 5), "explain: expected an evaluation"),
     "a number to shrink": (lambda: untyped.shrink(easy(), 5), "shrink: expected an evaluation"),
     "a device as directory": (

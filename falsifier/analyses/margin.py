@@ -7,7 +7,7 @@ from math import ceil, log2
 from falsifier.core.arguments import finite, whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE, make_engine
-from falsifier.errors import SimulationError, SpecError
+from falsifier.errors import SimulationError, SpecError, written
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.problem.problem import Problem
@@ -134,7 +134,9 @@ class _Bisection:
         if len(values) < 2:
             raise SimulationError(f"{self.problem.name}: the simulation failed: {self.history[0].reason}")
         if values[0] == values[-1]:
-            raise SpecError(f"vary: the robustness is the same for {LIMIT} = {low:g} and {high:g}")
+            raise SpecError(
+                f"{written('--stl', 'vary')}: the robustness is the same for {LIMIT} = {low:g} and {high:g}"
+            )
         return (low, high) if values[0] < values[-1] else (high, low)
 
     def narrowed(self, easy: float, hard: float) -> bool:

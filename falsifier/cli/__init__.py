@@ -4,6 +4,7 @@ import errno
 import os
 import sys
 import traceback
+from functools import partial
 from importlib import import_module
 from io import StringIO
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -19,7 +20,7 @@ from falsifier.cli.output import (
     stop_at_interrupts,
 )
 from falsifier.core.posix import check_memory_limits
-from falsifier.errors import FalsifierError, did_you_mean
+from falsifier.errors import FalsifierError, did_you_mean, reader, speak_to
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
@@ -153,7 +154,9 @@ failed, 130 interrupted.
 )
 @click.version_option(__version__, prog_name="falsifier")
 def cli() -> None:
-    """Run the given command; its help text is _HELP."""
+    """Run the given command, whose messages speak of options; its help text is _HELP."""
+    click.get_current_context().call_on_close(partial(speak_to, reader()))
+    speak_to("command line")
 
 
 def main() -> NoReturn:

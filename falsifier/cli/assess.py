@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import asdict
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,6 @@ from falsifier.cli.options import (
     stl_option,
 )
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
-from falsifier.core.arguments import finite
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import JournalError, SpecError
@@ -87,7 +87,7 @@ def assess(
 @stl_option("Formula with {limit} in place of a threshold.")
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
-@budget_option(note=" of all searches together")
+@budget_option(least=20, note=" of all searches together")
 @seed_option()
 @quiet_option
 @json_option
@@ -174,7 +174,9 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
 
 def _between(text: str) -> tuple[float, float]:
     try:
-        low, high = (finite("--between", float(part)) for part in text.split(":"))
-    except (ValueError, SpecError):
-        raise click.UsageError(f"--between {text}: expected LOW:HIGH, for example 100:160") from None
-    return low, high
+        low, high = map(float, text.split(":"))
+        if -inf < low < high < inf:
+            return low, high
+    except ValueError:
+        pass
+    raise click.UsageError(f"--between {text}: expected LOW:HIGH with LOW < HIGH, for example 100:160")

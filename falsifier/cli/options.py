@@ -29,6 +29,14 @@ PATH = click.Path(path_type=Path)
 DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
 
 
+def number(text: str) -> float:
+    """Return a positive number; ValueError if it is none, which as the type of an option is a usage error."""
+    with suppress(ValueError):
+        if 0 < (value := float(text)) < inf:
+            return value
+    raise ValueError(text)
+
+
 class Parameterized(NamedTuple):
     """Value of ``--parameterization``.
 
@@ -77,7 +85,11 @@ def parameterized(text: str) -> Parameterized:
     for word in text.split(","):
         kind, colon, seconds = word.partition(":")
         if kind == "free" and colon:
-            said: dict[str, Any] = {"kind": kind, "shortest_piece": _seconds(text, seconds)}
+            try:
+                said: dict[str, Any] = {"kind": kind, "shortest_piece": number(seconds)}
+            except ValueError:
+                expected = "expected a time in s, for example free:0.5"
+                raise click.UsageError(f"--parameterization {text}: {expected}") from None
         else:
             said = {"kind" if word in ("free", "fixed") else "profile": word}
         if not word or any(getattr(found, name) for name in said):
@@ -87,13 +99,6 @@ def parameterized(text: str) -> Parameterized:
             )
         found = found._replace(**said)
     return found
-
-
-def _seconds(text: str, seconds: str) -> float:
-    with suppress(ValueError):
-        if 0 < (value := float(seconds)) < inf:
-            return value
-    raise click.UsageError(f"--parameterization {text}: expected a time in s, for example free:0.5")
 
 
 def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
@@ -183,16 +188,16 @@ def problem_options(command: Function) -> Function:
         ),
         parameterization_option(),
         interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
-        click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
+        click.option("--stop-time", type=number, metavar="SECONDS", help="End of each simulation."),
         click.option(
             "--output-interval",
-            type=float,
+            type=number,
             metavar="SECONDS",
             help="Step of the output grid on which the requirement is monitored.",
         ),
         click.option(
             "--time-limit",
-            type=float,
+            type=number,
             metavar="SECONDS",
             help="Maximum wall-clock time of one simulation; default: the spec's, or 60 for each tenth of "
             "the simulated time.",
@@ -264,10 +269,12 @@ def limit_options(*, note: str = "") -> Decorator:
     """Limits of a run in addition to --budget."""
     return lambda command: add(
         command,
-        click.option("--seconds", type=float, help=f"Maximum wall-clock time in seconds{note}."),
-        click.option("--max-tokens", type=int, help=f"Maximum number of language-model tokens{note}."),
+        click.option("--seconds", type=number, help=f"Maximum wall-clock time in seconds{note}."),
         click.option(
-            "--max-cost", type=float, help=f"Maximum cost of the language model in US dollars{note}."
+            "--max-tokens", type=click.IntRange(1), help=f"Maximum number of language-model tokens{note}."
+        ),
+        click.option(
+            "--max-cost", type=number, help=f"Maximum cost of the language model in US dollars{note}."
         ),
     )
 
@@ -282,9 +289,9 @@ _TOTALS: dict[str, Callable[[str], float]] = {
 
 
 def _total(text: str) -> tuple[str, float]:
-    name, _, number = text.partition("=")
+    name, _, limit = text.partition("=")
     try:
-        return name, _TOTALS[name](number)
+        return name, number(limit) and _TOTALS[name](limit)
     except (KeyError, ValueError):
         expected = ", ".join(f"{name}=N" for name in _TOTALS)
         raise click.UsageError(f"--total {text}: expected {expected}, for example cost=5") from None

@@ -245,6 +245,24 @@ class Experiment:
                 f"{self.output_interval:g} s; try output_interval = {self.stop_time / count:g}",
                 key="output_interval",
             )
+        self.steps_per_output  # noqa: B018 - an error belongs here
+
+    @property
+    def steps_per_output(self) -> int:
+        """Number of communication steps in the output interval.
+
+        Raises:
+            SpecError: if it is no whole number.
+        """
+        interval, step = self.output_interval, self.step_size or self.output_interval
+        count = max(round(interval / step), 1)
+        if abs(interval / step - count) > GRID_ROUNDING * count:
+            raise SpecError(
+                f"output_interval = {interval:g} s is not an integer multiple of step_size = {step:g} s; "
+                f"try step_size = {interval / count:g}",
+                key="step_size",
+            )
+        return count
 
     @property
     def samples(self) -> int:

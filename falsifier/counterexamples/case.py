@@ -16,7 +16,7 @@ from falsifier.counterexamples.store import (
     shrunk_file,
 )
 from falsifier.engines.protocol import KNOWN
-from falsifier.errors import CandidateError, SimulationError, SpecError
+from falsifier.errors import CandidateError, SimulationError, SpecError, written
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import FmuModel, System, resolved
@@ -113,13 +113,12 @@ class Case:
             raise SpecError(
                 f"the nearest miss of {problem.name} now violates (robustness "
                 f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
-                f"falsifier run ... --inputs {self.place}"
+                + written(f"falsifier run ... --inputs {self.place}", "falsify(..., start_from=[...])")
             )
         if not self.is_miss and not evaluation.violated:
             found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
             raise SpecError(
-                f"the counterexample of {problem.name} no longer violates: {found}; to search for another "
-                "one: falsifier run"
+                f"the counterexample of {problem.name} no longer violates: {found}; search for another one"
             )
         return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
 
@@ -151,7 +150,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     """
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
-            raise SpecError(f"{place}: --requirement applies to run directories only; this is not one")
+            raise SpecError(f"{place}: not a run directory, of which a requirement can be chosen")
         return counterexample_case(place)
     keep_recorded(place)
     described = manifest.read(place)

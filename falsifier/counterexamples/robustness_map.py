@@ -15,7 +15,7 @@ from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, setting
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
@@ -149,7 +149,7 @@ def robustness_map(
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1:
         raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:g}")
-    points = isqrt(int(_GRID_SHARE * whole("budget", budget, least=_LEAST_BUDGET)))
+    points = isqrt(int(_GRID_SHARE * whole(setting("budget"), budget, least=_LEAST_BUDGET)))
     samples = budget - points * points
     from scipy.stats.qmc import Sobol
 

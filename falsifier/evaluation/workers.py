@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
+from falsifier.errors import Reader, reader, speak_to
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 
@@ -142,7 +143,7 @@ def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":
     _start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending)
+        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending, reader())
     )
 
 
@@ -161,12 +162,13 @@ def _start_silent_tracker() -> None:
         sys.warnoptions.remove(_TRACKER_FILTER)
 
 
-def _prepare_worker(log_level: int, ending: _End) -> None:
+def _prepare_worker(log_level: int, ending: _End, told: Reader) -> None:
     """Make a worker end with its parent, however that ends, and ignore Ctrl-C, which the parent handles.
 
     Args:
         log_level: the parent's level of the logger for simulations.
         ending: closed at the other end if the worker is to end in the middle of a simulation.
+        told: who reads what the parent says.
     """
     import os
     import signal
@@ -174,6 +176,7 @@ def _prepare_worker(log_level: int, ending: _End) -> None:
     from multiprocessing.connection import wait
     from threading import Thread
 
+    speak_to(told)
     logging.getLogger(_FMU_LOGGER).setLevel(log_level)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from falsifier.core.arguments import instance
 from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
-from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section
+from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section, setting
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import NAME_IN_LINES, STL_OPTION, AnyRequirement
+from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
 from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
@@ -110,7 +110,7 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
         SpecError: naming what is wrong with the formula, or with the arguments of a template.
     """
     kind = "template" if isinstance(section, Template) else "formula"
-    option = None if key else STL_OPTION
+    option = None if key else setting("stl")
     with in_section(option, key):
         text = section.expanded(experiment.stop_time, experiment.output_interval)
     with in_section(option, key and f"{key}.{kind}"):

@@ -38,8 +38,6 @@ from falsifier.problem.template_arguments import Template
 from falsifier.problem.templates import TEMPLATES
 
 Section = TypeVar("Section", bound=BaseModel)
-# The option that states a requirement in place of a spec's.
-STL_OPTION = "--stl"
 # Names that we choose stand in messages, tables and titles.
 NAME_IN_LINES = "expected a name of one line without control characters"
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.

@@ -14,7 +14,7 @@ from falsifier.core.fitting import fit
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import JournalError, SpecError, written
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
@@ -266,7 +266,11 @@ def carry_out(
         if begun and not resume:
             raise JournalError(
                 f"{directory} already contains a run: choose another directory, or to continue it: "
-                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
+                + (
+                    written(f"falsifier resume {directory}", f"resume({str(directory)!r})")
+                    if request.problems
+                    else "resume() with problems=[...]"
+                )
             )
         if directory is not None and (directory / CAMPAIGN).exists():
             raise JournalError(f"{directory} already contains a campaign: choose another directory")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import GRID_ROUNDING, Experiment
-from falsifier.errors import ModelError, SimulationError, SpecError, did_you_mean
+from falsifier.core.model import Experiment
+from falsifier.errors import ModelError, SimulationError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 
 _DEFAULT_TIME_LIMIT = 60.0
@@ -119,7 +119,7 @@ def make_plan(
         units={name: variables[name].unit for name in experiment.outputs if variables[name].unit},
         limits={n: limits for n in (*inputs, *parameters) if (limits := variables[n].type_limits)},
         times=times,
-        every=_steps_per_output(experiment),
+        every=experiment.steps_per_output,
         pieces=pieces,
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
@@ -127,20 +127,6 @@ def make_plan(
         strings=experiment.strings,
         has_limit=experiment.time_limit is not None,
     )
-
-
-def _steps_per_output(experiment: Experiment) -> int:
-    interval, step = experiment.output_interval, experiment.step_size
-    if step is None:
-        return 1
-    count = max(round(interval / step), 1)
-    if abs(interval / step - count) > GRID_ROUNDING * count:
-        raise SpecError(
-            f"output_interval = {interval:g} s is not an integer multiple of step_size = {step:g} s; "
-            f"try step_size = {interval / count:g}",
-            key="step_size",
-        )
-    return count
 
 
 def given_values(

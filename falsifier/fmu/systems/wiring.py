@@ -49,8 +49,8 @@ def make_network(
         raise SpecError(
             f"{shown}: these depend directly on each other (an algebraic loop), as their FMUs declare; "
             "export one of the components without the direct dependency, for example with a delay, or accept "
-            'a delay of one communication step: [coupling] loops = "delay"; or repeat their steps until they '
-            'agree: loops = "iterate"',
+            'a delay of one communication step in the coupling: loops = "delay"; or repeat their steps until '
+            'they agree: loops = "iterate"',
             key="connections",
         )
     loops: tuple[tuple[int, int], ...] = ()
@@ -201,8 +201,7 @@ class _Joiner:
         if found is None:
             raise SpecError(
                 f"the output is in {a}, the input in {b}, and neither FMU defines how to convert "
-                f"one to the other; connect like units, or state the conversion: "
-                f'{{ from = "{connection.source}", factor = NUMBER, offset = NUMBER }}'
+                "one to the other; connect like units, or state factor and offset of this connection"
             )
         if found != (1.0, 0.0):
             shown = f" {found[1]:+.6g}" if found[1] else ""

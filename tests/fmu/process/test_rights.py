@@ -39,7 +39,7 @@ def test_the_guard_is_told_paths_without_links(tmp_path: Path) -> None:
 def test_what_was_refused_is_told_with_the_way_out() -> None:
     told = read_told(b"w/etc/x\0w/etc/x\0x/bin/sh\0s\0")
     assert told.cause == "" and told.refusals.count("/etc/x") == 1
-    for said in ("--allow write:/etc`", "/bin/sh", "--allow programs`", "signal"):
+    for said in ("allow=['write:/etc']", "/bin/sh", "allow=['programs']", "signal"):
         assert said in told.refusals
     assert "`--allow 'write:/my logs'`" in read_told(b"w/my logs/x\0").refusals, "as a shell takes it"
     assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
