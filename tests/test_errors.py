@@ -1,7 +1,6 @@
 import ast
 import pickle
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,6 @@ from falsifier.errors import (
     naming,
     rejected,
     setting,
-    speak_to,
     written,
 )
 
@@ -34,13 +32,6 @@ def test_a_failed_simulation_travels_between_processes_with_what_it_knows() -> N
     error = SimulationError("it crashed", status="crashed", time=1.5, log=("a", "b"))
     read = pickle.loads(pickle.dumps(error))
     assert (str(read), read.status, read.time, read.log) == ("it crashed", "crashed", 1.5, ("a", "b"))
-
-
-@pytest.fixture
-def at_the_command_line() -> Iterator[None]:
-    speak_to("command line")
-    yield
-    speak_to("Python")
 
 
 def test_in_python_arguments_are_named() -> None:

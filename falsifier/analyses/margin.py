@@ -2,15 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import ceil, log2
+from math import ceil, inf, log2
+from numbers import Real
 
-from falsifier.core.arguments import finite, whole
+from falsifier.core.arguments import instance, list_of, whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE, make_engine
 from falsifier.errors import SimulationError, SpecError, written
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, check_problem
 from falsifier.problem.requirement import Requirement, parse_requirement
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
@@ -94,11 +95,14 @@ def margin(
         SpecError: if the formula, the range or a number is not valid, or the threshold changes nothing.
         SimulationError: if most simulations failed.
     """
-    low, high = finite("between", between[0]), finite("between", between[1])
+    check_problem(problem)
+    instance("vary", vary, str, "text")
+    given = list_of("between", between, Real, "two numbers")
     if LIMIT not in vary:
         raise SpecError(f"vary: expected {LIMIT} in place of the threshold, got {vary!r}")
-    if low >= high:
-        raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
+    if len(given) != 2 or not -inf < given[0] < given[1] < inf:
+        raise SpecError(f"between: expected two numbers (LOW, HIGH) with LOW < HIGH, got {between!r}")
+    low, high = given
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
     state = _Bisection(problem, vary, engine, budget, seed, searched or (lambda *_: None))
     easy, hard = state.directed(low, high)

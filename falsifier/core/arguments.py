@@ -7,9 +7,11 @@ from numbers import Real
 from operator import index
 from os import PathLike
 from pathlib import Path
-from typing import SupportsIndex
+from typing import Any, SupportsIndex, TypeVar
 
 from falsifier.errors import SpecError
+
+T = TypeVar("T")
 
 
 def whole(name: str, given: object, *, least: int) -> int:
@@ -64,12 +66,17 @@ def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> 
     return Path(given)
 
 
+def list_of(name: str, given: Iterable[T], kind: Any, expected: str) -> tuple[T, ...]:
+    """Return what is in a list that a user gave; SpecError naming the argument if it is no such list."""
+    found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
+    if found is None or not all(isinstance(each, kind) for each in found):
+        raise SpecError(f"{name}: expected a list of {expected}, got {reprlib.repr(given)}")
+    return found
+
+
 def texts(name: str, given: Iterable[str]) -> tuple[str, ...]:
     """Return the texts of a list that a user gave; SpecError naming the argument if it is no such list."""
-    found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
-    if found is None or not all(isinstance(each, str) for each in found):
-        raise SpecError(f"{name}: expected a list of texts, got {given!r}")
-    return found
+    return list_of(name, given, str, "texts")
 
 
 def one_of(name: str, given: object, allowed: Sequence[str]) -> None:

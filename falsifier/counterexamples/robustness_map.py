@@ -16,7 +16,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
 
 # Simulations of a map, and the share of them on its grid.
@@ -145,6 +145,7 @@ def robustness_map(
     Raises:
         SpecError: for a failed simulation, a radius outside (0, 1], or a budget below 7.
     """
+    check_evaluation(problem, evaluation)
     if evaluation.robustness is None:
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1:

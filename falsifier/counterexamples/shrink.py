@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import inf
 
-from falsifier.core.arguments import finite, instance, whole
+from falsifier.core.arguments import finite, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange
 from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
 from falsifier.errors import CandidateError, SpecError, setting
 from falsifier.evaluation.confirm import half_step
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
@@ -79,7 +79,7 @@ def shrink(
     Raises:
         SpecError: if the simulation fails or has a larger robustness, or a number is out of range.
     """
-    instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
+    check_evaluation(problem, evaluation)
     if at_most is not None:
         finite(setting("at_most"), at_most)
     hunt = _Hunt(problem, whole("budget", budget, least=1))

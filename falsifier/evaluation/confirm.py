@@ -17,7 +17,7 @@ from falsifier.core.model import Experiment, Model
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate_any
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
@@ -74,6 +74,7 @@ class _Opinion:
 
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
+    check_evaluation(problem, evaluation)
     fresh = _repeat(problem, evaluation.candidate)
     found = Confirmation(
         problem=problem,
@@ -137,7 +138,7 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
 
     # The next simulation then loads the model again, so nothing left over from the search can influence it.
     problem.model.close()
-    again = evaluate(problem, candidate)
+    again = evaluate_any(problem, candidate)
     if again.trajectory is None or again.robustness is None:
         return _Opinion(None, None, None, f"failed: {again.reason}")
     if known is not None and _same(known.trajectory, again.trajectory):

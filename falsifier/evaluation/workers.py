@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
 from falsifier.errors import Reader, reader, speak_to
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, evaluate_any
 from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -122,8 +122,8 @@ def start(
     that process too has the status ``crashed``.
     """
     if executor is None:
-        return [partial(evaluate, problem, candidate) for candidate in candidates]
-    return [partial(_wait, problem, c, executor.submit(evaluate, problem, c)) for c in candidates]
+        return [partial(evaluate_any, problem, candidate) for candidate in candidates]
+    return [partial(_wait, problem, c, executor.submit(evaluate_any, problem, c)) for c in candidates]
 
 
 def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
@@ -131,7 +131,7 @@ def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") 
         return future.result()
     with _processes(1) as alone:
         try:
-            return alone.submit(evaluate, problem, candidate).result()
+            return alone.submit(evaluate_any, problem, candidate).result()
         except BrokenExecutor as error:
             return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
 

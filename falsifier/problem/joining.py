@@ -155,7 +155,7 @@ def join_formula(
     if data["model"]["stop_time"] is None:
         stop_time = setting("stop_time", "SECONDS")
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add {stop_time}")
-    spec = parse_spec(data | {"requirements": {name: stated}}, file=str(path))
+    spec = parse_spec(data | {"requirements": {STL_NAME: stated}}, file=str(path))
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
@@ -165,7 +165,7 @@ def join_formula(
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(
         spec,
-        name,
+        STL_NAME,
         path=path,
         stated=stated,
         stated_name=name,

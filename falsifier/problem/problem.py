@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
-from falsifier.core.arguments import finite, path_of, texts
+from falsifier.core.arguments import finite, instance, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
@@ -267,6 +267,11 @@ def check_limits(problem: Problem) -> None:
     for each in ranges:
         if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
             raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
+
+
+def check_problem(given: object) -> None:
+    """Check that a user gave a problem; SpecError if not."""
+    instance("problem", given, Problem, "a Problem, such as load_problem('AT1')")
 
 
 def check_names(problems: Iterable[Problem]) -> None:

@@ -44,7 +44,7 @@ class Requirement:
         parsed = parse(formula) if isinstance(formula, str) else formula
         for attribute, value in (("name", name), ("formula", parsed), ("description", description)):
             object.__setattr__(self, attribute, value)
-        if not isinstance(self.name, str):
+        if not isinstance(self.name, str) or not self.name.strip():
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
         if one_line(self.name) != self.name:  # it stands in messages, tables and titles
             raise SpecError(f"requirement {self.name!r}: {NAME_IN_LINES}")

@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
+from falsifier.core.arguments import one_of, positive, whole
 from falsifier.core.model import Interface
+from falsifier.errors import SpecError
 from falsifier.fmu.description.model_description import Description
 
 T = TypeVar("T")
@@ -31,6 +33,9 @@ class Coupling:
             converged.
         max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
         isolation: ``together``: all components run in one process; ``each``: each in one of its own.
+
+    Raises:
+        SpecError: naming the attribute that is not as above.
     """
 
     method: Method = "gauss-seidel"
@@ -39,6 +44,19 @@ class Coupling:
     tolerance: float = 1e-9
     max_rounds: int = 100
     isolation: Isolation = "together"
+
+    def __post_init__(self) -> None:
+        one_of("coupling.method", self.method, get_args(Method))
+        one_of("coupling.loops", self.loops, get_args(Loops))
+        one_of("coupling.extrapolation", self.extrapolation, get_args(Extrapolation))
+        one_of("coupling.isolation", self.isolation, get_args(Isolation))
+        positive("coupling.tolerance", self.tolerance)
+        whole("coupling.max_rounds", self.max_rounds, least=1)
+        if self.loops == "iterate" and self.method == "jacobi":
+            raise SpecError(
+                'coupling.loops: with the method "jacobi" every connection has a delay, and no step is '
+                'iterated; use method = "gauss-seidel" or loops = "delay"'
+            )
 
 
 # Position of the system itself in a Place: an input of the whole, which feeds inputs of components.

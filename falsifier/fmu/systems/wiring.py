@@ -2,9 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import get_args
 
-from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description.model_description import describe
@@ -12,7 +10,6 @@ from falsifier.fmu.description.structure import Structure, conversion, read_stru
 from falsifier.fmu.process.network import (
     SYSTEM,
     Coupling,
-    Extrapolation,
     Link,
     Member,
     Network,
@@ -180,7 +177,6 @@ class _Joiner:
         if (factor, offset) != (1.0, 0.0) and b.kind != "real":
             raise SpecError(f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
-        one_of("extrapolation", extrapolation, get_args(Extrapolation))
         if connection.extrapolation == "linear" and not b.is_continuous:
             raise SpecError('only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
@@ -190,10 +186,10 @@ class _Joiner:
     def _conversion(self, source: Place, target: Place, connection: Connection) -> tuple[float, float, str]:
         """Return factor and offset, and what is done with units unless the user has stated a conversion."""
         if connection.factor is not None or connection.offset is not None:
-            factor = 1.0 if connection.factor is None else finite("factor", connection.factor)
+            factor = 1.0 if connection.factor is None else connection.factor
             if factor == 0.0:
                 raise SpecError("factor = 0 passes nothing on; state another, or remove it and fix the input")
-            return factor, finite("offset", connection.offset or 0.0), ""
+            return factor, connection.offset or 0.0, ""
         a, b = self._variable(source).unit, self._variable(target).unit
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
