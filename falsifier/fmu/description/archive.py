@@ -119,7 +119,7 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
             with archive.open(name) as file:
                 return file.read() if first is None else file.read(first)
         except KeyError:
-            raise ModelError(
+            raise ModelFileError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except UNREADABLE as error:
