@@ -255,8 +255,13 @@ def rejected(message: str, given: object) -> str:
     message = next((own for begin, own in _VALIDATORS if message.startswith(begin)), "expected {}").format(
         message.partition(" be ")[2] or message
     )
-    text = repr(given)
-    return f"{message}, got {text if len(text) <= _SHOWN_INPUT else f'{text[:_SHOWN_INPUT]} ...'}"
+    return f"{message}, got {shown(given)}"
+
+
+def shown(given: object) -> str:
+    """Return a rejected value as a file has it; a long one without its end."""
+    text = str(given).lower() if isinstance(given, bool) else repr(given)
+    return text if len(text) <= _SHOWN_INPUT else f"{text[:_SHOWN_INPUT]} ..."
 
 
 def first_fault(error: "ValidationError") -> tuple[str, str]:

@@ -52,6 +52,11 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}
+        tried = {n: (min(s.values), max(s.values)) for n, s in signals.items() if n in inputs}
+        tried |= {n: (value, value) for n, value in given.items() if n in problem.info}
+        for name, (low, high) in tried.items():
+            if excess := problem.info[name].excess(low, high):
+                warn(f"{name}: {f'{low:g}' if low == high else f'[{low:g}, {high:g}]'} {excess}")
         if inputs and not signals:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
@@ -104,7 +109,7 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
         warn(f"{file}: ends at {found.end:g} s; the simulation at {stop_time:g} s: --stop-time changes it")
-    if found.end < stop_time and any(len(s.times) > 1 for s in found.signals.values()):
+    if 0.0 < found.end < stop_time:
         warn(f"{file}: ends at {found.end:g} s; the last values are kept until {stop_time:g} s")
     return dict(found.signals)
 

@@ -174,7 +174,8 @@ class SearchSpace:
         stop_time: end of the simulation in s.
 
     Raises:
-        SpecError: if the stop time is not positive, or a name occurs twice.
+        SpecError: if the stop time is not positive or shorter than a period of an input, or a name occurs
+            twice.
     """
 
     inputs: tuple[InputRange, ...]
@@ -189,6 +190,12 @@ class SearchSpace:
         for name in self.names:
             if self.names.count(name) > 1:
                 raise SpecError(f"search space: {name!r} has two ranges; keep one")
+        periods = [(r, "hold", r.hold or 0.0) for r in self.inputs]
+        periods += [(r, "free: min_interval", r.free.min_interval) for r in self.inputs if r.free]
+        for r, what, period in periods:
+            if period > self.stop_time:
+                end = f"the simulation of {self.stop_time:g} s"
+                raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
         ranges: tuple[Range, ...] = (*self.inputs, *self.parameters)

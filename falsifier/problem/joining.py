@@ -105,7 +105,7 @@ def join(
             space,
             _recording(experiment, info, [*spec.model.record, *formula.signals], known),
             fixed,
-            (*info.notes, *_notes(grid, model)),
+            (*info.notes, *_notes(grid, model, space, experiment)),
         )
 
 
@@ -228,9 +228,13 @@ def _experiment(
     return experiment, grid
 
 
-def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
+def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
+    step = experiment.step_size or experiment.output_interval
+    for r in space.inputs:
+        if r.hold is not None and r.hold < step:
+            yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 
 

@@ -133,7 +133,7 @@ def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: st
 @pytest.mark.parametrize(
     ("template", "message"),
     [
-        ("settles reference=1 within=1 time=1", r"stl: signal: this key is missing \(Signal"),
+        ("settles reference=1 within=1 time=1", r"stl: signal: this key is missing: Signal"),
         ("settls signal=x", r"stl: template: no such template; did you mean 'settles'"),
         ("rise signal=x reference=1 reaches=3 time=1", "percentage of the reference"),
         ("rise signal=x reference=1 direction=down time=1", "state reaches as well"),
