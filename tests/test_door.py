@@ -90,6 +90,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", parameters={"wheelRadius": "big"}),
         r"^parameters\.wheelRadius: .*: parameters=\{'wheelRadius': \(LOW, HIGH\)\}",
     ),
+    "a division by zero": (
+        lambda: untyped.Problem.from_fmu(AT, "G[0,20] (1/0 < speed)"),
+        "^stl: (?!.*fits all times)",
+    ),
     "a name given twice": (
         lambda: untyped.Problem.from_fmu(
             AT, "G (speed <= 1)", inputs={"throttle": (0, 100)}, parameters={"throttle": (0, 1)}

@@ -32,10 +32,9 @@ _FAILED = 3
 # Set by the shell when it asks for completions; falsifier completes by what click brings.
 _COMPLETES = "_FALSIFIER_COMPLETE"
 # What a machine has run out of, and what to do.
-_ELSEWHERE = "or choose a location on another disk, for example with --out DIR"
 _EXHAUSTED = {
-    errno.ENOSPC: f"free some space, {_ELSEWHERE}",
-    errno.EDQUOT: f"delete files of yours, {_ELSEWHERE}",
+    errno.ENOSPC: "free some space, or choose a location on another disk",
+    errno.EDQUOT: "delete files of yours, or choose a location on another disk",
     errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
     errno.ENOMEM: "free memory, or raise the limit (ulimit -v)",
     errno.EMFILE: "raise the limit on open files (ulimit -n)",
@@ -218,7 +217,6 @@ def _report_refusal(error: OSError) -> int:
     elif not where:
         warn(f"falsifier: {error}")
     else:
-        cure = "choose a readable and writable location, for example with --out DIR"
-        warn(f"falsifier: {where}{error.strerror}; {cure}")
+        warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2
     return _FAILED

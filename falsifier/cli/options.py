@@ -166,8 +166,16 @@ def target_argument(command: Function) -> Function:
     return click.argument("target", shell_complete=complete)(command)
 
 
-def problem_options(command: Function) -> Function:
+def problem_options(command: Function, *, searches: bool = True) -> Function:
     """Add the target and everything that changes a problem, except its requirement."""
+    search = click.option(
+        "--search",
+        "ranges",
+        multiple=True,
+        metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
+        help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or the "
+        "FMU's min and max. Repeatable.",
+    )
     return add(
         command,
         target_argument,
@@ -178,14 +186,7 @@ def problem_options(command: Function) -> Function:
             metavar="NAME=VALUE",
             help="Keep an input constant, or set a parameter, start value or string. Repeatable.",
         ),
-        click.option(
-            "--search",
-            "ranges",
-            multiple=True,
-            metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
-            help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or "
-            "the FMU's min and max. Repeatable.",
-        ),
+        *([search] if searches else []),
         parameterization_option(),
         interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
         click.option("--stop-time", type=number, metavar="SECONDS", help="End of each simulation."),
@@ -206,9 +207,9 @@ def problem_options(command: Function) -> Function:
     )
 
 
-def requirement_options(command: Function) -> Function:
+def requirement_options(command: Function, *, searches: bool = True) -> Function:
     """Add problem_options and the requirement."""
-    return add(command, stl_option(), problem_options)
+    return add(command, stl_option(), partial(problem_options, searches=searches))
 
 
 def problem_source(options: dict[str, Any]) -> "ProblemSource":

@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
 
 
 @command()
-@requirement_options
+@partial(requirement_options, searches=False)
 @inputs_option("Inputs to simulate")
 @out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
 @json_option

@@ -83,7 +83,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
         fits = fitting_interval(formula, experiment.stop_time, experiment.output_interval)
-        advice = "" if fits is None else f"; output_interval = {fits:.12g} fits all times"
+        is_other = fits is not None and fits != experiment.output_interval
+        advice = f"; output_interval = {fits:.12g} fits all times" if is_other else ""
         raise SpecError(f"{error}{advice}") from None
     return formula
 

@@ -275,10 +275,10 @@ def _arguments(text: str) -> dict[str, Any]:
     found: dict[str, Any] = {"template": name}
     for pair in pairs:
         key, equals, value = pair.partition("=")
-        if not equals or key in found:
+        if not equals or key in found or value.endswith(","):
             raise SpecError(
-                f"{pair}: expected each argument of {name} once, as key=value; spaces need quotes: "
-                "when='speed > 5'"
+                f"{pair}: expected each argument of {name} once, as key=value without commas between them; "
+                "spaces need quotes: when='speed > 5'"
             )
         try:
             found[key] = tomllib.loads(f"v = {value}")["v"]

@@ -112,7 +112,8 @@ def read_spec(path: Path) -> Spec:
         try:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
-            raise SpecError(f"not valid TOML: {error}") from None
+            said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
+            raise SpecError(f"not valid TOML: {said}") from None
         if not data:
             raise SpecError(
                 "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "

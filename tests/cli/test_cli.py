@@ -58,6 +58,7 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--stop-time", "1e-9"], "falsifier: --stop-time: the stop time 1e-09 s is not"),
         (["run", "AT1", "--engine", "hybrid"], "name one (--llm NAME)"),
         (["run", "AT.fmu", "--stl", "settles signal=x"], "falsifier: --stl: reference: this key is missing"),
+        (["simulate", "AT1", "--search", "throttle"], "No such option"),
         (["lint", "AT1"], "use falsifier check"),
         (["shrink", "r"], "use falsifier explain RUN --shrink"),
         (["schema"], "use falsifier tools schema"),

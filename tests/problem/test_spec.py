@@ -81,6 +81,9 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     bad.write_text("[model\n")
     with pytest.raises(SpecError, match=r"bad\.toml: not valid TOML: .*line 1"):
         read_spec(bad)
+    bad.write_text("[requirements.R1]\n[requirements.R1]\n")
+    with pytest.raises(SpecError, match=r"Cannot declare \[requirements\.R1\] twice"):
+        read_spec(bad)
     bad.write_text("[model]\n", encoding="utf-16")
     with pytest.raises(SpecError, match=r"bad\.toml: is written in UTF-16; .* save the file"):
         read_spec(bad)

@@ -168,7 +168,9 @@ def test_arguments_are_read_as_in_toml_or_as_text() -> None:
         assert parse(found.expanded(9.0)).signals == (name.strip("'\""),)
 
 
-@pytest.mark.parametrize("text", ["settles signal=x reference", "rise time=1 time=2", "rise signal='x"])
+@pytest.mark.parametrize(
+    "text", ["settles signal=x reference", "rise time=1 time=2", "rise signal='x", "rise signal=x,"]
+)
 def test_what_is_no_template_says_how_to_write_one(text: str) -> None:
     with pytest.raises(SpecError, match=r"stl: .*(key=value|a quote has no end)"):
         requirement_of(text)
