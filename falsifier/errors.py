@@ -87,11 +87,7 @@ def in_section(file: str | None = None, key: str | None = None) -> Iterator[None
 
 @contextmanager
 def naming(place: str | None) -> Iterator[None]:
-    """Let errors raised within name the option or argument that is to blame, in place of a spec and its key.
-
-    Args:
-        place: how the reader names it; None: the spec's key is to blame.
-    """
+    """Let errors raised within name an option or argument, if it is to blame, in place of a spec's key."""
     try:
         yield
     except SpecError as error:

@@ -60,10 +60,7 @@ _COMMANDS: _Table = {
     "report": ("falsifier.cli.report", "Report on a run or campaign: HTML or Markdown."),
     "watch": ("falsifier.cli.campaign", "Follow a running search from another terminal."),
     "simulate": ("falsifier.cli.simulate", "Simulate your own inputs and judge the requirement."),
-    "explain": (
-        "falsifier.cli.counterexample",
-        "Say why a counterexample violates; simplify it; map it.",
-    ),
+    "explain": ("falsifier.cli.counterexample", "Say why a counterexample violates; simplify it; map it."),
     "replay": ("falsifier.cli.counterexample", "Simulate a stored counterexample again."),
     "export": ("falsifier.cli.counterexample", "Write a counterexample for other tools."),
     "coverage": ("falsifier.cli.report", "Show what a run has tried, and what it has not."),

@@ -48,13 +48,7 @@ _SAID_EVERY = 100
 @quiet_option
 @json_option
 def assess(
-    *,
-    budget: int,
-    requirement: str | None,
-    seed: int,
-    quiet: bool,
-    as_json: bool,
-    **options: Any,
+    *, budget: int, requirement: str | None, seed: int, quiet: bool, as_json: bool, **options: Any
 ) -> None:
     """Bound the probability of a violation by simulating at random.
 

@@ -42,8 +42,7 @@ class Command(click.Command):
                 option = given.removesuffix("=") or (before if before.startswith("-") else "")
                 empty = f"{option}: the value is empty" if option else "an argument is empty"
                 raise click.UsageError(
-                    f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)",
-                    ctx,
+                    f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)", ctx
                 )
         try:
             return super().parse_args(ctx, args)

@@ -38,17 +38,11 @@ def number(text: str) -> float:
 
 
 class Parameterized(NamedTuple):
-    """Value of ``--parameterization``.
+    """Value of ``--parameterization``."""
 
-    Attributes:
-        profile: name of a profile of the spec.
-        kind: free or fixed; None if it is not stated.
-        shortest_piece: minimum time in s between two control points of every input.
-    """
-
-    profile: str | None = None
-    kind: "Parameterization | None" = None
-    shortest_piece: float | None = None
+    profile: str | None = None  # name of a profile of the spec
+    kind: "Parameterization | None" = None  # free or fixed; None if it is not stated
+    shortest_piece: float | None = None  # minimum time in s between two control points of every input
 
 
 def option(flag: str, name: str, text: str, *, multiple: bool, **more: Any) -> Decorator:

@@ -38,9 +38,7 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 @parameterization_option()
 @stl_option()
 @budget_option(
-    0,
-    least=0,
-    note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares",
+    0, least=0, note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares"
 )
 @json_option
 def check(*, budget: int, as_json: bool, **options: Any) -> None:

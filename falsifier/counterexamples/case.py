@@ -31,24 +31,16 @@ from falsifier.stl.margins import margin_words, signed
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A counterexample, or the simulation of a run with the smallest robustness that is no violation.
+    """A counterexample, or the simulation of a run with the smallest robustness that is no violation."""
 
-    Attributes:
-        file: the counterexample's file; of a nearest miss, that which its run would have.
-        candidate: what was simulated.
-        source: how to load the problem; None if it was made in Python.
-        allow: what the FMU was allowed then; None if that is not recorded.
-        deny: what it was denied then.
-        stored: content of the counterexample's file; None for a nearest miss.
-        text: what a nearest miss is, in words, before anything is said about it; empty for a counterexample.
-    """
-
-    file: Path
-    candidate: Candidate
-    source: ProblemSource | None
-    allow: tuple[str, ...] | None
-    deny: tuple[str, ...]
+    file: Path  # the counterexample's file; of a nearest miss, that which its run would have
+    candidate: Candidate  # what was simulated
+    source: ProblemSource | None  # how to load the problem; None if it was made in Python
+    allow: tuple[str, ...] | None  # what the FMU was allowed then; None if that is not recorded
+    deny: tuple[str, ...]  # what it was denied then
+    # Content of the counterexample's file; None for a nearest miss.
     stored: StoredCounterexample | None = None
+    # What a nearest miss is, in words, before anything is said about it; empty for a counterexample.
     text: str = ""
 
     @property
@@ -124,11 +116,7 @@ class Case:
 
 
 def counterexample_case(place: Path) -> Case:
-    """Return the counterexample of a run directory or file.
-
-    Raises:
-        SpecError: if there is none or more than one.
-    """
+    """Return the counterexample of a run directory or file; SpecError if there is none or more than one."""
     file = counterexample_file(place)
     stored = load_counterexample(file)
     return Case(

@@ -125,12 +125,7 @@ class RobustnessMap:
 
 
 def robustness_map(
-    problem: Problem,
-    evaluation: Evaluation,
-    *,
-    radius: float = 0.05,
-    budget: int = BUDGET,
-    seed: int = 0,
+    problem: Problem, evaluation: Evaluation, *, radius: float = 0.05, budget: int = BUDGET, seed: int = 0
 ) -> RobustnessMap:
     """Simulate around a counterexample or a near miss.
 
@@ -209,10 +204,7 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
 
 
 def _robustness(
-    problem: Problem,
-    candidate: Candidate,
-    coordinates: Sequence[Coordinate],
-    values: NDArray[np.float64],
+    problem: Problem, candidate: Candidate, coordinates: Sequence[Coordinate], values: NDArray[np.float64]
 ) -> float:
     changed = candidate
     for c, value in zip(coordinates, values.tolist(), strict=True):

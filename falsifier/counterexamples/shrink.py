@@ -177,9 +177,7 @@ def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
     }
     nominal = {p.name: rests[p.name] for p in problem.space.parameters if p.name in rests}
     yield replace(
-        candidate,
-        signals={**candidate.signals, **constants},
-        parameters={**candidate.parameters, **nominal},
+        candidate, signals={**candidate.signals, **constants}, parameters={**candidate.parameters, **nominal}
     )
     for name, signal in constants.items():
         yield with_signal(candidate, name, signal)

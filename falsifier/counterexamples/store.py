@@ -108,10 +108,7 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
 
 
 def _content(
-    requirement: RequirementRecord,
-    source: ProblemSource | None,
-    evaluation: Evaluation,
-    **recorded: Any,
+    requirement: RequirementRecord, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
 ) -> StoredCounterexample:
     verdict = evaluation.verdict
     if verdict is None:

@@ -78,10 +78,7 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
 
 
 def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
-    """Evaluate a candidate, whether it fits the search space or not.
-
-    A pure function of its arguments, in whichever process it runs.
-    """
+    """Evaluate a candidate that need not fit: a pure function, in whichever process it runs."""
     experiment = problem.experiment
     started = perf_counter()
     try:

@@ -22,12 +22,7 @@ from pydantic import ValidationError
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
-from falsifier.llm.failures import (
-    FormatUnsupportedError,
-    TransientChatError,
-    UnreadableReplyError,
-    classify,
-)
+from falsifier.llm.failures import FormatUnsupportedError, TransientChatError, UnreadableReplyError, classify
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
     check_name,

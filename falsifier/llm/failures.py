@@ -94,12 +94,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
     ),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
-    (
-        (400, 422),
-        (),
-        _RefusedOptionError,
-        "the server refuses the option {option}; drop it. {detail}",
-    ),
+    ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
         (404,),
         (),
@@ -131,12 +126,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
 
 
 def classify(
-    error: Exception,
-    *,
-    llm: str,
-    api_base: str | None,
-    secrets: Iterable[str],
-    options: Iterable[str] = (),
+    error: Exception, *, llm: str, api_base: str | None, secrets: Iterable[str], options: Iterable[str] = ()
 ) -> ChatError:
     """Translate what the client library raised into an error of this package, without secrets.
 

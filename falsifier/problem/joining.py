@@ -1,6 +1,6 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -177,7 +177,7 @@ def join_formula(
 
 def _experiment(
     spec: Spec,
-    layers: Iterable[ModelChanges],
+    layers: Sequence[ModelChanges],
     info: ModelInfo,
     changes: ModelChanges,
     formulas_of: Callable[[float], Iterable[str]],
@@ -188,11 +188,8 @@ def _experiment(
     """
 
     def stated(key: str) -> float | None:
-        value: float | None = getattr(spec.model, key)
-        for layer in layers:
-            if getattr(layer, key) is not None:
-                value = getattr(layer, key)
-        return value
+        each = (getattr(section, key) for section in (*reversed(layers), spec.model))
+        return next((value for value in each if value is not None), None)
 
     def fitting(fmu_step: float | None, step_size: float | None = None) -> Grid:
         times = formula_times(formulas_of(stop_time))

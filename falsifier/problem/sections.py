@@ -164,8 +164,7 @@ class ComponentSection(Strict):
         None, description="Step of its own in s, an integer multiple of the communication step."
     )
     interface: Interface | None = Field(
-        None,
-        description="co-simulation or model-exchange; default: co-simulation if the FMU offers it.",
+        None, description="co-simulation or model-exchange; default: co-simulation if the FMU offers it."
     )
 
 

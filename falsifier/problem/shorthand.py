@@ -65,7 +65,8 @@ def changes_from(
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
     if both := sorted(inputs.keys() & parameters.keys()):
-        raise SpecError(f"{both[0]}: given in inputs and in parameters; drop one of them")
+        why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
+        raise SpecError(f"{both[0]}: {why}; drop one of them")
     data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
     rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
@@ -84,28 +85,17 @@ def changes_from(
 
 
 def stated_as(kind: str, name: str, *, searched: bool) -> str:
-    """Return how the reader names the option or argument that states an input or a parameter.
-
-    >>> stated_as("inputs", "u", searched=True)
-    'inputs.u'
-    """
+    """Return how the reader names the option or argument that states an input or a parameter."""
     return written(f"--{'search' if searched else 'set'} {name}", f"{kind}.{name}")
 
 
 def searching(kind: str, name: str) -> str:
-    """Return what the reader writes to search an input or a parameter.
-
-    >>> searching("inputs", "u")
-    "inputs={'u': (LOW, HIGH)}"
-    """
+    """Return what the reader writes to search an input or a parameter."""
     return written(f"--search {name}=LOW:HIGH", f"{kind}={{{name!r}: (LOW, HIGH)}}")
 
 
 def changes_from_options(
-    *,
-    values: Iterable[str] = (),
-    ranges: Iterable[str] = (),
-    **more: Any,
+    *, values: Iterable[str] = (), ranges: Iterable[str] = (), **more: Any
 ) -> ModelChanges:
     """Return the changes for command-line options.
 
@@ -123,10 +113,7 @@ def changes_from_options(
         SpecError: naming the option that is invalid.
     """
     constant = _once("--set", map(_value, values))
-    searched = _once("--search", map(_range, ranges))
-    if both := sorted(constant.keys() & searched.keys()):
-        raise SpecError(f"{both[0]}: --set keeps it constant, --search varies it; drop one of them")
-    return changes_from(inputs=searched, parameters=constant, **more)
+    return changes_from(inputs=_once("--search", map(_range, ranges)), parameters=constant, **more)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:

@@ -98,11 +98,7 @@ class Spec(Strict):
 
 
 def read_spec(path: Path) -> Spec:
-    """Read and validate a spec file.
-
-    Raises:
-        SpecError: naming the file, the key and what was expected.
-    """
+    """Read and validate a spec file; SpecError naming the file, the key and what was expected."""
     with in_section(str(path)):
         text = _text_of(path)
         if len(text) > _MAX_LENGTH:

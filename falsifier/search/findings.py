@@ -108,8 +108,7 @@ def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
     remedy = _remedy(problem, coarse, limits)
     return Finding(
-        kind="parameterization",
-        text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}.",
+        kind="parameterization", text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}."
     )
 
 

@@ -61,20 +61,13 @@ _SHOWN_LINE = 160
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One token of a formula's text.
+    """One token of a formula's text."""
 
-    Attributes:
-        kind: its kind.
-        text: the number, the signal's name in the model, or the canonical spelling of a symbol or reserved
-            word.
-        written: the text as written in the formula.
-        position: position of its first character, from 0.
-    """
-
-    kind: Literal["number", "name", "symbol", "end"]
+    kind: Literal["number", "name", "symbol", "end"]  # its kind
+    # The number, the signal's name in the model, or the canonical spelling of a symbol or reserved word.
     text: str
-    written: str
-    position: int
+    written: str  # the text as written in the formula
+    position: int  # position of its first character, from 0
 
     @property
     def end(self) -> int:

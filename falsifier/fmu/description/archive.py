@@ -65,11 +65,7 @@ _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
 def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits.
-
-    Raises:
-        ModelError: if the file cannot be read.
-    """
+    """Return the SHA-256 of a file as hexadecimal digits; ModelError if the file cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

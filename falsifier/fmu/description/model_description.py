@@ -40,33 +40,20 @@ _SHOWN_NAMES = 10
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """Contents of a modelDescription.xml.
+    """Contents of a modelDescription.xml."""
 
-    Attributes:
-        info: what other packages need.
-        token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
-        identifiers: model identifier by interface.
-        libraries: its libraries for this platform and for Windows.
-        slots: how to access each scalar variable, by name.
-        arrays: start values of all elements by value reference, for arrays only.
-        states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
-        indicators: number of event indicators (FMI 1 and 2).
-        event_mode: whether the co-simulation interface supports event mode (FMI 3).
-        needs_tool: names of interfaces that need the exporting tool to be installed.
-        saves_state: names of interfaces whose state can be saved and restored.
-    """
-
-    info: ModelInfo
-    token: str
-    identifiers: Mapping[Interface, str]
-    slots: Mapping[str, Slot]
-    libraries: Libraries = _NO_LIBRARIES
+    info: ModelInfo  # what other packages need
+    token: str  # GUID (FMI 1 and 2) or instantiation token (FMI 3)
+    identifiers: Mapping[Interface, str]  # model identifier by interface
+    slots: Mapping[str, Slot]  # how to access each scalar variable, by name
+    libraries: Libraries = _NO_LIBRARIES  # its libraries for this platform and for Windows
+    # Start values of all elements by value reference, for arrays only.
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
-    states: int = 0
-    indicators: int = 0
-    event_mode: bool = False
-    needs_tool: tuple[Interface, ...] = ()
-    saves_state: tuple[Interface, ...] = ()
+    states: int = 0  # number of continuous states (FMI 1 and 2; FMI 3 reports it at run time)
+    indicators: int = 0  # number of event indicators (FMI 1 and 2)
+    event_mode: bool = False  # whether the co-simulation interface supports event mode (FMI 3)
+    needs_tool: tuple[Interface, ...] = ()  # names of interfaces that need the exporting tool to be installed
+    saves_state: tuple[Interface, ...] = ()  # names of interfaces whose state can be saved and restored
 
     @property
     def major(self) -> int:

@@ -56,25 +56,16 @@ _REFUSALS: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """How to access one scalar in the FMU.
+    """How to access one scalar in the FMU."""
 
-    Attributes:
-        reference: value reference of the variable or, for an element, of its array.
-        type: type code, e.g. ``Real``, ``Float32``, ``Boolean``.
-        offset: position in the array in row-major order, 0 for scalars.
-        size: number of elements of the array, 1 for scalars.
-        negated: whether it is an FMI 1 alias with the opposite sign.
-        refusal: why it cannot be set; empty if it can.
-        declared: name in modelDescription.xml, if another: an array's for its elements, the variable's for
-            aliases (FMI 3).
-    """
-
-    reference: int
-    type: str
-    offset: int = 0
-    size: int = 1
-    negated: bool = False
-    refusal: str = ""
+    reference: int  # value reference of the variable or, for an element, of its array
+    type: str  # type code, e.g. ``Real``, ``Float32``, ``Boolean``
+    offset: int = 0  # position in the array in row-major order, 0 for scalars
+    size: int = 1  # number of elements of the array, 1 for scalars
+    negated: bool = False  # whether it is an FMI 1 alias with the opposite sign
+    refusal: str = ""  # why it cannot be set; empty if it can
+    # Name in modelDescription.xml, if another: an array's for its elements, the variable's for aliases of
+    # FMI 3.
     declared: str = ""
 
 
@@ -184,8 +175,7 @@ def _states_2(root: Element, elements: list[Element]) -> set[int]:
     """Return the positions, counted from 1, of the continuous states; FMI 1 does not list them."""
     states = set()
     for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
-        index = whole(unknown.attrib, "index")
-        if not 1 <= index <= len(elements):
+        if (index := whole(unknown.attrib, "index")) > len(elements):
             raise ValueError(f"ModelStructure: index = {index}: there are {len(elements)} variables")
         derivative = elements[index - 1].find("Real")
         if derivative is not None and derivative.get("derivative"):
@@ -193,19 +183,21 @@ def _states_2(root: Element, elements: list[Element]) -> set[int]:
     return states
 
 
+class _ByReference(dict[int, Element]):
+    def __missing__(self, reference: int) -> Element:
+        raise ValueError(f"valueReference = {reference}: there is no such variable")
+
+
 def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterator[tuple[Variable, Slot]]:
     types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*")}
-    elements: dict[int, Element] = {}
+    elements = _ByReference()
     for element in root.findall("ModelVariables/*"):
         with about(element):
             elements[whole(element.attrib, "valueReference")] = element
-    states = set()
-    for derivative in root.findall("ModelStructure/ContinuousStateDerivative"):
-        with about(derivative):
-            known = elements.get(reference := whole(derivative.attrib, "valueReference"))
-            if known is None:
-                raise ValueError(f"valueReference = {reference}: there is no such variable")
-            states.add(whole(known.attrib, "derivative"))
+    states = {
+        whole(elements[whole(d.attrib, "valueReference")].attrib, "derivative")
+        for d in root.findall("ModelStructure/ContinuousStateDerivative")
+    }
     ticked = set(input_clocks(root))
     for reference, element in elements.items():
         if element.tag not in _TYPES_3:

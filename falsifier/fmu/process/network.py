@@ -46,10 +46,9 @@ class Coupling:
     isolation: Isolation = "together"
 
     def __post_init__(self) -> None:
-        one_of("coupling.method", self.method, get_args(Method))
-        one_of("coupling.loops", self.loops, get_args(Loops))
-        one_of("coupling.extrapolation", self.extrapolation, get_args(Extrapolation))
-        one_of("coupling.isolation", self.isolation, get_args(Isolation))
+        words = {"method": Method, "loops": Loops, "extrapolation": Extrapolation, "isolation": Isolation}
+        for name, kind in words.items():
+            one_of(f"coupling.{name}", getattr(self, name), get_args(kind))
         positive("coupling.tolerance", self.tolerance)
         whole("coupling.max_rounds", self.max_rounds, least=1)
         if self.loops == "iterate" and self.method == "jacobi":
@@ -65,23 +64,14 @@ SYSTEM = -1
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One component.
+    """One component."""
 
-    Attributes:
-        name: its name; empty for a single FMU.
-        path: path of its FMU.
-        sha256: hash of the FMU.
-        description: description of the FMU, with the component's name in place of the model's.
-        step: step of its own in s; None for the communication step.
-        interface: interface to simulate with.
-    """
-
-    name: str
-    path: Path
-    sha256: str
-    description: Description
-    step: float | None
-    interface: Interface
+    name: str  # its name; empty for a single FMU
+    path: Path  # path of its FMU
+    sha256: str  # hash of the FMU
+    description: Description  # description of the FMU, with the component's name in place of the model's
+    step: float | None  # step of its own in s; None for the communication step
+    interface: Interface  # interface to simulate with
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,48 +84,30 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A connection between two scalars: ``target = factor * source + offset``.
+    """A connection between two scalars: ``target = factor * source + offset``."""
 
-    Attributes:
-        source: an output, or an input of the system.
-        target: an input.
-        factor: factor of the conversion.
-        offset: offset of the conversion.
-        start: value of the input before the source is known.
-        is_linear: whether the input follows the course of the last two values.
-    """
-
-    source: Place
-    target: Place
-    factor: float
-    offset: float
-    start: float
-    is_linear: bool
+    source: Place  # an output, or an input of the system
+    target: Place  # an input
+    factor: float  # factor of the conversion
+    offset: float  # offset of the conversion
+    start: float  # value of the input before the source is known
+    is_linear: bool  # whether the input follows the course of the last two values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Network:
-    """What is simulated: a checked system, or a single FMU as its only component.
+    """What is simulated: a checked system, or a single FMU as its only component."""
 
-    Attributes:
-        name: what errors of loading call it: the name of a system, the path of a single FMU.
-        members: the components.
-        links: the connections.
-        order: positions of the components in the order in which they step.
-        loops: first position in the order, and the one after the last, of components that iterate together.
-        coupling: how they exchange values.
-        description: variables of all components, as ``component.variable``; of a single FMU, its own.
-        places: where each of these variables is.
-    """
-
-    name: str
-    members: tuple[Member, ...]
-    links: tuple[Link, ...]
-    order: tuple[int, ...]
+    name: str  # what errors of loading call it: the name of a system, the path of a single FMU
+    members: tuple[Member, ...]  # the components
+    links: tuple[Link, ...]  # the connections
+    order: tuple[int, ...]  # positions of the components in the order in which they step
+    # First position in the order, and the one after the last, of components that iterate together.
     loops: tuple[tuple[int, int], ...]
-    coupling: Coupling
+    coupling: Coupling  # how they exchange values
+    # Variables of all components, as ``component.variable``; of a single FMU, its own.
     description: Description
-    places: Mapping[str, Place]
+    places: Mapping[str, Place]  # where each of these variables is
 
     def stepped(self, position: int) -> str:
         """Return the name of the component at a position of the order; empty if there is none."""

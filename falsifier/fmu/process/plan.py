@@ -17,40 +17,25 @@ HEADER = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """What all simulations of a search have in common.
+    """What all simulations of a search have in common."""
 
-    Attributes:
-        model: name of the FMU or system.
-        inputs: names of the inputs that are set, in the order of their rows.
-        parameters: names of the parameters and start values that are set.
-        outputs: names of the recorded variables, in the order of their rows.
-        units: units of the outputs by name.
-        limits: smallest and largest number of the types of inputs and parameters, by name; not of reals.
-        times: the output grid in s.
-        every: communication steps per output interval (co-simulation).
-        pieces: maximum number of pieces of an input, see ``Signal.pieces``.
-        max_step: maximum step of the solver in s (model exchange).
-        tolerance: relative tolerance; None for the model's default.
-        time_limit: maximum wall-clock time of one simulation in s.
-        has_limit: whether that is for the whole simulation; else for each tenth of the simulated time, so
-            that slow models are simulated, and those that hang are ended.
-        strings: names and values of string parameters.
-    """
-
-    model: str
-    inputs: tuple[str, ...]
-    parameters: tuple[str, ...]
-    outputs: tuple[str, ...]
-    units: Mapping[str, str]
+    model: str  # name of the FMU or system
+    inputs: tuple[str, ...]  # names of the inputs that are set, in the order of their rows
+    parameters: tuple[str, ...]  # names of the parameters and start values that are set
+    outputs: tuple[str, ...]  # names of the recorded variables, in the order of their rows
+    units: Mapping[str, str]  # units of the outputs by name
+    # Smallest and largest number of the types of inputs and parameters, by name; not of reals.
     limits: Mapping[str, tuple[float, float]]
-    times: NDArray[np.float64]
-    every: int
-    pieces: int
-    max_step: float
-    tolerance: float | None
-    time_limit: float
+    times: NDArray[np.float64]  # the output grid in s
+    every: int  # communication steps per output interval (co-simulation)
+    pieces: int  # maximum number of pieces of an input, see ``Signal.pieces``
+    max_step: float  # maximum step of the solver in s (model exchange)
+    tolerance: float | None  # relative tolerance; None for the model's default
+    time_limit: float  # maximum wall-clock time of one simulation in s
+    # Whether that is for the whole simulation; else for each tenth of the simulated time, so that slow models
+    # are simulated, and those that hang are ended.
     has_limit: bool
-    strings: tuple[tuple[str, str], ...]
+    strings: tuple[tuple[str, str], ...]  # names and values of string parameters
 
     @property
     def stop_time(self) -> float:

@@ -51,11 +51,7 @@ class Memory:
         self._count = 0
 
     def fit(self, count: int) -> None:
-        """Make room for at least this many values.
-
-        Raises:
-            OSError: if there is none, or files may not be so large.
-        """
+        """Make room for at least this many values; OSError if there is none, or files may not be so large."""
         if count > self._count:
             posix_files.enlarge(self.file, 8 * count)
             self._count = count

@@ -7,15 +7,7 @@ from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description.model_description import describe
 from falsifier.fmu.description.structure import Structure, conversion, read_structure
-from falsifier.fmu.process.network import (
-    SYSTEM,
-    Coupling,
-    Link,
-    Member,
-    Network,
-    Place,
-    full_name,
-)
+from falsifier.fmu.process.network import SYSTEM, Coupling, Link, Member, Network, Place, full_name
 from falsifier.fmu.systems.components import Component, Connection, Frame, merged
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 
