@@ -137,6 +137,8 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "lists as trajectory": (lambda: untyped.Trajectory([0, 1], {"x": [1, 2]}), "times: expected an array of"),
     "NaN in a signal": (lambda: untyped.Signal((0.0, 1.0), (0.0, float("nan"))), "must be finite numbers"),
+    "a text in a signal": (lambda: untyped.Signal((0.0,), ("a",)), "expected sequences of numbers"),
+    "numbers as signal": (lambda: untyped.Signal(0.0, 1.0), "expected sequences of numbers"),
     "an unknown interpolation": (
         lambda: untyped.Signal((0.0,), (0.0,), "cubic"),
         "interpolation: expected",

@@ -47,13 +47,17 @@ class Signal:
     hold: float | None = None
 
     def __post_init__(self) -> None:
+        try:
+            is_finite = all(map(isfinite, (*self.times, *self.values)))
+        except TypeError:
+            raise SpecError("control-point times and values: expected sequences of numbers") from None
         if len(self.times) != len(self.values) or not self.times:
             raise SpecError(
                 f"{len(self.times)} times and {len(self.values)} values: expected equally many, one or more"
             )
         if self.times[0] != 0.0 or any(b <= a for a, b in pairwise(self.times)):
             raise SpecError(f"control-point times must increase strictly from 0, got {list(self.times)}")
-        if not all(map(isfinite, self.times)) or not all(map(isfinite, self.values)):
+        if not is_finite:
             raise SpecError("control-point times and values must be finite numbers")
         one_of("interpolation", self.interpolation, INTERPOLATIONS)
         if self.hold is not None:
