@@ -165,17 +165,11 @@ def _same(one: Trajectory | None, other: Trajectory | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """How much one output changes if the communication step is halved.
+    """How much one output changes if the communication step is halved."""
 
-    Attributes:
-        largest: maximum distance between the two trajectories, in the output's unit.
-        time: time in s at which it occurs.
-        span: maximum minus minimum of the finer trajectory, in the output's unit.
-    """
-
-    largest: float
-    time: float
-    span: float
+    largest: float  # maximum distance between the two trajectories, in the output's unit
+    time: float  # time in s at which it occurs
+    span: float  # maximum minus minimum of the finer trajectory, in the output's unit
 
     @property
     def relative(self) -> float:

@@ -157,17 +157,11 @@ def encoded(
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the guard of a worker has told.
+    """What the guard of a worker has told."""
 
-    Attributes:
-        cause: what ended the process, empty if the guard does not know.
-        refusals: what was refused before, and how it can be allowed; empty if nothing.
-        enforced: what is enforced, as bits of ``enum enforced`` in worker/platform/sandbox.h.
-    """
-
-    cause: str = ""
-    refusals: str = ""
-    enforced: int = 0
+    cause: str = ""  # what ended the process, empty if the guard does not know
+    refusals: str = ""  # what was refused before, and how it can be allowed; empty if nothing
+    enforced: int = 0  # what is enforced, as bits of ``enum enforced`` in worker/platform/sandbox.h
 
 
 def read_told(data: bytes) -> Told:
