@@ -3,6 +3,9 @@
 A message names the thing that is wrong, what was expected and what to do. ``exit_code`` is the exit code of
 the command line: 2 for wrong usage or a wrong file, 3 if a simulation, a language model or the machine
 failed.
+
+Who is told to state something writes options on the command line, and arguments in Python: ``written`` and
+``setting`` return what this process's reader writes, as a translation returns words of the reader's language.
 """
 
 import difflib
@@ -39,6 +42,9 @@ _VALIDATORS = (
 )
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
+Reader = Literal["Python", "command line"]
+# Who reads what this process says.
+_READERS: list[Reader] = ["Python"]
 
 
 class FalsifierError(Exception):
@@ -77,6 +83,17 @@ def in_section(file: str | None = None, key: str | None = None) -> Iterator[None
             raise
         keys = ".".join(part for part in (key, error.key) if part)
         raise SpecError(error.message, file=file, key=keys or None) from None
+
+
+@contextmanager
+def naming(place: str | None) -> Iterator[None]:
+    """Let errors raised within name an option or argument, if it is to blame, in place of a spec's key."""
+    try:
+        yield
+    except SpecError as error:
+        if place is None:
+            raise
+        raise SpecError(error.message, file=place) from None
 
 
 class FormulaError(FalsifierError):
@@ -167,6 +184,31 @@ class JournalError(FalsifierError):
     """A run directory cannot be read, belongs to another problem or is in use."""
 
 
+def reader() -> Reader:
+    """Return who reads what this process says."""
+    return _READERS[0]
+
+
+def speak_to(reader: Reader) -> None:
+    """Choose who reads what this process says from now on; worker processes are told what their parent is."""
+    _READERS[0] = reader
+
+
+def written(option: str, argument: str) -> str:
+    """Return which of the two the reader writes: an option of the command line, or an argument in Python."""
+    return option if reader() == "command line" else argument
+
+
+def setting(name: str, value: str = "") -> str:
+    """Return how the reader names a setting that is an option and an argument of the same name, or states it.
+
+    >>> setting("stop_time"), setting("stop_time", "SECONDS")
+    ('stop_time', 'stop_time=SECONDS')
+    """
+    option = f"--{name.replace('_', '-')}"
+    return written(f"{option} {value}", f"{name}={value}") if value else written(option, name)
+
+
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return the end of an error message: the most similar known name, if any, and the known names.
 
@@ -209,11 +251,25 @@ def rejected(message: str, given: object) -> str:
     message = next((own for begin, own in _VALIDATORS if message.startswith(begin)), "expected {}").format(
         message.partition(" be ")[2] or message
     )
-    text = repr(given)
-    return f"{message}, got {text if len(text) <= _SHOWN_INPUT else f'{text[:_SHOWN_INPUT]} ...'}"
+    return f"{message}, got {shown(given)}"
+
+
+def shown(given: object) -> str:
+    """Return a rejected value as a file has it; a long one without its end."""
+    text = str(given).lower() if isinstance(given, bool) else repr(given)
+    return text if len(text) <= _SHOWN_INPUT else f"{text[:_SHOWN_INPUT]} ..."
 
 
 def first_fault(error: "ValidationError") -> tuple[str, str]:
     """Return the key of the first thing that pydantic has found wrong, and what is wrong in our words."""
     first = error.errors()[0]
-    return ".".join(map(str, first["loc"])), rejected(first["msg"], first["input"])
+    return key_of(first["loc"]), rejected(first["msg"], first["input"])
+
+
+def key_of(location: Iterable[str | int]) -> str:
+    """Return the key at a location in nested tables and lists.
+
+    >>> key_of(("inputs", "u", "range", 1))
+    'inputs.u.range, entry 2'
+    """
+    return "".join(f", entry {p + 1}" if isinstance(p, int) else f".{p}" for p in location).lstrip("., ")

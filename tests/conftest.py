@@ -2,6 +2,7 @@
 
 import os
 import socket
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from falsifier.campaigns import run_campaign
+from falsifier.errors import speak_to
 from tests.campaigns.support import request, work_in_threads
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
@@ -46,6 +48,14 @@ def closed_network() -> Any:
         patch.delenv(name)
     yield
     patch.undo()
+
+
+@pytest.fixture
+def at_the_command_line() -> Iterator[None]:
+    """Messages name options."""
+    speak_to("command line")
+    yield
+    speak_to("Python")
 
 
 @pytest.fixture(scope="session")

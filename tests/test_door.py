@@ -32,6 +32,8 @@ def test_every_public_name_is_there(name: str) -> None:
 
 # What a user without a type checker may write.
 untyped: Any = falsifier
+PROBLEM = r"problem: expected a Problem, such as load_problem\('AT1'\), got 'AT1' \(str\)"
+CANDIDATE = falsifier.Candidate()
 WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "a tuple of limits": (lambda: untyped.InputRange("u", 0.0, 1.0, free=(3, 1)), r"'u': free: .*Freedom"),
     "no formula": (lambda: untyped.parse(None), "text of a formula, got None"),
@@ -40,7 +42,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         "'R': description: expected text, got 5",
     ),
     "a monitor of text": (lambda: untyped.Monitor("..", 0.1, 11), r"use parse\('..'\)"),
-    "one problem to resume": (lambda: untyped.resume("runs/x", problems=easy()), r"problems=\[problem\]"),
+    "one problem to resume": (
+        lambda: untyped.resume("runs/x", problems=easy()),
+        "problems: expected a list of Problem",
+    ),
     "a list of inputs": (
         lambda: untyped.Problem.from_fmu("my.fmu", "G[0,1] (x <= 1)", inputs=["u"]),
         r"inputs: expected choices by name.*\['u'\]",
@@ -62,15 +67,97 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "what templates lack": (
         lambda: untyped.Problem.from_fmu(AT, "rise signal=speed"),
-        "^formula: reference: this key is missing",
+        "^stl: reference: this key is missing",
     ),
     "no range": (
         lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", inputs={"throttle": 3, "brake": 0}),
         r"a value keeps throttle and brake constant.* add inputs=\{'NAME': \(LOW, HIGH\)\}",
     ),
-    "no requirement": (lambda: untyped.load_problem(AT), r"no requirement; add stl='G\[0,10\]"),
-    "a result to explain": (lambda: untyped.explain(easy(), 5), "explain: expected an evaluation"),
-    "a number to shrink": (lambda: untyped.shrink(easy(), 5), "shrink: expected an evaluation"),
+    "no requirement": (
+        lambda: untyped.load_problem(AT),
+        r"no requirement; use load_problem\('.*AT\.fmu', stl='G\[0,10\]",
+    ),
+    "a search without a requirement": (lambda: untyped.falsify(str(AT)), r"use load_problem\('.*', stl='G"),
+    "several requirements": (lambda: untyped.falsify("AT"), r"falsify\(load_problems\('AT'\)\) falsifies"),
+    "no target": (lambda: untyped.load_problem(""), "the target is empty; give a spec file"),
+    "a folder": (lambda: untyped.load_problem("."), r"resume\('\.'\) continues it"),
+    "no language model": (lambda: untyped.falsify(easy(), engine="hybrid"), r"name one \(llm=NAME\)"),
+    "units that differ": (
+        lambda: untyped.System({"a": AT}, {"a.throttle": "a.speed"}),
+        "state factor and offset of this connection$",
+    ),
+    "a text to search": (
+        lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", parameters={"wheelRadius": "big"}),
+        r"^parameters\.wheelRadius: .*: parameters=\{'wheelRadius': \(LOW, HIGH\)\}",
+    ),
+    "a division by zero": (
+        lambda: untyped.Problem.from_fmu(AT, "G[0,20] (1/0 < speed)"),
+        "^stl: (?!.*fits all times)",
+    ),
+    "a name given twice": (
+        lambda: untyped.Problem.from_fmu(
+            AT, "G (speed <= 1)", inputs={"throttle": (0, 100)}, parameters={"throttle": (0, 1)}
+        ),
+        "throttle: given in inputs and in parameters; drop one",
+    ),
+    "a step longer than the interval": (
+        lambda: untyped.Problem.from_fmu(AT, "speed <= 1", output_interval=0.01, step_size=0.02),
+        "^output_interval: .* is not an integer multiple of step_size = 0.02 s; try step_size = 0.01",
+    ),
+    "a number to evaluate": (lambda: untyped.evaluate(easy(), 5), "candidate: expected a Candidate, got 5"),
+    "a name to evaluate": (lambda: untyped.evaluate("AT1", CANDIDATE), PROBLEM),
+    "a name to simulate": (lambda: untyped.simulate("AT1"), PROBLEM),
+    "a name to assess": (lambda: untyped.assess("AT1", budget=1), PROBLEM),
+    "a name to find a margin of": (lambda: untyped.margin("AT1", "x <= {limit}", (0, 1)), PROBLEM),
+    "one end of a range": (
+        lambda: untyped.margin(easy(), "x <= {limit}", 3),
+        "between: expected a list",
+    ),
+    "three ends of a range": (lambda: untyped.margin(easy(), "x <= {limit}", (0, 1, 2)), r"\(LOW, HIGH\)"),
+    "a number as threshold": (lambda: untyped.margin(easy(), 5, (0, 1)), "vary: expected text, got 5"),
+    "a number to confirm": (lambda: untyped.confirm(easy(), 5), "evaluation: expected an Evaluation"),
+    "a number to map": (lambda: untyped.robustness_map(easy(), 5), "evaluation: expected an Evaluation"),
+    "a run to start from": (
+        lambda: untyped.falsify(easy(), start_from="at1"),
+        "start_from: expected a list of Candidate, got 'at1'",
+    ),
+    "a limit of what costs nothing": (
+        lambda: untyped.falsify(easy(), budget=falsifier.Budget(cost=1.0)),
+        "budget: tokens and cost limit a language model, and none is named",
+    ),
+    "one listener": (lambda: untyped.falsify(easy(), listeners=print), "listeners: expected a list of func"),
+    "a name to make an engine for": (lambda: untyped.make_engine("surrogate", "AT1", seed=0), PROBLEM),
+    "a seed below 0": (
+        lambda: untyped.make_engine("uniform", easy(), seed=-1),
+        "seed: expected",
+    ),
+    "a text as seed": (
+        lambda: untyped.make_engine("uniform", easy(), seed="x"),
+        "seed: expected",
+    ),
+    "lists as trajectory": (lambda: untyped.Trajectory([0, 1], {"x": [1, 2]}), "times: expected an array of"),
+    "NaN in a signal": (lambda: untyped.Signal((0.0, 1.0), (0.0, float("nan"))), "must be finite numbers"),
+    "a text in a signal": (lambda: untyped.Signal((0.0,), ("a",)), "expected sequences of numbers"),
+    "numbers as signal": (lambda: untyped.Signal(0.0, 1.0), "expected sequences of numbers"),
+    "an unknown interpolation": (
+        lambda: untyped.Signal((0.0,), (0.0,), "cubic"),
+        "interpolation: expected",
+    ),
+    "a coupling of an unknown kind": (lambda: untyped.Coupling(loops="x"), "coupling.loops: expected refuse"),
+    "a text as factor": (
+        lambda: untyped.Connection("a.y", factor="a"),
+        "a.y: factor: expected a finite number, got 'a'",
+    ),
+    "a text without name": (
+        lambda: untyped.Requirement("", "x <= 1"),
+        "expected a name, got ''",
+    ),
+    "a number as name": (
+        lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", name=5),
+        "requirement: expected a name, got 5",
+    ),
+    "a result to explain": (lambda: untyped.explain(easy(), 5), "evaluation: expected an Evaluation"),
+    "a number to shrink": (lambda: untyped.shrink(easy(), 5), "evaluation: expected an Evaluation"),
     "a device as directory": (
         lambda: untyped.falsify(easy(), budget=1, directory="/dev/null"),
         "/dev/null: no folder",

@@ -1,9 +1,22 @@
+import ast
 import pickle
+import re
+from pathlib import Path
 
 import pytest
 
 from falsifier import errors
-from falsifier.errors import FalsifierError, SimulationError, did_you_mean, rejected
+from falsifier.errors import (
+    FalsifierError,
+    SimulationError,
+    SpecError,
+    did_you_mean,
+    in_section,
+    naming,
+    rejected,
+    setting,
+    written,
+)
 
 TREE = [
     value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, FalsifierError)
@@ -19,6 +32,49 @@ def test_a_failed_simulation_travels_between_processes_with_what_it_knows() -> N
     error = SimulationError("it crashed", status="crashed", time=1.5, log=("a", "b"))
     read = pickle.loads(pickle.dumps(error))
     assert (str(read), read.status, read.time, read.log) == ("it crashed", "crashed", 1.5, ("a", "b"))
+
+
+def test_in_python_arguments_are_named() -> None:
+    assert (setting("stop_time"), written("--llm NAME", "llm=NAME")) == ("stop_time", "llm=NAME")
+
+
+def test_at_the_command_line_options_are_named(at_the_command_line: None) -> None:
+    assert setting("stop_time", "SECONDS") == "--stop-time SECONDS"
+    assert written("--llm NAME", "llm=NAME") == "--llm NAME"
+
+
+@pytest.mark.parametrize(
+    ("place", "message"), [("--set u", "--set u: is no number"), (None, "my.toml: inputs.u: is no number")]
+)
+def test_an_option_is_to_blame_in_place_of_the_spec_that_it_changes(place: str | None, message: str) -> None:
+    with pytest.raises(SpecError) as caught, in_section("my.toml"), naming(place), in_section(key="inputs.u"):
+        raise SpecError("is no number")
+    assert str(caught.value) == message
+
+
+# What reads and writes options; options of other programs; what is written for the command line.
+_OF_OPTIONS = (
+    *("problem/shorthand.py", "llm/failures.py", "llm/providers.py", "campaigns/archcomp.py"),
+    "counterexamples/export/components.py",
+)
+
+
+def test_only_the_command_line_speaks_of_options_without_asking_who_reads() -> None:
+    package = Path(errors.__file__).parent
+    found = []
+    for file in package.rglob("*.py"):
+        place = file.relative_to(package)
+        if place.parts[0] in ("__init__.py", "cli", "views") or str(place) in _OF_OPTIONS:
+            continue
+        nodes = list(ast.walk(ast.parse(file.read_text())))
+        calls = [n for n in nodes if isinstance(n, ast.Call) and getattr(n.func, "id", "") == "written"]
+        allowed = {part for call in calls for part in ast.walk(call)}
+        allowed |= {n.value for n in nodes if isinstance(n, ast.Expr)}  # docstrings
+        for node in nodes:
+            text = node.value if isinstance(node, ast.Constant) and node not in allowed else ""
+            if isinstance(text, str) and re.search(r"(?<![\w-])--[a-z]", text):
+                found.append(f"{place}: {text}")
+    assert not found
 
 
 def test_known_names_are_listed_with_the_nearest_first() -> None:

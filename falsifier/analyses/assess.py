@@ -16,7 +16,7 @@ from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.problem.problem import Problem, check_limits
+from falsifier.problem.problem import Problem, check_limits, check_problem
 from falsifier.search.findings import Failure, Finding
 from falsifier.search.findings import failures as by_cause
 from falsifier.search.vacuity import Vacuity
@@ -154,6 +154,7 @@ def assess(
         SimulationError: if every simulation failed.
         ModelError: if the model cannot be used at all.
     """
+    check_problem(problem)
     budget, seed = whole("budget", budget, least=1), whole("seed", seed, least=0)
     if not 0.0 < confidence < 1.0:
         raise SpecError(f"confidence: expected a number between 0 and 1, got {confidence!r}")

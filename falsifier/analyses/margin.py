@@ -4,17 +4,18 @@ from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import ceil, floor, inf, log2, log10
+from numbers import Real
 
 from falsifier.analyses.lint import ranges_of
-from falsifier.core.arguments import finite, whole
+from falsifier.core.arguments import instance, list_of, whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE, make_engine
-from falsifier.errors import SimulationError, SpecError
+from falsifier.errors import SimulationError, SpecError, setting, written
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, check_problem
 from falsifier.problem.requirement import Requirement, formula_of
-from falsifier.problem.shorthand import in_python, requirement_of
+from falsifier.problem.shorthand import requirement_of
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.loop import search
@@ -102,21 +103,25 @@ def margin(
             nothing, or not always in the same direction.
         SimulationError: if most simulations failed.
     """
-    low, high = finite("between", between[0]), finite("between", between[1])
+    check_problem(problem)
+    instance("vary", vary, str, "text")
+    given = list_of("between", between, Real, "two numbers")
     if LIMIT not in vary:
-        raise SpecError(f"vary: expected {LIMIT} in place of the threshold, got {vary!r}")
-    if low >= high:
-        raise SpecError(f"between: expected LOW < HIGH, got {low:g}:{high:g}")
+        raise SpecError(f"{_stated()}: expected {LIMIT} in place of the threshold, got {vary!r}")
+    if len(given) != 2 or not -inf < given[0] < given[1] < inf:
+        raise SpecError(
+            f"{setting('between')}: expected two numbers (LOW, HIGH) with LOW < HIGH, got {between!r}"
+        )
+    low, high = given
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
     check_names(RunRequest(problems=(), engine=engine))
-    with in_python("vary"):
-        lowest, highest = (formula_at(problem, vary, threshold) for threshold in (low, high))
+    lowest, highest = (formula_at(problem, vary, threshold) for threshold in (low, high))
     experiment = problem.experiment
     step, samples = experiment.output_interval, experiment.samples
     signs = differences(lowest, highest, step=step, samples=samples, ranges=ranges_of(problem))
     if len(signs) != 1:
         what = "is the same" if not signs else "changes in either direction, depending on the signals,"
-        raise SpecError(f"vary: the robustness {what} for {LIMIT} = {low:g} and {high:g}")
+        raise SpecError(f"{_stated()}: the robustness {what} for {LIMIT} = {low:g} and {high:g}")
     finest = 10.0 ** floor(log10(_FINEST * RESOLUTION * (high - low)))
     between_two = finest if lowest.windows == highest.windows else step
     count = ceil(round((high - low) / between_two, 6))
@@ -136,8 +141,12 @@ def margin(
 
 def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
     """Return the formula in which the threshold has this value; SpecError if it does not fit the problem."""
-    stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"))
+    stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"), _stated())
     return formula_of(stated, problem.info, problem.experiment, key="")
+
+
+def _stated() -> str:
+    return written("--stl", "vary")
 
 
 @dataclass(slots=True)

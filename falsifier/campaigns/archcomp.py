@@ -27,7 +27,7 @@ from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, first_fault
-from falsifier.evaluation.evaluate import evaluate
+from falsifier.evaluation.evaluate import evaluate_any
 from falsifier.evaluation.input_file import csv_rows
 from falsifier.problem.loading import find_spec, load_problem
 from falsifier.problem.problem import Problem
@@ -277,7 +277,7 @@ def _checked(row: Row, budget: int) -> Revalidated:
         candidate = _candidate(row, problem)
     except (FalsifierError, ValueError) as error:
         return result(str(error))
-    evaluation = evaluate(problem, candidate)
+    evaluation = evaluate_any(problem, candidate)
     robustness, allowed = evaluation.robustness, tolerance(row.requirement)
     if robustness is None:
         return result(f"simulation failed: {evaluation.reason}")

@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, written
 from falsifier.record.files import CAMPAIGN, can_be_a_folder, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
@@ -48,8 +48,8 @@ def check_new(directory: Path) -> None:
     if is_campaign(directory) or holds_run(directory):
         what = "campaign" if is_campaign(directory) else "run"
         raise JournalError(
-            f"{directory} already contains a {what}: choose another --out, or to continue it: "
-            f"falsifier resume {directory}"
+            f"{directory} already contains a {what}: choose another directory, or to continue it: "
+            + written(f"falsifier resume {directory}", f"resume_campaign({str(directory)!r})")
         )
 
 

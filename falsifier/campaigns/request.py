@@ -11,13 +11,13 @@ from pydantic import Field
 from falsifier.core.files import readable_part
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
-from falsifier.search.budget import Budget
+from falsifier.search.budget import Budget, stated_price
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest, Strict
 
@@ -185,18 +185,17 @@ def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | 
         limit += inf if budget.cost is None else budget.cost
     if request.limits is not None and request.limits.cost is not None:
         limit = min(limit, request.limits.cost)
-    told = "free of charge"
+    told, total = "free of charge", written("--total {}=N", "limits=Budget({}=N)")
     if limit < inf:
         told = f"the cost is limited to {limit:.4g} US dollars"
     elif cost == inf:
         told = (
-            "the price is unknown (--llm-option price=SENT:RECEIVED), so the cost is too: --total tokens=N "
-            "limits it"
+            f"the price is unknown ({stated_price()}), so the cost is too: {total.format('tokens')} limits it"
         )
     elif cost:
         told = (
             f"sending them with the longest prompts costs about {cost:.4g} US dollars; replies cost extra, "
-            "and --total cost=N limits all of it"
+            f"and {total.format('cost')} limits all of it"
         )
     text = f"up to {counted(questions, 'question')} to language models; {told}"
     return Ceiling(None if cost == inf else cost, text)

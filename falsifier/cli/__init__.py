@@ -4,6 +4,7 @@ import errno
 import os
 import sys
 import traceback
+from functools import partial
 from importlib import import_module
 from io import StringIO
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -19,7 +20,7 @@ from falsifier.cli.output import (
     stop_at_interrupts,
 )
 from falsifier.core.posix import check_memory_limits
-from falsifier.errors import FalsifierError, did_you_mean
+from falsifier.errors import FalsifierError, did_you_mean, reader, speak_to
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
@@ -31,10 +32,9 @@ _FAILED = 3
 # Set by the shell when it asks for completions; falsifier completes by what click brings.
 _COMPLETES = "_FALSIFIER_COMPLETE"
 # What a machine has run out of, and what to do.
-_ELSEWHERE = "or choose a location on another disk, for example with --out DIR"
 _EXHAUSTED = {
-    errno.ENOSPC: f"free some space, {_ELSEWHERE}",
-    errno.EDQUOT: f"delete files of yours, {_ELSEWHERE}",
+    errno.ENOSPC: "free some space, or choose a location on another disk",
+    errno.EDQUOT: "delete files of yours, or choose a location on another disk",
     errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
     errno.ENOMEM: "free memory, or raise the limit (ulimit -v)",
     errno.EMFILE: "raise the limit on open files (ulimit -n)",
@@ -150,7 +150,9 @@ failed, 130 interrupted.
 )
 @click.version_option(__version__, prog_name="falsifier")
 def cli() -> None:
-    """Run the given command; its help text is _HELP."""
+    """Run the given command, whose messages speak of options; its help text is _HELP."""
+    click.get_current_context().call_on_close(partial(speak_to, reader()))
+    speak_to("command line")
 
 
 def main() -> NoReturn:
@@ -212,7 +214,6 @@ def _report_refusal(error: OSError) -> int:
     elif not where:
         warn(f"falsifier: {error}")
     else:
-        cure = "choose a readable and writable location, for example with --out DIR"
-        warn(f"falsifier: {where}{error.strerror}; {cure}")
+        warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2
     return _FAILED

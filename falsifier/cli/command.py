@@ -64,6 +64,8 @@ def _number_text(kind: "click.ParamType[Any]") -> str:
     """What an option of this type expects; empty if that is no number."""
     if isinstance(kind, click.IntRange):
         return f"a whole number from {kind.min}" + (" on" if kind.max is None else f" to {kind.max}")
+    if kind.name == "number":
+        return "a positive number"
     return {click.INT: "a whole number", click.FLOAT: "a number"}.get(kind, "")
 
 

@@ -22,6 +22,7 @@ from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
+from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
 from falsifier.views.model_text import NO_INTERFACE, info_text, model_json, simulink_text
 
@@ -195,8 +196,8 @@ def _named(given: Path) -> "Path | System":
 
 def _spec_of(given: Path) -> Path | None:
     """Return the spec that is given, or that of the bundled requirement whose name is; None for an FMU."""
-    if given.suffix == ".toml":
-        return given
+    if (target := Target.parse(str(given))).kind == "spec":
+        return Path(target.file)
     if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
         return find_spec(str(given))[0]
     return None

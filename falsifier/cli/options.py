@@ -29,18 +29,20 @@ PATH = click.Path(path_type=Path)
 DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
 
 
+def number(text: str) -> float:
+    """Return a positive number; ValueError if it is none, which as the type of an option is a usage error."""
+    with suppress(ValueError):
+        if 0 < (value := float(text)) < inf:
+            return value
+    raise ValueError(text)
+
+
 class Parameterized(NamedTuple):
-    """Value of ``--parameterization``.
+    """Value of ``--parameterization``."""
 
-    Attributes:
-        profile: name of a profile of the spec.
-        kind: free or fixed; None if it is not stated.
-        shortest_piece: minimum time in s between two control points of every input.
-    """
-
-    profile: str | None = None
-    kind: "Parameterization | None" = None
-    shortest_piece: float | None = None
+    profile: str | None = None  # name of a profile of the spec
+    kind: "Parameterization | None" = None  # free or fixed; None if it is not stated
+    shortest_piece: float | None = None  # minimum time in s between two control points of every input
 
 
 def option(flag: str, name: str, text: str, *, multiple: bool, **more: Any) -> Decorator:
@@ -77,7 +79,11 @@ def parameterized(text: str) -> Parameterized:
     for word in text.split(","):
         kind, colon, seconds = word.partition(":")
         if kind == "free" and colon:
-            said: dict[str, Any] = {"kind": kind, "shortest_piece": _seconds(text, seconds)}
+            try:
+                said: dict[str, Any] = {"kind": kind, "shortest_piece": number(seconds)}
+            except ValueError:
+                expected = "expected a time in s, for example free:0.5"
+                raise click.UsageError(f"--parameterization {text}: {expected}") from None
         else:
             said = {"kind" if word in ("free", "fixed") else "profile": word}
         if not word or any(getattr(found, name) for name in said):
@@ -87,13 +93,6 @@ def parameterized(text: str) -> Parameterized:
             )
         found = found._replace(**said)
     return found
-
-
-def _seconds(text: str, seconds: str) -> float:
-    with suppress(ValueError):
-        if 0 < (value := float(seconds)) < inf:
-            return value
-    raise click.UsageError(f"--parameterization {text}: expected a time in s, for example free:0.5")
 
 
 def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
@@ -161,8 +160,16 @@ def target_argument(command: Function) -> Function:
     return click.argument("target", shell_complete=complete)(command)
 
 
-def problem_options(command: Function) -> Function:
+def problem_options(command: Function, *, searches: bool = True) -> Function:
     """Add the target and everything that changes a problem, except its requirement."""
+    search = click.option(
+        "--search",
+        "ranges",
+        multiple=True,
+        metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
+        help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or the "
+        "FMU's min and max. Repeatable.",
+    )
     return add(
         command,
         target_argument,
@@ -173,26 +180,19 @@ def problem_options(command: Function) -> Function:
             metavar="NAME=VALUE",
             help="Keep an input constant, or set a parameter, start value or string. Repeatable.",
         ),
-        click.option(
-            "--search",
-            "ranges",
-            multiple=True,
-            metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
-            help="Input, parameter or start value to search. NAME alone: an input with the spec's range, or "
-            "the FMU's min and max. Repeatable.",
-        ),
+        *([search] if searches else []),
         parameterization_option(),
         interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
-        click.option("--stop-time", type=float, metavar="SECONDS", help="End of each simulation."),
+        click.option("--stop-time", type=number, metavar="SECONDS", help="End of each simulation."),
         click.option(
             "--output-interval",
-            type=float,
+            type=number,
             metavar="SECONDS",
             help="Step of the output grid on which the requirement is monitored.",
         ),
         click.option(
             "--time-limit",
-            type=float,
+            type=number,
             metavar="SECONDS",
             help="Maximum wall-clock time of one simulation; default: the spec's, or 60 for each tenth of "
             "the simulated time.",
@@ -201,9 +201,9 @@ def problem_options(command: Function) -> Function:
     )
 
 
-def requirement_options(command: Function) -> Function:
+def requirement_options(command: Function, *, searches: bool = True) -> Function:
     """Add problem_options and the requirement."""
-    return add(command, stl_option(), problem_options)
+    return add(command, stl_option(), partial(problem_options, searches=searches))
 
 
 def problem_source(options: dict[str, Any]) -> "ProblemSource":
@@ -264,10 +264,12 @@ def limit_options(*, note: str = "") -> Decorator:
     """Limits of a run in addition to --budget."""
     return lambda command: add(
         command,
-        click.option("--seconds", type=float, help=f"Maximum wall-clock time in seconds{note}."),
-        click.option("--max-tokens", type=int, help=f"Maximum number of language-model tokens{note}."),
+        click.option("--seconds", type=number, help=f"Maximum wall-clock time in seconds{note}."),
         click.option(
-            "--max-cost", type=float, help=f"Maximum cost of the language model in US dollars{note}."
+            "--max-tokens", type=click.IntRange(1), help=f"Maximum number of language-model tokens{note}."
+        ),
+        click.option(
+            "--max-cost", type=number, help=f"Maximum cost of the language model in US dollars{note}."
         ),
     )
 
@@ -282,9 +284,9 @@ _TOTALS: dict[str, Callable[[str], float]] = {
 
 
 def _total(text: str) -> tuple[str, float]:
-    name, _, number = text.partition("=")
+    name, _, limit = text.partition("=")
     try:
-        return name, _TOTALS[name](number)
+        return name, number(limit) and _TOTALS[name](limit)
     except (KeyError, ValueError):
         expected = ", ".join(f"{name}=N" for name in _TOTALS)
         raise click.UsageError(f"--total {text}: expected {expected}, for example cost=5") from None

@@ -26,11 +26,7 @@ _SHOW_CURSOR = b"\x1b[?25h\n"
 
 
 def say(text: str, *, nl: bool = True) -> None:
-    """Print a result, without control characters.
-
-    Raises:
-        OSError: if stdout cannot be written to.
-    """
+    """Print a result, without control characters; OSError if stdout cannot be written to."""
     click.echo(plain(text), nl=nl)
 
 

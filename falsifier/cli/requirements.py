@@ -110,8 +110,8 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     settings = llm_settings(options)
     if settings is None:
         raise SpecError(
-            "formalize needs --llm NAME, which proposes the readings; without a language model, choose a "
-            f"template for --stl ({', '.join(TEMPLATES)}): docs/requirements.md"
+            f"formalize needs --llm NAME, which proposes the readings; or choose a template "
+            f"({', '.join(TEMPLATES)}), as --stl 'settles signal=speed reference=80 within=2% time=3'"
         )
     if choose is not None or out is not None:  # before anything is paid for
         _file(subject_of(target), out)

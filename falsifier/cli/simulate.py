@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +32,7 @@ _FILES = ("trajectory.csv", "input.csv")
 
 
 @command()
-@requirement_options
+@partial(requirement_options, searches=False)
 @inputs_option("Inputs to simulate")
 @out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
 @json_option
@@ -54,6 +55,11 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}
+        tried = {n: (min(s.values), max(s.values)) for n, s in signals.items() if n in inputs}
+        tried |= {n: (value, value) for n, value in given.items() if n in problem.info}
+        for name, (low, high) in tried.items():
+            if excess := problem.info[name].excess(low, high):
+                warn(f"{name}: {f'{low:g}' if low == high else f'[{low:g}, {high:g}]'} {excess}")
         if inputs and not signals:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
@@ -107,7 +113,7 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
         warn(f"{file}: ends at {found.end:g} s; the simulation at {stop_time:g} s: --stop-time changes it")
-    if found.end < stop_time and any(len(s.times) > 1 for s in found.signals.values()):
+    if 0.0 < found.end < stop_time:
         warn(f"{file}: ends at {found.end:g} s; the last values are kept until {stop_time:g} s")
     return dict(found.signals)
 

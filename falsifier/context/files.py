@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path, PurePosixPath
 
 from falsifier.core.secrets import line_of_held_secret, line_of_secret
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, setting
 from falsifier.fmu.description.archive import UNREADABLE, open_archive
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
@@ -17,7 +17,7 @@ _STANDARD = ("fmi2", "fmi3", "fmiplatform", "fmimodel", "sundials", "cvode")
 _MAX_BYTES = 4 << 20
 _MAX_FILES = 400
 # What to do about a file inside an FMU that cannot be told: it cannot be left out alone.
-NAME_THEM = "unpack the FMU, and name the files that matter with --context FILE instead of --context fmu"
+NAME_THEM = "unpack the FMU, and name the files that matter as context instead of fmu"
 # The mark of UTF-32 begins like that of UTF-16.
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
@@ -124,8 +124,8 @@ class Sentry:
         if file not in self._checked:
             raise SpecError(
                 f"context {shown}: line {line} looks like a key, token or password, so nothing is sent; "
-                f"{otherwise}; if it is not, allow this file with --context 'checked:{file}', or with "
-                f"checked = ['{file}'] in the spec's [context]"
+                f"{otherwise}; if it is not, allow this file with {setting('context')} "
+                f"'checked:{file}', or with checked = ['{file}'] in the spec's [context]"
             )
         note = f"context {shown}: line {line} looks like a key, token or password, and was allowed"
         if note not in self.notes:

@@ -1,4 +1,4 @@
-"""Checks of values that users write in Python."""
+"""Checks of values that users write in Python; what is wrong is a SpecError that names the argument."""
 
 import reprlib
 from collections.abc import Iterable, Sequence
@@ -7,17 +7,15 @@ from numbers import Real
 from operator import index
 from os import PathLike
 from pathlib import Path
-from typing import SupportsIndex
+from typing import Any, SupportsIndex, TypeVar
 
 from falsifier.errors import SpecError
 
+T = TypeVar("T")
+
 
 def whole(name: str, given: object, *, least: int) -> int:
-    """Return a whole number that a user gave, numpy's too, as an int.
-
-    Raises:
-        SpecError: naming the argument, if it is no whole number or less than the least.
-    """
+    """Return a whole number that a user gave, numpy's too, as an int."""
     try:
         if isinstance(given, SupportsIndex) and not isinstance(given, bool) and index(given) >= least:
             return index(given)
@@ -27,56 +25,45 @@ def whole(name: str, given: object, *, least: int) -> int:
 
 
 def finite(name: str, given: object) -> float:
-    """Return a number that a user gave, numpy's too, as a float.
-
-    Raises:
-        SpecError: naming the argument, if it is no number, NaN or infinite.
-    """
+    """Return a number that a user gave, numpy's too, as a float."""
     if isinstance(given, Real) and not isinstance(given, bool) and isfinite(given):
         return float(given)
     raise SpecError(f"{name}: expected a finite number, got {given!r}")
 
 
 def positive(name: str, given: object) -> float:
-    """Return a positive number that a user gave, such as a duration in s.
-
-    Raises:
-        SpecError: naming the argument, if it is no number, not positive, NaN or infinite.
-    """
+    """Return a positive number that a user gave, such as a duration in s."""
     if (number := finite(name, given)) > 0:
         return number
     raise SpecError(f"{name}: expected a positive number, got {given!r}")
 
 
 def instance(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:
-    """Check the type of a value that a user gave.
-
-    Raises:
-        SpecError: naming the argument, what was expected and what was given.
-    """
+    """Check the type of a value that a user gave."""
     if not isinstance(given, kind):
         raise SpecError(f"{name}: expected {expected}, got {reprlib.repr(given)} ({type(given).__name__})")
 
 
 def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> Path:
-    """Return the path that a user gave; SpecError naming the argument if it is none."""
+    """Return the path that a user gave."""
     instance(name, given, (str, PathLike), expected)
     return Path(given)
 
 
-def texts(name: str, given: Iterable[str]) -> tuple[str, ...]:
-    """Return the texts of a list that a user gave; SpecError naming the argument if it is no such list."""
+def list_of(name: str, given: Iterable[T], kind: Any, expected: str) -> tuple[T, ...]:
+    """Return what is in a list that a user gave, all of one kind."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None
-    if found is None or not all(isinstance(each, str) for each in found):
-        raise SpecError(f"{name}: expected a list of texts, got {given!r}")
+    if found is None or not all(isinstance(each, kind) for each in found):
+        raise SpecError(f"{name}: expected a list of {expected}, got {reprlib.repr(given)}")
     return found
 
 
-def one_of(name: str, given: object, allowed: Sequence[str]) -> None:
-    """Check that a word is one of those allowed.
+def texts(name: str, given: Iterable[str]) -> tuple[str, ...]:
+    """Return the texts of a list that a user gave."""
+    return list_of(name, given, str, "texts")
 
-    Raises:
-        SpecError: naming the argument and the allowed words.
-    """
+
+def one_of(name: str, given: object, allowed: Sequence[str]) -> None:
+    """Check that a word is one of those allowed."""
     if given not in allowed:
         raise SpecError(f"{name}: expected {', '.join(allowed[:-1])} or {allowed[-1]}, got {given!r}")

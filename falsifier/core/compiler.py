@@ -19,11 +19,7 @@ _ERROR = re.compile(r"\berror:|undefined (reference|symbol)", re.IGNORECASE)
 
 
 def compiler() -> list[str]:
-    """Return the command of a C compiler.
-
-    Raises:
-        ModelError: if there is none.
-    """
+    """Return the command of a C compiler; ModelError if there is none."""
     for name in _COMPILERS:
         if shutil.which(name):
             return [name]

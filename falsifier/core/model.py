@@ -202,6 +202,17 @@ class ModelInfo:
 GRID_ROUNDING = 1e-6
 
 
+def _multiple(what: str, whole: float, part: str, period: float) -> None:
+    """Check that one time is an integer multiple of another."""
+    count = max(round(whole / period), 1)
+    if abs(whole / period - count) > GRID_ROUNDING * count:
+        raise SpecError(
+            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try "
+            f"{part} = {whole / count:g}",
+            key=part,
+        )
+
+
 @dataclass(frozen=True, slots=True)
 class Experiment:
     """How one simulation is run; the same for all candidates of a problem.
@@ -237,14 +248,14 @@ class Experiment:
                 positive(name, given)
         if not isinstance(self.outputs, tuple):
             raise SpecError(f"outputs: expected a tuple of names, got {self.outputs!r}")
-        intervals = self.stop_time / self.output_interval
-        count = max(round(intervals), 1)
-        if abs(intervals - count) > GRID_ROUNDING * count:
-            raise SpecError(
-                f"stop_time = {self.stop_time:g} s is not an integer multiple of output_interval = "
-                f"{self.output_interval:g} s; try output_interval = {self.stop_time / count:g}",
-                key="output_interval",
-            )
+        _multiple("stop_time", self.stop_time, "output_interval", self.output_interval)
+        if self.step_size is not None:
+            _multiple("output_interval", self.output_interval, "step_size", self.step_size)
+
+    @property
+    def steps_per_output(self) -> int:
+        """Number of communication steps in the output interval."""
+        return round(self.output_interval / (self.step_size or self.output_interval))
 
     @property
     def samples(self) -> int:

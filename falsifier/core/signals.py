@@ -16,6 +16,9 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import one_of, positive
+from falsifier.errors import SpecError
+
 Interpolation = Literal["pchip", "linear", "constant"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
@@ -35,7 +38,7 @@ class Signal:
         hold: period in s at which the interpolated signal is sampled and held; None: it is not held.
 
     Raises:
-        ValueError: if the lengths differ, the times do not increase from 0, or a value is not finite.
+        SpecError: if the lengths differ, the times do not increase from 0, or a value is not finite.
     """
 
     times: tuple[float, ...]
@@ -44,20 +47,21 @@ class Signal:
     hold: float | None = None
 
     def __post_init__(self) -> None:
+        try:
+            is_finite = all(map(isfinite, (*self.times, *self.values)))
+        except TypeError:
+            raise SpecError("control-point times and values: expected sequences of numbers") from None
         if len(self.times) != len(self.values) or not self.times:
-            raise ValueError(
+            raise SpecError(
                 f"{len(self.times)} times and {len(self.values)} values: expected equally many, one or more"
             )
         if self.times[0] != 0.0 or any(b <= a for a, b in pairwise(self.times)):
-            raise ValueError(f"control-point times must increase strictly from 0, got {list(self.times)}")
-        if not all(map(isfinite, self.times)) or not all(map(isfinite, self.values)):
-            raise ValueError("control-point times and values must be finite numbers")
-        if self.interpolation not in INTERPOLATIONS:
-            raise ValueError(
-                f"unknown interpolation {self.interpolation!r}, expected one of {INTERPOLATIONS}"
-            )
-        if self.hold is not None and not self.hold > 0:
-            raise ValueError(f"hold must be a positive number of seconds, got {self.hold}")
+            raise SpecError(f"control-point times must increase strictly from 0, got {list(self.times)}")
+        if not is_finite:
+            raise SpecError("control-point times and values must be finite numbers")
+        one_of("interpolation", self.interpolation, INTERPOLATIONS)
+        if self.hold is not None:
+            positive("hold", self.hold)
 
     @classmethod
     def evenly(

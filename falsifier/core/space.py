@@ -174,7 +174,8 @@ class SearchSpace:
         stop_time: end of the simulation in s.
 
     Raises:
-        SpecError: if the stop time is not positive, or a name occurs twice.
+        SpecError: if the stop time is not positive or shorter than a period of an input, or a name occurs
+            twice.
     """
 
     inputs: tuple[InputRange, ...]
@@ -189,6 +190,12 @@ class SearchSpace:
         for name in self.names:
             if self.names.count(name) > 1:
                 raise SpecError(f"search space: {name!r} has two ranges; keep one")
+        periods = [(r, "hold", r.hold or 0.0) for r in self.inputs]
+        periods += [(r, "free: min_interval", r.free.min_interval) for r in self.inputs if r.free]
+        for r, what, period in periods:
+            if period > self.stop_time:
+                end = f"the simulation of {self.stop_time:g} s"
+                raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
         ranges: tuple[Range, ...] = (*self.inputs, *self.parameters)
@@ -278,15 +285,12 @@ class SearchSpace:
         parts.extend(float(candidate.parameters[p.name]) for p in self.parameters)
         return np.array(parts, dtype=np.float64)
 
-    def admit(self, candidate: Candidate) -> Candidate:
-        """Return the candidate as it will be simulated.
-
-        Values outside their range by no more than a rounding error are clipped; integers, Booleans and
-        enumerations are rounded to the nearest allowed number; each input gets its hold.
+    def check(self, candidate: Candidate) -> None:
+        """Check that a candidate has a value for all that is searched, and none outside its range.
 
         Raises:
-            CandidateError: naming the input or parameter that is unknown or missing or whose control points
-                the space does not allow, or all that are outside their ranges.
+            CandidateError: naming the input or parameter that is unknown or missing, or all that are outside
+                their ranges.
         """
         for name in (*candidate.signals, *candidate.parameters):
             if name not in self.names:
@@ -295,9 +299,8 @@ class SearchSpace:
         missing += [p for p in self.parameters if p.name not in candidate.parameters]
         if missing:
             raise CandidateError(f"{missing[0].label} is missing")
-        times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
         outside = [
-            *(_signal_outside(r, times[r.name], candidate.signals[r.name].values) for r in self.inputs),
+            *(_signal_outside(r, candidate.signals[r.name]) for r in self.inputs),
             *(
                 f"{p.label}: {value:g} is {_outside(p)}"
                 for p in self.parameters
@@ -306,6 +309,18 @@ class SearchSpace:
         ]
         if any(outside):
             raise CandidateError("; ".join(filter(None, outside)))
+
+    def admit(self, candidate: Candidate) -> Candidate:
+        """Return the candidate as it will be simulated.
+
+        Values outside their range by no more than a rounding error are clipped; integers, Booleans and
+        enumerations are rounded to the nearest allowed number; each input gets its hold.
+
+        Raises:
+            CandidateError: as of ``check``, or naming an input whose control points the space does not allow.
+        """
+        self.check(candidate)
+        times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
         signals = {r.name: _admitted_signal(r, times[r.name], candidate.signals[r.name]) for r in self.inputs}
         parameters = {p.name: _into_range(candidate.parameters[p.name], p) for p in self.parameters}
         return replace(candidate, signals=signals, parameters=parameters)
@@ -379,9 +394,10 @@ def _is_outside(ranged: Range, value: float) -> bool:
     return not ranged.low - tolerance <= value <= ranged.high + tolerance
 
 
-def _signal_outside(r: InputRange, times: Sequence[float], values: Sequence[float]) -> str:
+def _signal_outside(r: InputRange, signal: Signal) -> str:
     """What is outside the range of an input; empty if nothing is."""
-    found = [(t, v) for t, v in zip(times, values, strict=True) if _is_outside(r, v)]
+    values = signal.values
+    found = [(t, v) for t, v in zip(signal.times, values, strict=True) if _is_outside(r, v)]
     if not found:
         return ""
     if len(set(values)) == 1 < len(values):

@@ -8,6 +8,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import instance
 from falsifier.errors import MonitorError, did_you_mean
 
 # Maximum number of distinct values, all integers, of a real signal that is taken for discrete.
@@ -31,7 +32,8 @@ class Trajectory:
     log: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, column in self.columns.items():
+        for name, column in {"times": self.times, **self.columns}.items():
+            instance(name, column, np.ndarray, "an array of numpy")
             if column.shape != self.times.shape:
                 raise MonitorError(
                     f"signal {name!r} has {column.shape[0] if column.ndim else 0} samples, "

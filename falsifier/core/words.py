@@ -56,10 +56,11 @@ def parameterization_text(r: InputRange) -> str:
     >>> parameterization_text(InputRange("u", 0.0, 1.0, control_points=5))
     '(5 control points, pchip)'
     """
+    held = "" if r.hold is None else f", each held for {r.hold:g} s"
     if r.free is None:
-        return f"({counted(r.control_points, 'control point')}, {r.interpolation})"
+        return f"({counted(r.control_points, 'control point')}, {r.interpolation}{held})"
     most = counted(r.free.max_control_points, "control point")
-    return f"(free: at most {most}, at least {r.free.min_interval:g} s apart)"
+    return f"(free: at most {most}, at least {r.free.min_interval:g} s apart{held})"
 
 
 def counted(count: int, noun: str) -> str:

@@ -16,7 +16,7 @@ from falsifier.counterexamples.store import (
     shrunk_file,
 )
 from falsifier.engines.protocol import KNOWN
-from falsifier.errors import CandidateError, SimulationError, SpecError
+from falsifier.errors import CandidateError, SimulationError, SpecError, written
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import FmuModel, System, resolved
@@ -31,24 +31,16 @@ from falsifier.stl.margins import margin_words, signed
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A counterexample, or the simulation of a run with the smallest robustness that is no violation.
+    """A counterexample, or the simulation of a run with the smallest robustness that is no violation."""
 
-    Attributes:
-        file: the counterexample's file; of a nearest miss, that which its run would have.
-        candidate: what was simulated.
-        source: how to load the problem; None if it was made in Python.
-        allow: what the FMU was allowed then; None if that is not recorded.
-        deny: what it was denied then.
-        stored: content of the counterexample's file; None for a nearest miss.
-        text: what a nearest miss is, in words, before anything is said about it; empty for a counterexample.
-    """
-
-    file: Path
-    candidate: Candidate
-    source: ProblemSource | None
-    allow: tuple[str, ...] | None
-    deny: tuple[str, ...]
+    file: Path  # the counterexample's file; of a nearest miss, that which its run would have
+    candidate: Candidate  # what was simulated
+    source: ProblemSource | None  # how to load the problem; None if it was made in Python
+    allow: tuple[str, ...] | None  # what the FMU was allowed then; None if that is not recorded
+    deny: tuple[str, ...]  # what it was denied then
+    # Content of the counterexample's file; None for a nearest miss.
     stored: StoredCounterexample | None = None
+    # What a nearest miss is, in words, before anything is said about it; empty for a counterexample.
     text: str = ""
 
     @property
@@ -113,23 +105,18 @@ class Case:
             raise SpecError(
                 f"the nearest miss of {problem.name} now violates (robustness "
                 f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
-                f"falsifier run ... --inputs {self.place}"
+                + written(f"falsifier run ... --inputs {self.place}", "falsify(..., start_from=[...])")
             )
         if not self.is_miss and not evaluation.violated:
             found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
             raise SpecError(
-                f"the counterexample of {problem.name} no longer violates: {found}; to search for another "
-                "one: falsifier run"
+                f"the counterexample of {problem.name} no longer violates: {found}; search for another one"
             )
         return replace(evaluation, candidate=replace(evaluation.candidate, rationale=""))
 
 
 def counterexample_case(place: Path) -> Case:
-    """Return the counterexample of a run directory or file.
-
-    Raises:
-        SpecError: if there is none or more than one.
-    """
+    """Return the counterexample of a run directory or file; SpecError if there is none or more than one."""
     file = counterexample_file(place)
     stored = load_counterexample(file)
     return Case(
@@ -151,7 +138,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     """
     if not (place.is_dir() and holds_run(place)):
         if requirement is not None:
-            raise SpecError(f"{place}: --requirement applies to run directories only; this is not one")
+            raise SpecError(f"{place}: not a run directory, of which a requirement can be chosen")
         return counterexample_case(place)
     keep_recorded(place)
     described = manifest.read(place)

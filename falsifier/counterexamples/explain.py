@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
 
-from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange
@@ -21,7 +20,8 @@ from falsifier.counterexamples.shrink import (
     with_stretch,
 )
 from falsifier.counterexamples.simplicity import rest_value
-from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
+from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.stl import Diagnosis, in_words
 from falsifier.stl.margins import is_on_limit, margin_words, signed
@@ -139,12 +139,11 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     """Diagnose a counterexample, or a near miss, and reset its parts one at a time.
 
     Raises:
-        SpecError: if no evaluation is given.
-        ValueError: if the evaluation has no trajectory.
+        SpecError: if no evaluation is given, or it has no trajectory.
     """
-    instance("explain", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
+    check_evaluation(problem, evaluation)
     if evaluation.trajectory is None:
-        raise ValueError("a failed simulation cannot be explained: pass an evaluation with a trajectory")
+        raise SpecError("a failed simulation cannot be explained: pass an evaluation with a trajectory")
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
     effects = tuple(_effects(problem, evaluation.candidate))
     return Explanation(problem, evaluation, diagnosis, effects)

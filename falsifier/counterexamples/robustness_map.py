@@ -15,8 +15,8 @@ from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
-from falsifier.errors import SpecError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.errors import SpecError, setting
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
@@ -141,11 +141,12 @@ def robustness_map(
     Raises:
         SpecError: for a failed simulation, a radius outside (0, 1], or a budget below 7.
     """
+    check_evaluation(problem, evaluation)
     if evaluation.robustness is None:
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1:
         raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:g}")
-    points = isqrt(int(_GRID_SHARE * whole("budget", budget, least=_LEAST_BUDGET)))
+    points = isqrt(int(_GRID_SHARE * whole(setting("budget"), budget, least=_LEAST_BUDGET)))
     samples = budget - points * points
     from scipy.stats.qmc import Sobol
 

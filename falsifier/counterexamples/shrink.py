@@ -12,14 +12,14 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import inf
 
-from falsifier.core.arguments import finite, instance, whole
+from falsifier.core.arguments import finite, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import InputRange
 from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
-from falsifier.errors import CandidateError, SpecError
+from falsifier.errors import CandidateError, SpecError, setting
 from falsifier.evaluation.confirm import half_step
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
@@ -79,16 +79,18 @@ def shrink(
     Raises:
         SpecError: if the simulation fails or has a larger robustness, or a number is out of range.
     """
-    instance("shrink", evaluation, Evaluation, "an evaluation, such as confirmation.evaluation")
+    check_evaluation(problem, evaluation)
     if at_most is not None:
-        finite("at_most", at_most)
+        finite(setting("at_most"), at_most)
     hunt = _Hunt(problem, whole("budget", budget, least=1))
     start = hunt.kept(problem.space.admit(evaluation.candidate))
     if start is None or start.robustness is None:
         raise SpecError(f"nothing to shrink: the simulation of {problem.name} fails")
     hunt.demands_violation = start.violated
     if start.violated and at_most is not None and at_most > 0:
-        raise SpecError(f"at_most: {problem.name} is violated: expected a number up to 0, got {at_most!r}")
+        raise SpecError(
+            f"{setting('at_most')}: {problem.name} is violated: expected 0 or less, got {at_most!r}"
+        )
     share = KEPT_SHARE if start.violated else 1 + GIVEN_SHARE
     hunt.at_most = share * start.robustness if at_most is None else at_most
     if hunt.kept(start.candidate) is None:

@@ -17,7 +17,7 @@ from falsifier import __version__
 from falsifier.core.arguments import path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, first_fault
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, first_fault, written
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import fmu_files, fmus_sha256, resolved
@@ -202,8 +202,8 @@ def counterexample_file(path: Path) -> Path:
         manifest.check_no_folder(path)
         raise SpecError(f"not a run directory; {expected}", file=str(path))
     raise SpecError(
-        f"contains no confirmed counterexample; {expected}. falsifier explain also takes a run that found "
-        "none",
+        f"contains no confirmed counterexample; {expected}"
+        + written(". falsifier explain also takes a run that found none", ""),
         file=str(path),
     )
 

@@ -6,6 +6,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from falsifier.core.arguments import whole
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError, did_you_mean
 
@@ -108,7 +109,11 @@ def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> 
         SpecError: if the name is unknown, the engine's package is not installed, or the problem has nothing
             to search.
     """
+    from falsifier.problem.problem import check_problem
+
     check_engine(name)
+    check_problem(problem)
+    whole("seed", seed, least=0)
     if not problem.space.names:
         raise SpecError("nothing to search; give at least one input or parameter a range")
     engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)

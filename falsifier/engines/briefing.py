@@ -7,7 +7,7 @@ from functools import cached_property
 from falsifier.context.values import NOTHING
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import in_one_line
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, setting, written
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, start_values
 from falsifier.llm import CONTEXT_VARIANT
@@ -166,14 +166,15 @@ def told_context(
     if not told.has("context"):
         if problem.source is not None and set(problem.source.context) - {NOTHING}:
             raise SpecError(
-                f"--context: the prompt variant {told.name} does not tell it; use {CONTEXT_VARIANT}, or drop "
-                "--variant"
+                f"{setting('context')}: the prompt variant {told.name} does not tell it; use "
+                f"{CONTEXT_VARIANT}, or drop {setting('variant')}"
             )
         return problem, told
     if anonymous:
+        out = written(f"--context {NOTHING}", f"context=[{NOTHING!r}]")
         raise SpecError(
-            "--anonymous hides what the system is, and context would tell it: drop --anonymous, or leave the "
-            f"files out with --context {NOTHING}"
+            f"{setting('anonymous')} hides what the system is, and context would tell it: drop the one, or "
+            f"leave the files out with {out}"
         )
     return with_context(problem), told
 

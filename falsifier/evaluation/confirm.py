@@ -17,7 +17,7 @@ from falsifier.core.model import Experiment, Model
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate_any
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 
@@ -74,6 +74,7 @@ class _Opinion:
 
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
+    check_evaluation(problem, evaluation)
     fresh = _repeat(problem, evaluation.candidate)
     first, again = signed(evaluation.robustness), signed(fresh.robustness)
     differs = f"equal inputs give different outputs: the robustness was {first} when it was found; "
@@ -140,7 +141,7 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
 
     # The next simulation then loads the model again, so nothing left over from the search can influence it.
     problem.model.close()
-    again = evaluate(problem, candidate)
+    again = evaluate_any(problem, candidate)
     if again.trajectory is None or again.robustness is None:
         return _Opinion(None, None, None, f"failed: {again.reason}")
     if known is not None and _same(known.trajectory, again.trajectory):
@@ -167,17 +168,11 @@ def _same(one: Trajectory | None, other: Trajectory | None) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """How much one output changes if the communication step is halved.
+    """How much one output changes if the communication step is halved."""
 
-    Attributes:
-        largest: maximum distance between the two trajectories, in the output's unit.
-        time: time in s at which it occurs.
-        span: maximum minus minimum of the finer trajectory, in the output's unit.
-    """
-
-    largest: float
-    time: float
-    span: float
+    largest: float  # maximum distance between the two trajectories, in the output's unit
+    time: float  # time in s at which it occurs
+    span: float  # maximum minus minimum of the finer trajectory, in the output's unit
 
     @property
     def relative(self) -> float:

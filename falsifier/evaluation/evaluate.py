@@ -10,13 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
 from falsifier.fmu import System
-from falsifier.problem.problem import Problem
+from falsifier.problem.problem import Problem, check_problem
 from falsifier.stl import Formula, Monitor
 from falsifier.stl.monitor import Verdict
 
@@ -64,12 +65,20 @@ class Evaluation:
 def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     """Simulate one candidate and monitor its trajectory.
 
-    A pure function of its arguments, in whichever process it runs. A simulation that fails, crashes or hangs
-    is returned as an evaluation with a status and a reason.
+    A simulation that fails, crashes or hangs is returned as an evaluation with a status and a reason.
 
     Raises:
+        CandidateError: if something that is searched has no value, or one outside its range.
         ModelError: if the model cannot be used at all.
     """
+    check_problem(problem)
+    instance("candidate", candidate, Candidate, "a Candidate")
+    problem.space.check(candidate)
+    return evaluate_any(problem, candidate)
+
+
+def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
+    """Evaluate a candidate that need not fit: a pure function, in whichever process it runs."""
     experiment = problem.experiment
     started = perf_counter()
     try:
@@ -108,6 +117,7 @@ def simulate(
     >>> simulate(load_problem("AT1"), {"throttle": 100.0}).robustness  # doctest: +SKIP
     -0.213
     """
+    check_problem(problem)
     info, driven = problem.info, dict(inputs or {})
     known = [v.name for v in info.inputs]
     settable = [v.name for v in info.variables if v.settable and v.causality != "input"]
@@ -122,7 +132,13 @@ def simulate(
     signals = {n: s if isinstance(s, Signal) else Signal((0.0,), (float(s),)) for n, s in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
     candidate = Candidate(signals, {n: float(v) for n, v in (parameters or {}).items()}, "user")
-    return evaluate(replace(problem, parameters=fixed), candidate)
+    return evaluate_any(replace(problem, parameters=fixed), candidate)
+
+
+def check_evaluation(problem: Problem, evaluation: Evaluation) -> None:
+    """Check that a user gave a problem and an evaluation; SpecError if not."""
+    check_problem(problem)
+    instance("evaluation", evaluation, Evaluation, "an Evaluation, such as confirmation.evaluation")
 
 
 def start_values(problem: Problem) -> dict[str, tuple[float, float]]:

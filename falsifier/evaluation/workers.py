@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.errors import Reader, reader, speak_to
+from falsifier.evaluation.evaluate import Evaluation, evaluate_any
 from falsifier.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -121,8 +122,8 @@ def start(
     that process too has the status ``crashed``.
     """
     if executor is None:
-        return [partial(evaluate, problem, candidate) for candidate in candidates]
-    return [partial(_wait, problem, c, executor.submit(evaluate, problem, c)) for c in candidates]
+        return [partial(evaluate_any, problem, candidate) for candidate in candidates]
+    return [partial(_wait, problem, c, executor.submit(evaluate_any, problem, c)) for c in candidates]
 
 
 def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
@@ -130,7 +131,7 @@ def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") 
         return future.result()
     with _processes(1) as alone:
         try:
-            return alone.submit(evaluate, problem, candidate).result()
+            return alone.submit(evaluate_any, problem, candidate).result()
         except BrokenExecutor as error:
             return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
 
@@ -142,7 +143,7 @@ def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":
     _start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending)
+        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending, reader())
     )
 
 
@@ -161,12 +162,13 @@ def _start_silent_tracker() -> None:
         sys.warnoptions.remove(_TRACKER_FILTER)
 
 
-def _prepare_worker(log_level: int, ending: _End) -> None:
+def _prepare_worker(log_level: int, ending: _End, told: Reader) -> None:
     """Make a worker end with its parent, however that ends, and leave signals such as Ctrl-C to it.
 
     Args:
         log_level: the parent's level of the logger for simulations.
         ending: closed at the other end if the worker is to end in the middle of a simulation.
+        told: who reads what the parent says.
     """
     import os
     import signal
@@ -174,6 +176,7 @@ def _prepare_worker(log_level: int, ending: _End) -> None:
     from multiprocessing.connection import wait
     from threading import Thread
 
+    speak_to(told)
     logging.getLogger(_FMU_LOGGER).setLevel(log_level)
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

@@ -119,11 +119,7 @@ class WrittenCandidate(BaseModel):
 
 
 def candidates_in(text: str) -> list[dict[str, Any]]:
-    """Return the candidates of a reply in order, valid or not.
-
-    Raises:
-        RejectedReplyError: if there is none.
-    """
+    """Return the candidates of a reply in order, valid or not; RejectedReplyError if there is none."""
     found = next((some for one in objects_in(text) if (some := _candidates_of(one))), [])
     if not found:
         other = _other_keys(without_thoughts(text))
@@ -165,11 +161,7 @@ def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def written_candidate(found: dict[str, Any]) -> WrittenCandidate:
-    """Read one candidate.
-
-    Raises:
-        RejectedReplyError: stating what is wrong first.
-    """
+    """Read one candidate; RejectedReplyError stating what is wrong first."""
     try:
         return WrittenCandidate.model_validate(found)
     except ValidationError as error:

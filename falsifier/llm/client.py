@@ -21,7 +21,7 @@ from pydantic import ValidationError
 
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
-from falsifier.errors import ChatError, ChatSetupError
+from falsifier.errors import ChatError, ChatSetupError, setting
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError, UnreadableReplyError, classify
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.litellm_adapter import (
@@ -305,7 +305,7 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
     if is_model_file(llm):
         check_model_file(llm)
         if api_base is not None:
-            raise ChatSetupError(f"--llm {llm}: a model file has a server of its own; drop --api-base")
+            raise ChatSetupError(f"{llm}: a model file has a server of its own; drop {setting('api_base')}")
         return
     check_name(llm)
     check_address(llm, api_base)

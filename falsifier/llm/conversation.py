@@ -5,7 +5,7 @@ from typing import Any, TypeVar
 
 from falsifier.core.literals import printable
 from falsifier.core.words import counted
-from falsifier.errors import ChatError, ContextExceededError, FalsifierError
+from falsifier.errors import ChatError, ContextExceededError, FalsifierError, written
 from falsifier.llm.messages import (
     LONGEST_REPLY,
     UNREADABLE,
@@ -92,8 +92,11 @@ def converse(
         f"{' | '.join(dict.fromkeys(problems))}"
     )
     if problems[-1].startswith(_CUT_OFF):
-        text += f"; allow longer replies (--llm-option max_tokens={_MOST_TOKENS}), or less "
-        text += "effort (--llm NAME@low)"
+        longer = written(
+            f"--llm-option max_tokens={_MOST_TOKENS}", f"options={{'max_tokens': {_MOST_TOKENS}}}"
+        )
+        text += f"; allow longer replies ({longer}), or less "
+        text += "effort (NAME@low)"
     raise NoValidReplyError(text)
 
 

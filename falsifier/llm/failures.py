@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
-from falsifier.errors import ChatError, ContextExceededError
+from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
@@ -89,36 +89,31 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         (413,),
         (),
         ContextExceededError,
-        "the request is larger than the server, or a proxy before it, takes; use a plainer prompt variant "
-        "(--variant), or raise its limit. {detail}",
+        "the request is larger than the server, or a proxy before it, takes; use a plainer prompt "
+        "variant, or raise its limit. {detail}",
     ),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
-    (
-        (400, 422),
-        (),
-        _RefusedOptionError,
-        "the server refuses the option {option}; drop --llm-option {option}. {detail}",
-    ),
+    ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
         (404,),
         (),
         ChatError,
-        "no such LLM or address; check the LLM's name, --api-base, and whether the account behind {keys} may "
-        "use it. {detail}",
+        "no such LLM or address; check the LLM's name, the server's address, and whether the account behind "
+        "{keys} may use it. {detail}",
     ),
     (
         (),
         ("contentpolicy", "content_policy", "content management policy"),
         ChatError,
-        "the provider's content filter rejected the prompt; try another LLM or --anonymous. {detail}",
+        "the provider's content filter rejected the prompt; try another LLM, or neutral names. {detail}",
     ),
     (
         (),
         ("contextwindow", "context_length", "maximum context", "context size", "exceed_context"),
         ContextExceededError,
-        "the prompt is too long for this LLM; {longer}use a plainer prompt variant (--variant) or another "
-        "LLM. The server says: {detail}",
+        "the prompt is too long for this LLM; {longer}use a plainer prompt variant or another LLM. "
+        " The server says: {detail}",
     ),
     (
         (429,),
@@ -143,7 +138,7 @@ def classify(
         start = f"the server with '{provider.start}'" if provider.start else "the LLM's server"
         return TransientChatError(
             f"{llm}: nothing is listening at {redact(address, secrets)}: start {start}, "
-            "or correct --api-base",
+            f"or correct {setting('api_base')}",
             patience=_LOCAL_PATIENCE,
         )
     said = redact(printable(str(error)), secrets)

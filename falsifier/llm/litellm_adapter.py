@@ -26,7 +26,7 @@ from functools import cache
 from inspect import signature
 from typing import Any
 
-from falsifier.errors import ChatError, ChatSetupError, did_you_mean
+from falsifier.errors import ChatError, ChatSetupError, did_you_mean, written
 from falsifier.llm.providers import PROVIDERS, known, provider_of
 from falsifier.llm.transport import guarded_client
 from falsifier.llm.usage import Price
@@ -141,7 +141,7 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
         ChatSetupError: naming the option.
     """
     if "timeout" in options:
-        raise ChatSetupError("timeout: use --llm-option timeout=SECONDS, which also limits slow replies")
+        raise ChatSetupError("timeout: state it beside the options, which also limits slow replies")
     provider = provider_of(llm)
     is_own = api_base is not None or known(llm).local or not known(llm).keys or provider in _ROUTERS
     if not options or is_own:
@@ -149,9 +149,10 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
     taken = _options_of(llm)
     for name in options:
         if name not in taken:
+            given = written(f"--llm-option {name}", name)
             raise ChatSetupError(
-                f"--llm-option {name}: {provider} has no such option; {did_you_mean(name, taken)}. What "
-                "litellm does not know can be sent in Python as options={'extra_body': {...}}"
+                f"{given}: {provider} has no such option; {did_you_mean(name, taken)}. What litellm "
+                "does not know can be sent in Python as options={'extra_body': {...}}"
             )
 
 

@@ -60,17 +60,17 @@ def check_model_file(llm: str) -> Path:
             begins_well = file.read(len(_MAGIC)) == _MAGIC
         size = path.stat().st_size
     except OSError as error:
-        raise ChatSetupError(f"--llm {llm}: cannot read the file ({error.strerror or error})") from None
+        raise ChatSetupError(f"{llm}: cannot read the file ({error.strerror or error})") from None
     if not begins_well:
-        raise ChatSetupError(f"--llm {llm}: not a GGUF file; download or convert the model in that format")
+        raise ChatSetupError(f"{llm}: not a GGUF file; download or convert the model in that format")
     if find_spec("xllamacpp") is None:
         raise ChatSetupError(
-            f"--llm {llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
+            f"{llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
         )
     memory = posix.machine_memory()
     if memory and size + _MORE_BYTES > memory:
         raise ChatSetupError(
-            f"--llm {llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and this "
+            f"{llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and this "
             f"machine has {memory / 2**30:.1f} GiB; use a smaller model or a stronger quantization"
         )
     return path

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from urllib.parse import urlsplit
 
 from falsifier.core.secrets import holds_credentials
-from falsifier.errors import ChatSetupError
+from falsifier.errors import ChatSetupError, setting
 from falsifier.llm.messages import Mode
 
 
@@ -98,8 +98,8 @@ def check_address(llm: str, api_base: str | None) -> None:
         return
     if holds_credentials(api_base):
         raise ChatSetupError(
-            "--api-base: an address with a user name, a password or a key would be recorded; drop "
-            f"--api-base, and put the whole address into the environment variable {_address_variable(llm)}"
+            f"{setting('api_base')}: an address with a user name, a password or a key would be recorded; "
+            f"drop it, and put the whole address into the environment variable {_address_variable(llm)}"
         )
     try:
         parts = urlsplit(api_base)
@@ -107,7 +107,7 @@ def check_address(llm: str, api_base: str | None) -> None:
     except ValueError:
         is_address = False
     if not is_address:
-        raise ChatSetupError(f"--api-base {api_base}: expected http://HOST:PORT/v1 or https://...")
+        raise ChatSetupError(f"{setting('api_base')} {api_base}: expected http://HOST:PORT/v1 or https://...")
 
 
 def find_key(llm: str, *, api_base: str | None = None) -> str | None:

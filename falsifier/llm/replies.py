@@ -12,7 +12,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import INTERPOLATIONS, Signal
 from falsifier.core.space import Dimension, InputRange, Range, SearchSpace
 from falsifier.core.words import counted
-from falsifier.errors import CandidateError, did_you_mean
+from falsifier.errors import CandidateError, SpecError, did_you_mean
 from falsifier.llm.candidate_text import (
     LONGEST_NUMBER,
     WrittenCandidate,
@@ -148,7 +148,7 @@ class ReplyForm:
             return Signal.evenly(
                 values, stop_time=self.space.stop_time, interpolation=interpolation, hold=chosen.hold
             )
-        except ValueError as error:
+        except SpecError as error:
             raise RejectedReplyError(f"input {quoted(written.name)}: {error}") from None
 
     def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:

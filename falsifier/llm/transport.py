@@ -37,14 +37,14 @@ _TOO_LONG = f"the reply has more than {_MOST_BYTES >> 20} MiB"
 # Maximum number of characters of a reply that an error repeats.
 _LONGEST_BEGINNING = 80
 _CUT = "the server or a proxy before it ended it; its log says why"
-_ADDRESS = "check host, port and http or https in --api-base"
+_ADDRESS = "check host, port and http or https in the server's address"
 _NO_LLM = f"that is no server of a language model; {_ADDRESS}"
 # How httpx and what it stands on tell a failure, by words of it, and what causes and cures it.
 _FAULTS = (
     (
         ("name or service not known", "name resolution", "getaddrinfo", "nodename nor servname"),
         "the server's name is not known here",
-        "check --api-base and the network",
+        "check the server's address and the network",
     ),
     (
         ("certificate_verify_failed",),
@@ -255,11 +255,11 @@ def _redirection(asked: httpx.URL, location: str | None) -> str:
     except (httpx.InvalidURL, ValueError):
         return "the server redirects to an address that cannot be read, and prompts do not follow"
     if target == asked:
-        return "the server redirects to the same address, or names none; check --api-base and its log"
+        return "the server redirects to the same address, or names none; check its address and its log"
     base = str(target).removesuffix("/chat/completions").removesuffix("/api/chat")[:200]
     return (
-        f"the server redirects to {base}, and prompts do not follow; if that is the right address, state it "
-        "with --api-base"
+        f"the server redirects to {base}, and prompts do not follow; if that is the right address, state "
+        "it as the server's address"
     )
 
 
@@ -271,7 +271,7 @@ def _fault_of(error: Exception) -> str:
     for words, cause, cure in _FAULTS:
         if any(word in text.lower() for word in words):
             return f"{cause} ({text}): {cure}"
-    return f"no connection to the server ({text}): check --api-base and the network"
+    return f"no connection to the server ({text}): check the server's address and the network"
 
 
 def _unreadable(body: bytes) -> str:
@@ -287,8 +287,8 @@ def _unreadable(body: bytes) -> str:
         return f"the reply is nested too deeply to be read: {_NO_LLM}"
     except ValueError:
         return (
-            f"the reply is not JSON ({found}): check --api-base, which for most servers ends with /v1, and "
-            "the server's log; a proxy or a page for signing in may answer in its place"
+            f"the reply is not JSON ({found}): check the server's address, which for most servers ends with "
+            "/v1, and its log; a proxy or a page for signing in may answer in its place"
         )
     if isinstance(sent, dict) and (error := sent.get("error")):
         return f"the server reports: {error}" if isinstance(error, str) else ""
@@ -298,8 +298,8 @@ def _unreadable(body: bytes) -> str:
             "service, says why"
         )
     return (
-        f"the reply does not have the form of an LLM's ({found}): check --api-base, and that the LLM's name "
-        "begins with the provider whose interface the server has"
+        f"the reply does not have the form of an LLM's ({found}): check the server's address, and that the "
+        "LLM's name begins with the provider whose interface the server has"
     )
 
 

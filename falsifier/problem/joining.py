@@ -1,7 +1,8 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,13 +10,14 @@ from falsifier.core.files import absent
 from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed
-from falsifier.errors import SpecError, did_you_mean, in_section
+from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 
@@ -69,28 +71,26 @@ def join(
         if profile is not None and profile not in spec.profiles:
             near = did_you_mean(profile, spec.profiles)
             raise SpecError(f"no profile {profile!r}; {near}; without a profile: free or fixed")
-        layers = spec.changes(requirement, profile)
-        model = model or make_model(spec, [*layers, changes] if changes else layers, path)
+        layers, changes = spec.changes(requirement, profile), changes or ModelChanges()
+        model = model or make_model(spec, [*layers, changes], path)
         info = model.info
-        if changes is not None:
-            changes = placed(changes, info)
-            layers = [*layers, changes]
+        layers.append(changes := placed(changes, info))
         # All formulas of a spec, so that its requirements can share a search.
         sections = spec.requirements.values() if stated is None else [stated]
-        experiment, grid = _experiment(spec, layers, info, lambda stop: section_formulas(sections, stop))
+        formulas_of = partial(section_formulas, sections)
+        experiment, grid = _experiment(spec, layers, info, changes, formulas_of)
         if isinstance(model, System):
             model.check_steps(experiment)
         inputs, parameters = dict(spec.inputs), dict(spec.parameters)
         for layer in layers:
             inputs |= {name: overlay(inputs.get(name), s) for name, s in layer.inputs.items()}
             parameters |= {name: overlay(parameters.get(name), s) for name, s in layer.parameters.items()}
-        formulas = section_formulas(sections, experiment.stop_time)
+        formulas = formulas_of(experiment.stop_time)
         free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
         inputs = {name: s.model_copy(update={"free": free}) if s.is_open else s for name, s in inputs.items()}
-        space, fixed = search_space(inputs, parameters, info, experiment.stop_time)
+        space, fixed = search_space(inputs, parameters, info, experiment.stop_time, changes)
         if searches and not space.names:
             raise _nothing_to_search(info, changes)
-        check_steps(experiment.stop_time, experiment.step_size, key="model.step_size")
         for r in space.inputs:
             check_steps(experiment.stop_time, r.hold, key=f"inputs.{r.name}.hold")
         section, name, key = spec.requirements[requirement], requirement, f"requirements.{requirement}"
@@ -105,7 +105,7 @@ def join(
             space,
             _recording(experiment, info, [*spec.model.record, *formula.signals], known),
             fixed,
-            (*info.notes, *_notes(grid, model)),
+            (*info.notes, *_notes(grid, model, space, experiment)),
         )
 
 
@@ -146,18 +146,16 @@ def join_formula(
         data = {"model": {"fmu": str(model.resolve()), "interface": interface}}
     else:
         if changes.interface == "model-exchange":
-            raise SpecError(
-                f"{path}: the components of a system have interfaces of their own; leave --interface out"
-            )
+            raise SpecError(f"{setting('interface')}: components of a system have interfaces of their own")
         info = model.info
         system = replace(model, allow=(*model.allow, *changes.allow), deny=(*model.deny, *changes.deny))
         data = {"model": {}, "components": {n: {"fmu": str(part.fmu)} for n, part in model.parts.items()}}
-    with in_section(str(path)):
-        changes = placed(changes, info)
+    changes = placed(changes, info)
     data["model"]["stop_time"] = changes.stop_time or info.stop_time
     if data["model"]["stop_time"] is None:
-        raise SpecError(f"{path}: the {info.noun} has no default stop time; add --stop-time SECONDS")
-    spec = parse_spec(data | {"requirements": {name: stated}}, file=str(path))
+        stop_time = setting("stop_time", "SECONDS")
+        raise SpecError(f"{path}: the {info.noun} has no default stop time; add {stop_time}")
+    spec = parse_spec(data | {"requirements": {STL_NAME: stated}}, file=str(path))
     searched = any(s.value is None for s in changes.inputs.values()) or any(
         s.range is not None for s in changes.parameters.values()
     )
@@ -167,7 +165,7 @@ def join_formula(
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(
         spec,
-        name,
+        STL_NAME,
         path=path,
         stated=stated,
         stated_name=name,
@@ -179,8 +177,9 @@ def join_formula(
 
 def _experiment(
     spec: Spec,
-    layers: Iterable[ModelChanges],
+    layers: Sequence[ModelChanges],
     info: ModelInfo,
+    changes: ModelChanges,
     formulas_of: Callable[[float], Iterable[str]],
 ) -> tuple[Experiment, Grid | None]:
     """Return the experiment without outputs, and its grid if nobody stated the interval.
@@ -189,11 +188,8 @@ def _experiment(
     """
 
     def stated(key: str) -> float | None:
-        value: float | None = getattr(spec.model, key)
-        for layer in layers:
-            if getattr(layer, key) is not None:
-                value = getattr(layer, key)
-        return value
+        each = (getattr(section, key) for section in (*reversed(layers), spec.model))
+        return next((value for value in each if value is not None), None)
 
     def fitting(fmu_step: float | None, step_size: float | None = None) -> Grid:
         times = formula_times(formulas_of(stop_time))
@@ -203,31 +199,39 @@ def _experiment(
     if not stop_time:
         raise SpecError(f"the {info.noun} has no default stop time; add this key", key="model.stop_time")
     output_interval, step_size, grid = stated("output_interval"), stated("step_size"), None
-    if output_interval is None:
-        grid = fitting(info.step_size, step_size)
-        output_interval = grid.interval
-    check_steps(stop_time, output_interval, key="model.output_interval")
-    intervals = stop_time / output_interval
-    if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
-        raise SpecError(
-            f"the stop time {stop_time:g} s is not an integer multiple of {output_interval:g} s; "
-            f"try {fitting(output_interval).interval:.12g}",
-            key="model.output_interval",
-        )
-    experiment = Experiment(
-        stop_time=stop_time,
-        output_interval=stop_time / round(intervals),
-        outputs=(),
-        step_size=step_size,
-        tolerance=stated("tolerance"),
-        time_limit=stated("time_limit"),
-    )
+    changed = [k for k in ("output_interval", "step_size", "stop_time") if getattr(changes, k) is not None]
+    with naming(setting(changed[0]) if changed else None):
+        if output_interval is None:
+            grid = fitting(info.step_size, step_size)
+            output_interval = grid.interval
+        check_steps(stop_time, output_interval, key="model.output_interval")
+        check_steps(stop_time, step_size, key="model.step_size")
+        intervals = stop_time / output_interval
+        if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
+            raise SpecError(
+                f"the stop time {stop_time:g} s is not an integer multiple of the output interval "
+                f"{output_interval:g} s; an interval that fits: {fitting(output_interval).interval:.12g} s",
+                key="model.output_interval",
+            )
+        with in_section(key="model"):
+            experiment = Experiment(
+                stop_time=stop_time,
+                output_interval=stop_time / round(intervals),
+                outputs=(),
+                step_size=step_size,
+                tolerance=stated("tolerance"),
+                time_limit=stated("time_limit"),
+            )
     return experiment, grid
 
 
-def _notes(grid: Grid | None, model: Model) -> Iterator[str]:
+def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
+    step = experiment.step_size or experiment.output_interval
+    for r in space.inputs:
+        if r.hold is not None and r.hold < step:
+            yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 
 
@@ -254,12 +258,17 @@ def _recording(
     return replace(experiment, outputs=tuple(outputs))
 
 
-def _nothing_to_search(info: ModelInfo, changes: ModelChanges | None) -> SpecError:
+def _nothing_to_search(info: ModelInfo, changes: ModelChanges) -> SpecError:
     """Return the error that says what keeps everything constant, and what lets something vary."""
-    kept = [*changes.inputs, *changes.parameters] if changes else []
-    why = f"--set keeps {listed(kept)} constant" if kept else "no input has a range"
+    kept = [name for name, _ in changes.variables]
+    bounded = [v.name for v in info.inputs if v.is_bounded]
+    why = "no input has a range"
+    if kept:
+        why = f"{written('--set keeps', 'a value keeps')} {listed(kept)} constant"
+    elif bounded:
+        why = f"{listed(bounded)} would be searched between min and max if a section [inputs.NAME] named them"
     return SpecError(
-        f"nothing to search: {why}, and nothing else varies; add --search NAME=LOW:HIGH, or to a spec "
+        f"nothing to search: {why}, and nothing else varies; add {searching('inputs', 'NAME')}, or to a spec "
         "[inputs.NAME] with range and control_points, or [parameters.NAME] with range; inputs "
         f"{did_you_mean('', (v.name for v in info.inputs))}"
     )
@@ -273,24 +282,23 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
     """
     inputs, parameters = dict[str, InputSection](), dict[str, ParameterSection]()
     for name, section in changes.variables:
-        if name not in info:
-            names = [v.name for v in info.variables if v.settable or v.causality == "input"]
-            raise SpecError(
-                f"the {info.noun} has no input, parameter or start value {name!r}; "
-                f"{did_you_mean(name, names)}"
-            )
-        stated = section.model_dump(exclude_unset=True)
-        if info[name].causality == "input":
-            if isinstance(section.value, str):
+        kind = "inputs" if name in changes.inputs else "parameters"
+        with naming(stated_as(kind, name, searched=section.value is None)):
+            if name not in info:
+                names = [v.name for v in info.variables if v.settable or v.causality == "input"]
                 raise SpecError(
-                    f"{name}: expected a number, got {section.value!r}; to search a range: --search "
-                    f"{name}=LOW:HIGH"
+                    f"the {info.noun} has no input, parameter or start value {name!r}; "
+                    f"{did_you_mean(name, names)}"
                 )
-            inputs[name] = InputSection.model_validate(stated)
-        elif not stated.keys() <= {"range", "value"} or not stated:
-            raise SpecError(
-                f"{name} is no input: --search {name}=LOW:HIGH searches it, without control points"
-            )
-        else:
-            parameters[name] = ParameterSection.model_validate(stated)
+            stated, variable = section.model_dump(exclude_unset=True), info[name]
+            if isinstance(section.value, str) and variable.kind != "string":
+                raise SpecError(
+                    f"expected a number, got {section.value!r}; to search a range: {searching(kind, name)}"
+                )
+            if variable.causality == "input":
+                inputs[name] = InputSection.model_validate(stated)
+            elif not stated.keys() <= {"range", "value"} or not stated:
+                raise SpecError(f"is no input: {searching(kind, name)} searches it, without control points")
+            else:
+                parameters[name] = ParameterSection.model_validate(stated)
     return changes.model_copy(update={"inputs": inputs, "parameters": parameters})

@@ -18,19 +18,21 @@ from falsifier.core.arguments import texts
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
-from falsifier.errors import FalsifierError, SpecError, did_you_mean
+from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, written
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import ModelChanges, RequirementSection
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, in_python, requirement_of
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import Parameterization, ProblemSource, Target, source_of
 from falsifier.problem.spec import read_spec
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
 # loading it once more.
 _LOADED: dict[ProblemSource, str] = {}
+# A formula to begin with.
+_EXAMPLE = "G[0,10] (SIGNAL <= 1)"
 # Keys with which a requirement changes the simulation.
 _OVERRIDES = set(ModelChanges.model_fields)
 
@@ -63,11 +65,16 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         if name in requirements:
             return path, name
         names.extend(requirements)
+    if not target:
+        raise SpecError("the target is empty; give a spec file, an FMU or a bundled name")
     if Path(target).is_dir():
         raise SpecError(
             f"{target} is a folder; give a spec file, an FMU or a bundled name. If it holds a run: "
-            f"falsifier resume {shlex.quote(target)} continues it, "
-            f"falsifier llm prompt {shlex.quote(target)} --at N prints what was asked before sample N"
+            + written(
+                f"falsifier resume {shlex.quote(target)} continues it, falsifier llm prompt "
+                f"{shlex.quote(target)} --at N prints what was asked before sample N",
+                f"resume({target!r}) continues it",
+            )
         )
     if Path(target).is_file():
         raise SpecError(
@@ -142,14 +149,12 @@ def load_problem(
         changes=changes,
         context=texts("context", context),
     )
-    with in_python("stl"):
-        return load_source(source)
+    return load_source(source)
 
 
 def load_problems(target: str | PathLike[str], *, profile: str | None = None) -> list[Problem]:
     """Load one problem per requirement of a spec, or only the requirement that the target names."""
-    with in_python("stl"):
-        return [load_source(source) for source in sources_of(source_of(target, profile=profile))]
+    return [load_source(source) for source in sources_of(source_of(target, profile=profile))]
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
@@ -200,7 +205,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         if source.shortest_piece < step:
             raise SpecError(
                 f"pieces of {source.shortest_piece:g} s: inputs change at communication steps, "
-                f"{step:g} s apart; give at least that, or a smaller --output-interval"
+                f"{step:g} s apart; give at least that, or a smaller {setting('output_interval')}"
             )
         problem = replace(problem, space=problem.space.freed(source.shortest_piece))
     if source.parameterization == "fixed":
@@ -229,7 +234,8 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
     if source.parts.kind == "fmu":
         fmu = Path(source.target)
         if stated is None and fmu.is_file():
-            raise SpecError(f"{fmu}: no requirement; add --stl 'G[0,10] (SIGNAL <= 1)'")
+            add = written(f"add --stl '{_EXAMPLE}'", f"use load_problem({str(fmu)!r}, stl={_EXAMPLE!r})")
+            raise SpecError(f"{fmu}: no requirement; {add}")
         joined = join_formula(
             fmu,
             stated or RequirementSection(formula=""),
@@ -246,9 +252,10 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
         requirement, *others = spec.requirements
         target, names = source.target.rstrip(":"), ", ".join(spec.requirements)
         if others and stated is None:
+            every = written(f"falsifier run {target}", f"falsify(load_problems({target!r}))")
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{target}:{requirement}; falsifier run {target} falsifies all of them. Known: {names}",
+                f"{target}:{requirement}; {every} falsifies all of them. Known: {names}",
                 file=str(path),
             )
         first, *rest = (section.model_dump(include=_OVERRIDES) for section in spec.requirements.values())

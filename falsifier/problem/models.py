@@ -87,8 +87,8 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         SpecError: naming the file, both ends of a connection that does not fit, and the remedy.
         ModelError: if an FMU cannot be read.
     """
-    coupling = Coupling(**spec.coupling.model_dump())
     with in_section(str(path)):
+        coupling = Coupling(**spec.coupling.model_dump())
         if spec.model.fmu is not None:
             package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
             return replace(package, logging=logging)

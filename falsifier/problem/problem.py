@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
-from falsifier.core.arguments import finite, path_of, texts
+from falsifier.core.arguments import finite, instance, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
-from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, in_python, requirement_of
+from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import STL_NAME, ProblemSource
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ class Problem:
     @staticmethod
     def from_fmu(
         fmu: str | Path | System,
-        formula: str,
+        stl: str,
         *,
         name: str = STL_NAME,
         inputs: Mapping[str, InputChoice] | None = None,
@@ -101,7 +101,7 @@ class Problem:
 
         Args:
             fmu: path of the FMU or package, or the system, whose variables are ``component.variable``.
-            formula: the requirement, in Signal Temporal Logic; or a template with its arguments.
+            stl: the requirement, in Signal Temporal Logic; or a template with its arguments.
             name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
                 all real inputs with a min and a max are. Inputs that are connected cannot be searched.
@@ -145,14 +145,11 @@ class Problem:
         context = texts("context", context)
         expected = "the path of an FMU or SSP package, or a System"
         model = fmu if isinstance(fmu, System) else path_of("fmu", fmu, expected)
-        with in_python("formula"):
-            joined = join_formula(model, requirement_of(formula), changes=changes, name=name)
+        joined = join_formula(model, requirement_of(stl), changes=changes, name=name)
         problem = Problem.of(joined)
         source = None
         if not isinstance(fmu, System):
-            source = ProblemSource(
-                target=str(fmu), stl=formula, stl_name=name, changes=changes, context=context
-            )
+            source = ProblemSource(target=str(fmu), stl=stl, stl_name=name, changes=changes, context=context)
         return replace(problem, source=source, named_context=Named.of(context))
 
     @staticmethod
@@ -270,6 +267,11 @@ def check_limits(problem: Problem) -> None:
     for each in ranges:
         if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
             raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
+
+
+def check_problem(given: object) -> None:
+    """Check that a user gave a problem; SpecError if not."""
+    instance("problem", given, Problem, "a Problem, such as load_problem('AT1')")
 
 
 def check_names(problems: Iterable[Problem]) -> None:

@@ -1,13 +1,14 @@
 """Ranges and values of a spec, checked against the FMU's variables and completed from them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, ValueKind
-from falsifier.errors import SpecError, did_you_mean, in_section
-from falsifier.problem.sections import InputSection, ParameterSection
-from falsifier.problem.shorthand import named_file
+from falsifier.errors import SpecError, did_you_mean, in_section, naming
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.shorthand import named_file, searching, stated_as
 
 # Number of control points of an input of which nobody states it: both ends, the middle and two in between.
 DEFAULT_POINTS = 5
@@ -18,6 +19,7 @@ def search_space(
     parameters: Mapping[str, ParameterSection],
     info: ModelInfo,
     stop_time: float,
+    changes: ModelChanges,
 ) -> tuple[SearchSpace, dict[str, float]]:
     """Return what is searched, and the values of what is fixed.
 
@@ -26,6 +28,7 @@ def search_space(
         parameters: the same of parameters and start values.
         info: the model's variables.
         stop_time: end of the simulation in s.
+        changes: what of this options or arguments state.
 
     Raises:
         SpecError: naming the key and the remedy.
@@ -34,20 +37,28 @@ def search_space(
     ranges: list[ParameterRange] = []
     fixed: dict[str, float] = {}
     for name, section in inputs.items():
-        with in_section(key=f"inputs.{name}"):
+        with _stated("inputs", name, changes.inputs.get(name)):
             variable = _input(name, info)
             if section.value is not None:
                 fixed[name] = _fixed(variable, section.value)
             else:
                 searched.append(_input_range(variable, section))
     for name, parameter in parameters.items():
-        with in_section(key=f"parameters.{name}"):
+        with _stated("parameters", name, changes.parameters.get(name)):
             variable = _parameter(name, info)
             if parameter.range is not None:
                 ranges.append(_parameter_range(variable, parameter.range))
             elif parameter.value is not None and variable.kind != "string":
                 fixed[name] = _fixed(variable, parameter.value)
     return SearchSpace(tuple(searched), tuple(ranges), stop_time), fixed
+
+
+@contextmanager
+def _stated(kind: str, name: str, changed: InputSection | ParameterSection | None) -> Iterator[None]:
+    """Let errors raised within name the option or argument that changes this, or else the spec's section."""
+    place = changed and stated_as(kind, name, searched=changed.value is None)
+    with naming(place or None), in_section(key=f"{kind}.{name}"):
+        yield
 
 
 def _input(name: str, info: ModelInfo) -> Variable:
@@ -89,8 +100,8 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
     low, high = section.range or variable.limits
     if low is None or high is None:
         raise SpecError(
-            "the FMU specifies no min and max for this input; add range = [low, high] or "
-            f"--search {variable.name}=LOW:HIGH[:POINTS]",
+            "the FMU specifies no min and max for this input; add its range: "
+            f"{searching('inputs', variable.name)}, or range = [low, high] in a spec",
             key="range",
         )
     _check(variable, low, high)
@@ -133,7 +144,7 @@ def _fixed(variable: Variable, value: float | str) -> float:
     if isinstance(value, str):
         raise SpecError(
             f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
-            f"{variable.kind}; to search a range: --search {variable.name}=LOW:HIGH",
+            f"{variable.kind}; write a number, or range = [low, high] to search",
             key="value",
         )
     _check(variable, value)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from falsifier.core.arguments import instance
 from falsifier.core.literals import one_line
 from falsifier.core.model import Experiment, ModelInfo
-from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section
+from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section, setting
 from falsifier.problem.grid import fitting_interval
-from falsifier.problem.spec import NAME_IN_LINES, STL_OPTION, AnyRequirement
+from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
 from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
@@ -44,7 +44,7 @@ class Requirement:
         parsed = parse(formula) if isinstance(formula, str) else formula
         for attribute, value in (("name", name), ("formula", parsed), ("description", description)):
             object.__setattr__(self, attribute, value)
-        if not isinstance(self.name, str):
+        if not isinstance(self.name, str) or not self.name.strip():
             raise SpecError(f"requirement: expected a name, got {self.name!r}")
         if one_line(self.name) != self.name:  # it stands in messages, tables and titles
             raise SpecError(f"requirement {self.name!r}: {NAME_IN_LINES}")
@@ -83,7 +83,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
         fits = fitting_interval(formula, experiment.stop_time, experiment.output_interval)
-        advice = "" if fits is None else f"; output_interval = {fits:.12g} fits all times"
+        is_other = fits is not None and fits != experiment.output_interval
+        advice = f"; output_interval = {fits:.12g} fits all times" if is_other else ""
         raise SpecError(f"{error}{advice}") from None
     return formula
 
@@ -110,7 +111,7 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
         SpecError: naming what is wrong with the formula, or with the arguments of a template.
     """
     kind = "template" if isinstance(section, Template) else "formula"
-    option = None if key else STL_OPTION
+    option = None if key else setting("stl")
     with in_section(option, key):
         text = section.expanded(experiment.stop_time, experiment.output_interval)
     with in_section(option, key and f"{key}.{kind}"):

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
-from falsifier.errors import did_you_mean
+from falsifier.errors import did_you_mean, shown
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
@@ -16,7 +17,7 @@ Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 
 def _plain(value: Any) -> Any:
     if isinstance(value, bool | str):  # pydantic would take true for 1, and "5" for 5
-        raise ValueError(f"expected a number, got {value!r}")
+        raise ValueError(f"expected a number, got {shown(value)}")
     return value
 
 
@@ -52,8 +53,13 @@ class Strict(BaseModel):
                 raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), fields)}")
         for key, field in fields.items():
             if field.is_required() and key not in section:
-                raise _wrong(key, f"this key is missing ({field.description})")
+                raise _wrong(key, missing(field))
         return section
+
+
+def missing(field: FieldInfo) -> str:
+    """Say that a key is missing, and what it means."""
+    return f"this key is missing: {(field.description or '').removesuffix('.')}"
 
 
 def _wrong(key: str, message: str) -> PydanticCustomError:
@@ -158,8 +164,7 @@ class ComponentSection(Strict):
         None, description="Step of its own in s, an integer multiple of the communication step."
     )
     interface: Interface | None = Field(
-        None,
-        description="co-simulation or model-exchange; default: co-simulation if the FMU offers it.",
+        None, description="co-simulation or model-exchange; default: co-simulation if the FMU offers it."
     )
 
 

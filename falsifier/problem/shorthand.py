@@ -2,8 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
@@ -12,10 +11,10 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
 from falsifier.core.model import Interface
-from falsifier.errors import SpecError, first_fault, in_section
+from falsifier.errors import SpecError, first_fault, in_section, setting, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
-from falsifier.problem.spec import STL_OPTION, AnyRequirement, parse_spec
+from falsifier.problem.spec import AnyRequirement, parse_spec
 from falsifier.stl.lexer import RESERVED
 
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
@@ -23,11 +22,6 @@ _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
-
-# Options in messages that problems made in Python may raise.
-_OPTION = re.compile(
-    r"--search (\S+?)=LOW:HIGH(\[:POINTS\])?|--(stl|stop-time|output-interval|interface|set)\b( (?=[A-Z']))?"
-)
 
 # A constant value; (low, high) to search, with the spec's control points or else a free parameterization;
 # (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
@@ -70,6 +64,9 @@ def changes_from(
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
+    if both := sorted(inputs.keys() & parameters.keys()):
+        why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
+        raise SpecError(f"{both[0]}: {why}; drop one of them")
     data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
     rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
@@ -78,31 +75,27 @@ def changes_from(
     try:
         return ModelChanges.model_validate(data)
     except ValidationError as error:
-        raise SpecError(": ".join(first_fault(error))) from None
+        key, message = first_fault(error)
+        kind, name = (*error.errors()[0]["loc"], "")[:2]
+        if kind in data:
+            key = written(stated_as(str(kind), str(name), searched=kind == "inputs"), key)
+        else:
+            key = setting(key)
+        raise SpecError(message, file=key) from None
 
 
-@contextmanager
-def in_python(stl: str) -> Iterator[None]:
-    """Let errors raised within speak of arguments in Python, not of options; ``stl`` is that of ``--stl``."""
+def stated_as(kind: str, name: str, *, searched: bool) -> str:
+    """Return how the reader names the option or argument that states an input or a parameter."""
+    return written(f"--{'search' if searched else 'set'} {name}", f"{kind}.{name}")
 
-    def argument(found: re.Match[str]) -> str:
-        if found[1]:
-            return f"inputs={{{found[1]!r}: (LOW, HIGH)}}"
-        name = {"stl": stl, "set": "a value"}.get(found[3]) or found[3].replace("-", "_")
-        return f"{name}=" if found[4] else name
 
-    try:
-        yield
-    except SpecError as error:
-        message, file = _OPTION.sub(argument, error.message), error.file and _OPTION.sub(argument, error.file)
-        raise SpecError(message, file=file, key=error.key) from None
+def searching(kind: str, name: str) -> str:
+    """Return what the reader writes to search an input or a parameter."""
+    return written(f"--search {name}=LOW:HIGH", f"{kind}={{{name!r}: (LOW, HIGH)}}")
 
 
 def changes_from_options(
-    *,
-    values: Iterable[str] = (),
-    ranges: Iterable[str] = (),
-    **more: Any,
+    *, values: Iterable[str] = (), ranges: Iterable[str] = (), **more: Any
 ) -> ModelChanges:
     """Return the changes for command-line options.
 
@@ -120,10 +113,7 @@ def changes_from_options(
         SpecError: naming the option that is invalid.
     """
     constant = _once("--set", map(_value, values))
-    searched = _once("--search", map(_range, ranges))
-    if both := sorted(constant.keys() & searched.keys()):
-        raise SpecError(f"{both[0]}: --set keeps it constant, --search varies it; drop one of them")
-    return changes_from(inputs=searched, parameters=constant, **more)
+    return changes_from(inputs=_once("--search", map(_range, ranges)), parameters=constant, **more)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
@@ -231,11 +221,11 @@ def _range(option: str) -> tuple[str, InputChoice]:
     )
 
 
-def requirement_of(text: str) -> AnyRequirement:
+def requirement_of(text: str, place: str | None = None) -> AnyRequirement:
     """Return the requirement that a text states: a formula, or the name of a template and its arguments.
 
     Arguments are ``key=value`` in any order. Values are written as in TOML; text needs no quotes of its own
-    unless it contains spaces.
+    unless it contains spaces. Errors name the place where it was stated, by default the setting stl.
 
     >>> requirement_of("settles signal=speed reference=80 within=2% time=3").expanded(50.0)
     'G[3,50] (abs(speed - 80) <= 1.6)'
@@ -243,24 +233,25 @@ def requirement_of(text: str) -> AnyRequirement:
     Raises:
         SpecError: naming the argument that is wrong, or what is not ``key=value``.
     """
-    instance("formula", text, str, "text")
+    place = place or setting("stl")
+    instance(place, text, str, "text")
     named = _TEMPLATE.match(text)
     if named is None or named[1] in RESERVED:
         return RequirementSection(formula=text)
-    with in_section(STL_OPTION):
+    with in_section(place):
         arguments = _arguments(text)
         if beside := sorted(arguments.keys() & ModelChanges.model_fields.keys()):
             # It would shape the formula and not the simulation.
             raise SpecError(
                 "it changes simulations, and is no argument of a template here: state it beside the "
-                "requirement (--stop-time, ...), or write a spec with [requirements.NAME]",
+                f"requirement ({setting('stop_time')}, ...), or write a spec with [requirements.NAME]",
                 key=beside[0],
             )
     try:
-        spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=STL_OPTION)
+        spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=place)
     except SpecError as error:
         key = (error.key or "").removeprefix("requirements.R").lstrip(".")
-        raise SpecError(error.message, file=STL_OPTION, key=key or None) from None
+        raise SpecError(error.message, file=place, key=key or None) from None
     return spec.requirements["R"]
 
 
@@ -271,10 +262,10 @@ def _arguments(text: str) -> dict[str, Any]:
     found: dict[str, Any] = {"template": name}
     for pair in pairs:
         key, equals, value = pair.partition("=")
-        if not equals or key in found:
+        if not equals or key in found or value.endswith(","):
             raise SpecError(
-                f"{pair}: expected each argument of {name} once, as key=value; spaces need quotes: "
-                "when='speed > 5'"
+                f"{pair}: expected each argument of {name} once, as key=value without commas between them; "
+                "spaces need quotes: when='speed > 5'"
             )
         try:
             found[key] = tomllib.loads(f"v = {value}")["v"]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
 
 from falsifier.core.literals import one_line
-from falsifier.errors import SpecError, did_you_mean, in_section, rejected
+from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import (
     Components,
@@ -33,13 +33,12 @@ from falsifier.problem.sections import (
     ProfileSection,
     RequirementSection,
     Strict,
+    missing,
 )
 from falsifier.problem.template_arguments import Template
 from falsifier.problem.templates import TEMPLATES
 
 Section = TypeVar("Section", bound=BaseModel)
-# The option that states a requirement in place of a spec's.
-STL_OPTION = "--stl"
 # Names that we choose stand in messages, tables and titles.
 NAME_IN_LINES = "expected a name of one line without control characters"
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
@@ -49,6 +48,13 @@ _MAX_KEY_PARTS = 500
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # Parts of pydantic's locations that are no keys.
 _STEPS = ("tuple", "function-before")
+# What to write if a section of a name is no table.
+_TABLES = {
+    "inputs": "[inputs.{0}] with range = [low, high] or value",
+    "parameters": "[parameters.{0}] with range = [low, high], or {0} = a single value",
+    "requirements": "[requirements.{0}] with formula = '...'",
+    "components": "[components.{0}] with fmu = '...'",
+}
 
 
 # Pydantic's locations have the kind of a requirement as a tag between its name and its keys.
@@ -92,11 +98,7 @@ class Spec(Strict):
 
 
 def read_spec(path: Path) -> Spec:
-    """Read and validate a spec file.
-
-    Raises:
-        SpecError: naming the file, the key and what was expected.
-    """
+    """Read and validate a spec file; SpecError naming the file, the key and what was expected."""
     with in_section(str(path)):
         text = _text_of(path)
         if len(text) > _MAX_LENGTH:
@@ -106,7 +108,8 @@ def read_spec(path: Path) -> Spec:
         try:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
-            raise SpecError(f"not valid TOML: {error}") from None
+            said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
+            raise SpecError(f"not valid TOML: {said}") from None
         if not data:
             raise SpecError(
                 "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "
@@ -155,8 +158,7 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
 def _check_model(spec: Spec) -> None:
     """Check that a spec has either an FMU or components."""
     if spec.model.fmu is None and not spec.components:
-        about = ModelSection.model_fields["fmu"].description
-        raise SpecError(f"this key is missing ({about})", key="model.fmu")
+        raise SpecError(missing(ModelSection.model_fields["fmu"]), key="model.fmu")
     if spec.components and spec.model.fmu is not None:
         raise SpecError(
             "a spec has either one FMU here or [components.NAME]; remove one of them", key="model.fmu"
@@ -187,26 +189,34 @@ def overlay(base: Section | None, changes: Section) -> Section:
 def _error_of(error: ValidationError) -> SpecError:
     """Return the error to raise for the first thing that is wrong."""
     first = error.errors()[0]
-    where = [str(part) for part in first["loc"] if part not in _STEPS]
+    where, given = [part for part in first["loc"] if part not in _STEPS], first["input"]
+    message = rejected(first["msg"], given)
     if where[:1] == ["requirements"] and len(where) > 2:
         where.pop(2)  # below the name of a requirement comes the tag of its kind, which is no key
-    if first["type"] == "union_tag_not_found":
-        known = did_you_mean(str(first["input"].get("template")), TEMPLATES)
-        return SpecError(f"no such template; {known}", key=f"{'.'.join(where)}.template")
-    if first["type"] == "wrong_key":
-        wrong = first["ctx"]["key"]
-        if quoted := _unquoted(where, wrong, first["input"].get(wrong)):
-            message = f"names with dots are written in quotes: {quoted}"
-            return SpecError(message, key=".".join(where[:2]))
-        where.append(wrong)
-    return SpecError(rejected(first["msg"], first["input"]), key=".".join(where))
-
-
-def _unquoted(where: Sequence[str], key: str, value: object) -> str:
-    """Return how to write a dotted name that TOML has read as nested tables; empty if there is none."""
     section, name = ("", "", *where)[-2:]
+    if first["type"] == "union_tag_not_found":
+        where.append("template")
+        message = f"no such template; {did_you_mean(str(given.get('template')), TEMPLATES)}"
+    elif first["type"] == "wrong_key":
+        wrong = first["ctx"]["key"]
+        if wrong == "formula" and "template" in given:
+            message = "this requirement has a template, too; give one of the two"
+        elif section == "parameters" and wrong in InputSection.model_fields:
+            message = f"only inputs have {wrong}: write [inputs.{name}] if it is one"
+        elif quoted := _unquoted(where, wrong, given):
+            return SpecError(f"names with dots are written in quotes: {quoted}", key=key_of(where[:2]))
+        where.append(wrong)
+    elif section in _TABLES and not isinstance(given, Mapping):
+        message = f"expected a table: {_TABLES[str(section)].format(name)}"
+    return SpecError(message, key=key_of(where))
+
+
+def _unquoted(where: Sequence[str | int], key: str, given: Mapping[str, Any]) -> str:
+    """Return how to write a dotted name that TOML has read as nested tables; empty if there is none."""
+    section, name, value = *("", "", *where)[-2:], given.get(key)
     quoted = f'"{name}.{key}"'
     if section in ("inputs", "parameters") and isinstance(value, dict):
         return f"[{section}.{quoted}]"
-    is_dotted = section == "parameters" or (section == "connections" and "." not in name)
+    dotless = not {"range", "value"} & given.keys() if section == "parameters" else "." not in str(name)
+    is_dotted = section in ("parameters", "connections") and dotless
     return f"{quoted} = ..." if is_dotted and value is not None else ""

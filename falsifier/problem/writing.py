@@ -179,21 +179,13 @@ def _comment(text: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """A model that a new requirement is about.
+    """A model that a new requirement is about."""
 
-    Attributes:
-        problem: model, ranges and experiment; its requirement is another one.
-        path: the spec file, to whose folder its paths are relative.
-        text: content of that file, or of a starter spec for it.
-        is_new: whether that is a starter, which is not written yet.
-        free_grid: whether the output interval may follow the formula.
-    """
-
-    problem: Problem
-    path: Path
-    text: str
-    is_new: bool
-    free_grid: bool
+    problem: Problem  # model, ranges and experiment; its requirement is another one
+    path: Path  # the spec file, to whose folder its paths are relative
+    text: str  # content of that file, or of a starter spec for it
+    is_new: bool  # whether that is a starter, which is not written yet
+    free_grid: bool  # whether the output interval may follow the formula
 
     @property
     def is_started(self) -> bool:

@@ -354,7 +354,7 @@ def repair(directory: Path) -> list[str]:
                 file.truncate(reader.offset)
             found.append(
                 f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
-                f"original is kept as {copy.name}; falsifier resume repeats what is missing"
+                f"original is kept as {copy.name}; to resume the run repeats what is missing"
             )
         for path in sorted((directory / TRAJECTORIES).glob("*.npz")):
             if not is_intact(path, path.read_bytes()):

@@ -16,7 +16,7 @@ from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import ValueKind
-from falsifier.errors import JournalError, did_you_mean
+from falsifier.errors import JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Held, Problem
@@ -131,7 +131,9 @@ class Manifest(Surroundings):
             JournalError: for an unknown name, or none if there are several; it lists the known ones.
         """
         if name is None and self.shared:
-            raise JournalError(f"this run searched {', '.join(self.names)}; choose one: --requirement NAME")
+            raise JournalError(
+                f"this run searched {', '.join(self.names)}; choose one: {setting('requirement', 'NAME')}"
+            )
         name = name or self.names[0]
         if name not in self.names:
             raise JournalError(f"this run has searched no {name!r}; {did_you_mean(name, self.names)}")

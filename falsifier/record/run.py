@@ -1,20 +1,20 @@
 """The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic, perf_counter
 from typing import overload
 
-from falsifier.core.arguments import instance, path_of, whole
+from falsifier.core.arguments import list_of, path_of, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import JournalError, SpecError, written
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, load_sources, reloadable
@@ -127,9 +127,12 @@ def falsify(
     _check_engine(engine)
     seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
     limits = _budget(budget)
-    groups, known = alike(problems), list(start_from)
+    groups, known = alike(problems), list_of("start_from", start_from, Candidate, "Candidate")
+    listeners = list_of("listeners", listeners, Callable, "functions")
     chat = None if isinstance(llm, LLMSettings | str | None) else llm
     made = None if isinstance(engine, str | None) else engine
+    if llm is None and made is None and (limits.tokens or limits.cost):
+        raise SpecError("budget: tokens and cost limit a language model, and none is named; drop the limit")
     name = engine if isinstance(engine, str | None) else engine.name
     settings = _settings(llm)
     results: dict[str, Result] = {}
@@ -179,12 +182,7 @@ def resume(
         JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
         SpecError: if the budget is less than what a run has spent.
     """
-    if isinstance(problems, Problem | str) or not isinstance(problems, Sequence):
-        raise SpecError(
-            f"problems: expected a list, got {type(problems).__name__}; for one: problems=[problem]"
-        )
-    for problem in problems:
-        instance("problems", problem, Problem, "a list of Problem")
+    problems = list_of("problems", problems, Problem, "Problem")
     directory = path_of("directory", directory, "the directory of a run")
     places = runs_in(directory)
     by_name = {problem.name: problem for problem in problems}
@@ -275,7 +273,11 @@ def carry_out(
         if begun and not resume:
             raise JournalError(
                 f"{directory} already contains a run: choose another directory, or to continue it: "
-                + (f"falsifier resume {directory}" if request.problems else "resume() with problems=[...]")
+                + (
+                    written(f"falsifier resume {directory}", f"resume({str(directory)!r})")
+                    if request.problems
+                    else "resume() with problems=[...]"
+                )
             )
         if directory is not None and (directory / CAMPAIGN).exists():
             raise JournalError(f"{directory} already contains a campaign: choose another directory")

@@ -6,9 +6,19 @@ from time import monotonic
 
 from falsifier.core.arguments import positive, whole
 from falsifier.core.words import counted
-from falsifier.errors import ChatError, FalsifierError, SpecError
+from falsifier.errors import ChatError, FalsifierError, SpecError, written
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
 from falsifier.search import DEFAULT_SIMULATIONS
+
+# What to say if a cost is limited that cannot be known.
+UNKNOWN_PRICE = (
+    "the price of {} is unknown, so its cost cannot be limited: state it ({}), or limit the tokens"
+)
+
+
+def stated_price() -> str:
+    """Return how the reader states the price of a language model."""
+    return written("--llm-option price=SENT:RECEIVED", "price=(SENT, RECEIVED)")
 
 
 class LimitReached(FalsifierError):
@@ -114,10 +124,7 @@ class Budget:
             return f"the budget of {counted(self.tokens, 'token')} is used up"
         if self.cost is not None:
             if spent.cost is None:
-                raise SpecError(
-                    "the price of this language model is unknown, so its cost cannot be limited: state the "
-                    "price (--llm-option price=SENT:RECEIVED), or limit the tokens instead (--max-tokens)"
-                )
+                raise SpecError(UNKNOWN_PRICE.format("this language model", stated_price()))
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"
         return None

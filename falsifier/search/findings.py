@@ -8,6 +8,7 @@ from typing import Literal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
+from falsifier.errors import written
 from falsifier.problem.grid import default_freedom, smallest_window
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection
@@ -128,15 +129,16 @@ def _remedy(problem: Problem, coarse: Sequence[InputRange], limits: FreeSection)
     """Say what allows faster inputs, depending on why there were none."""
     source, own = problem.source, {r.name: r for r in problem.space.inputs}
     if any(own[r.name].free for r in coarse):
-        return f"--engine {DEFAULT_ENGINE}, which chooses control points itself"
+        engine = written(f"--engine {DEFAULT_ENGINE}", f"engine={DEFAULT_ENGINE!r}")
+        return f"{engine}, which chooses control points itself"
     stated = {} if source is None else source.changes.inputs
     points = any(r.name in stated and stated[r.name].control_points for r in coarse)
     if source is not None and source.parameterization == "fixed" and not points:
-        return "--parameterization free"
+        return written("--parameterization free", "parameterization='free'")
     count, shortest = limits.max_control_points, limits.min_interval
     if source is None or source.parts.kind == "python":
         return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
-    option = f"--parameterization free:{shortest:g}"
+    option = written(f"--parameterization free:{shortest:g}", f"shortest_piece={shortest:g}")
     if source.parts.kind != "spec":
         return option
     free = f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }}"

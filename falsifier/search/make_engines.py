@@ -8,10 +8,11 @@ from falsifier.context.values import Context
 from falsifier.core.files import cache_directory
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, setting
 from falsifier.llm.messages import Chat
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
+from falsifier.search.budget import UNKNOWN_PRICE, stated_price
 from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def check_names(request: RunRequest) -> None:
     if llm is None:
         if engine in _LLM_ENGINES:
             raise SpecError(
-                f"the engine {engine!r} needs a language model: name one (--llm NAME, in Python llm=NAME)"
+                f"the engine {engine!r} needs a language model: name one ({setting('llm', 'NAME')})"
             )
         check_engine(engine or DEFAULT_ENGINE)
         return
@@ -121,10 +122,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         cache=cache_directory() / "replies" if llm.cache else None,
     )
     if max_cost is not None and price_of(llm) is None:
-        raise SpecError(
-            f"the price of {llm.name} is unknown, so its cost cannot be limited: state the price "
-            "(--llm-option price=SENT:RECEIVED, in Python price=(SENT, RECEIVED)), or limit the tokens"
-        )
+        raise SpecError(UNKNOWN_PRICE.format(llm.name, stated_price()))
     return chat
 
 

@@ -77,11 +77,7 @@ def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 
 
 
 def window_samples(window: Window, step: float) -> tuple[int, int]:
-    """Return the bounds of a window in samples.
-
-    Raises:
-        FormulaError: if a bound is not a multiple of the step.
-    """
+    """Return the bounds of a window in samples; FormulaError if a bound is not a multiple of the step."""
     start, end = round(window.start / step), round(window.end / step)
     for bound, nearest in ((window.start, start), (window.end, end)):
         if abs(bound / step - nearest) > _BOUND_TOLERANCE:

@@ -48,7 +48,7 @@ _INSTEAD = {  # what was meant by a name
 
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
-    "u": "operators are capital letters: write U",
+    "u": "operators are capital letters: write U", "alw": "write G or always", "ev": "write F or eventually",
     "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
@@ -61,20 +61,13 @@ _SHOWN_LINE = 160
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """One token of a formula's text.
+    """One token of a formula's text."""
 
-    Attributes:
-        kind: its kind.
-        text: the number, the signal's name in the model, or the canonical spelling of a symbol or reserved
-            word.
-        written: the text as written in the formula.
-        position: position of its first character, from 0.
-    """
-
-    kind: Literal["number", "name", "symbol", "end"]
+    kind: Literal["number", "name", "symbol", "end"]  # its kind
+    # The number, the signal's name in the model, or the canonical spelling of a symbol or reserved word.
     text: str
-    written: str
-    position: int
+    written: str  # the text as written in the formula
+    position: int  # position of its first character, from 0
 
     @property
     def end(self) -> int:
@@ -119,7 +112,7 @@ def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaEr
 
 def hint_for(token: Token) -> str:
     """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
-    word = token.text.partition("[")[0].lower()
+    word = token.text.partition("[")[0].lower().rstrip("_")  # as Breach writes alw_[0,20]
     if token.kind != "name":
         return ""
     return _INSTEAD.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")

@@ -137,24 +137,16 @@ class Location:
 
 @dataclass(frozen=True, slots=True)
 class CompiledPart:
-    """A sub-formula and the location of its values.
+    """A sub-formula and the location of its values."""
 
-    Attributes:
-        formula: the sub-formula.
-        text: its text.
-        location: its samples and their offsets.
-        window: window of a temporal operator, in samples from the sample at which it is evaluated; an end of
-            None is the last sample of the trajectory.
-        samples: number of samples of one trajectory.
-        children: parts directly below.
-    """
-
-    formula: Formula
-    text: str
-    location: Location
+    formula: Formula  # the sub-formula
+    text: str  # its text
+    location: Location  # its samples and their offsets
+    # Window of a temporal operator, in samples from the sample at which it is evaluated; an end of None is
+    # the last sample of the trajectory.
     window: tuple[int, int | None] | None
-    samples: int
-    children: tuple["CompiledPart", ...]
+    samples: int  # number of samples of one trajectory
+    children: tuple["CompiledPart", ...]  # parts directly below
 
     def at(self, buffer: Floats, sample: int) -> float:
         """Return the robustness at a sample."""
@@ -180,26 +172,16 @@ class CompiledPart:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """Steps, and the location of each part's values.
+    """Steps, and the location of each part's values."""
 
-    Attributes:
-        root: the whole formula.
-        signals: names of the signals, in their order in the buffer.
-        step: sampling step in s.
-        samples: number of samples of one trajectory.
-        times: the time grid in s, shape (n,).
-        steps: what fills the buffer, in order.
-        size: length of the buffer.
-        checked: the predicate that each check is for, and its location, by the number of the step.
-    """
-
-    root: CompiledPart
-    signals: tuple[str, ...]
-    step: float
-    samples: int
-    times: NDArray[np.float64]
-    steps: tuple[Operation, ...]
-    size: int
+    root: CompiledPart  # the whole formula
+    signals: tuple[str, ...]  # names of the signals, in their order in the buffer
+    step: float  # sampling step in s
+    samples: int  # number of samples of one trajectory
+    times: NDArray[np.float64]  # the time grid in s, shape (n,)
+    steps: tuple[Operation, ...]  # what fills the buffer, in order
+    size: int  # length of the buffer
+    # The predicate that each check is for, and its location, by the number of the step.
     checked: dict[int, tuple[Predicate, Location]]
 
 

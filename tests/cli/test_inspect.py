@@ -45,6 +45,7 @@ def test_info_takes_a_bundled_requirement_or_a_spec_for_its_fmu(tmp_path: Path) 
     assert "did you mean 'AT1'?" in falsifier("info", "at1", cwd=tmp_path).err
     spec = falsifier("info", str(bundled("specs") / "AT.toml"), cwd=tmp_path).out
     assert spec == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
+    assert spec == falsifier("info", f"{bundled('specs') / 'AT.toml'}:AT1", cwd=tmp_path).out
 
 
 @pytest.mark.parametrize("given", [["."], ["/"], [".", "car.fmu"]])

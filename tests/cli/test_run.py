@@ -67,7 +67,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         (("empty:R",), "did you mean 'empty.toml:R'?"),
         (("folder.fmu", "--stl", "G (speed <= 1)"), "folder.fmu is a folder; give"),
         (("AT1", "AT2"), "falsifier bench TARGET TARGET"),
-        ((*SPEED, "--stop-time", "-5"), "stop_time: expected a number greater than 0, got -5.0"),
+        ((*SPEED, "--stop-time", "-5"), "--stop-time -5: expected a positive number"),
         ((*SPEED, "--search", "throttle=0:100:0"), "expected a number greater than or equal to 1, got 0"),
         (("empty.toml",), "empty.toml: the file contains nothing; write [model]"),
     ],

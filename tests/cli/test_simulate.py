@@ -35,6 +35,7 @@ def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_pat
 def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
     done = falsifier("simulate", "AT1", "--set", "throttle=120", "--out", "out", cwd=tmp_path)
     assert "constant 120" in done.out, done.err
+    assert "throttle: 120 exceeds the model's limits for 'throttle', [0, 100]" in done.err
     assert (tmp_path / "out" / "trajectory.png").is_file()
 
 
@@ -51,6 +52,13 @@ def test_own_files_in_the_directory_are_kept(tmp_path: Path) -> None:
         assert falsifier("simulate", EASY, "--inputs", "input.csv", "--out", "p", cwd=tmp_path).code == 1
     kept = falsifier("simulate", EASY, "--inputs", "p/input.csv", "--out", "p", cwd=tmp_path)
     assert (kept.code, "p/input.csv is the original, which is kept" in kept.err) == (2, True), kept.err
+
+
+def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,50,-3\n20,50,0\n")
+    done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
+    assert "u.csv: ends at 20 s; the last values are kept until 50 s" in done.err
+    assert "brake: [-3, 0] exceeds the model's limits" in done.err and "throttle:" not in done.err
 
 
 def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:

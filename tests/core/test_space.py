@@ -216,7 +216,7 @@ def test_one_point_is_a_constant() -> None:
 def test_bad_control_points_are_refused(
     times: tuple[float, ...], values: tuple[float, ...], message: str
 ) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(SpecError, match=message):
         Signal(times, values)
 
 

@@ -49,7 +49,7 @@ def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
     assert found.file.name == "counterexample-FAR.json"
     with pytest.raises(JournalError, match="no 'OTHER'; known: HARD, NEVER, FAR"):
         case_of(tmp_path, "OTHER")
-    with pytest.raises(SpecError, match="this is not one"):
+    with pytest.raises(SpecError, match="not a run directory"):
         case_of(tmp_path / "counterexample-HARD.json", "FAR")
 
 
@@ -57,7 +57,7 @@ def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) ->
     falsify(
         [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")], "corners", budget=2, directory=tmp_path
     )
-    with pytest.raises(JournalError, match="searched NEVER, FAR; choose one: --requirement NAME"):
+    with pytest.raises(JournalError, match="searched NEVER, FAR; choose one: requirement=NAME"):
         case_of(tmp_path)
 
 

@@ -6,6 +6,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.explain import explain
+from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import Array, lag_problem
 from tests.problems import broken, conditional
@@ -85,7 +86,7 @@ def test_a_part_without_which_the_simulation_fails_is_said() -> None:
 
 def test_a_failed_simulation_cannot_be_explained() -> None:
     problem = lag_problem(response=broken)
-    with pytest.raises(ValueError, match="failed"):
+    with pytest.raises(SpecError, match="failed"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
 
 

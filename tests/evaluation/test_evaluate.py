@@ -123,3 +123,16 @@ def _fails(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
 def test_what_cannot_be_initialised_has_no_start() -> None:
     problem = lag_problem()
     assert start_values(replace(problem, model=FunctionModel(_fails, problem.info))) == {}
+
+
+@pytest.mark.parametrize(
+    ("candidate", "message"),
+    [
+        (Candidate(), "input 'u' is missing"),
+        (Candidate({"u": Signal((0.0,), (5.0,))}), r"'u' at t = 0 s: 5 is outside its range \[-1, 1\]"),
+        (Candidate({"v": Signal((0.0,), (0.0,))}), "unknown input or parameter 'v'"),
+    ],
+)
+def test_only_what_is_searched_is_evaluated(candidate: Candidate, message: str) -> None:
+    with pytest.raises(CandidateError, match=message):
+        evaluate(lag_problem(), candidate)

@@ -12,9 +12,9 @@ from typing import Any
 
 import pytest
 
-from falsifier.errors import SimulationError
+from falsifier.errors import SimulationError, setting
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.workers import LastingExecutor, local_executor, start
+from falsifier.evaluation.workers import LastingExecutor, local_executor, open_workers, start
 from falsifier.testing import lag_problem
 from tests.fmu import support
 from tests.fmu.fixtures import isolated, ramp, run, runners
@@ -136,3 +136,8 @@ def test_only_what_ends_a_process_of_its_own_has_crashed(monkeypatch: pytest.Mon
     assert [each.status for each in evaluations] == ["ok", "crashed", "ok"]
     assert evaluations[0].verdict == evaluate(problem, harmless).verdict
     assert evaluations[1].reason == "the worker process died: a process was terminated abruptly"
+
+
+def test_workers_speak_to_the_reader_of_their_parent(at_the_command_line: None) -> None:
+    with open_workers(1) as (worker,):
+        assert worker.submit(setting, "stop_time").result() == "--stop-time"

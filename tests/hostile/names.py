@@ -7,7 +7,6 @@ HOSTILE = (
     "/abs/dir",
     "..",
     ".",
-    "",
     "CON.txt",
     "a\0b",
     "x" * 5000,

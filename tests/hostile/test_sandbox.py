@@ -227,9 +227,9 @@ def test_a_daemon_ends_with_the_process(place: Place) -> None:
 def test_a_failure_tells_what_was_refused_before(place: Place) -> None:
     said = place.run(CHANGE, 100 + OVERWRITE)
     assert said.startswith("SimulationError failed")
-    assert str(place.home / "victim") in said and f"--allow write:{place.home}" in said
+    assert str(place.home / "victim") in said and f"allow=['write:{place.home}']" in said
     said = place.run(EXECUTE, 100)
-    assert "/bin/sh" in said and "--allow programs" in said
+    assert "/bin/sh" in said and "allow=['programs']" in said
     assert "refused" not in place.run(CRASH)
 
 

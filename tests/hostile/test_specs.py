@@ -124,7 +124,7 @@ def described(text: str) -> Description:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (FMI2.format(scalar(typed="")), "variable 'x' has no type"),
+        (FMI2.format(scalar(typed="")), "'x': it has no type"),
         (FMI2.format(scalar() * 2), "two variables are named 'x'"),
         (FMI2.format(scalar(reference="99999999999")), "does not fit 32 bits"),
         (FMI2.format(scalar(reference="-1")), "does not fit 32 bits"),
@@ -132,7 +132,7 @@ def described(text: str) -> Description:
         (FMI2.format(scalar(name="x" * 20_000_000)), "more than 10000 characters"),
         (FMI2.replace('Name="m"', f'Name="{"m" * 20_000_000}"').format(""), "more than 10000 characters"),
         (FMI2.replace('ier="m"', f'ier="{"m" * 20_000_000}"').format(""), "more than 10000 characters"),
-        (FMI2.format(scalar(typed='<Real min="low"/>')), "could not convert"),
+        (FMI2.format(scalar(typed='<Real min="low"/>')), "min = 'low': expected a number"),
         (
             FMI3.format('<Float64 name="x" valueReference="1"><Dimension start="4000000000"/></Float64>'),
             "4000000000 elements",

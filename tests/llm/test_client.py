@@ -223,7 +223,7 @@ FAILURES: list[tuple[Step, type[ChatError] | None, str]] = [
     (Step(raw='{"id": "1", "object": "chat.completion", "choices": []}'), TransientChatError, ""),
     (Step(raw="<html>Bad gateway</html>"), TransientChatError, "Bad gateway"),
     (Step(status=401, message="bad key sk-openai-secret"), None, "check "),
-    (Step(status=404, message="no such model"), None, "--api-base"),
+    (Step(status=404, message="no such model"), None, "the server's address"),
     (Step(status=400, message="response_format json_schema unsupported"), FormatUnsupportedError, ""),
     (Step(status=429, message="insufficient_quota: check your billing"), None, "no quota left"),
 ]

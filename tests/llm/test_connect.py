@@ -76,7 +76,7 @@ def test_an_option_that_the_provider_does_not_have_is_refused(
 ) -> None:
     for variable in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
         monkeypatch.setenv(variable, "sk-some-key")
-    with pytest.raises(ChatSetupError, match=r"--llm-option max_token: .* did you mean 'max_tokens'"):
+    with pytest.raises(ChatSetupError, match=r"^max_token: .* did you mean 'max_tokens'"):
         connect(llm, options={"max_token": 9})
     connect(llm, options={"max_tokens": 9, "temperature": 1, "extra_headers": {"X": "y"}})
 
@@ -84,7 +84,7 @@ def test_an_option_that_the_provider_does_not_have_is_refused(
 def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
     connect("openai/m", api_base="http://127.0.0.1:9", options={"foo": 1})
     connect("ollama_chat/x", options={"foo": 1})
-    with pytest.raises(ChatSetupError, match="use --llm-option timeout=SECONDS"):
+    with pytest.raises(ChatSetupError, match="timeout: state it beside the options"):
         connect("ollama_chat/x", options={"timeout": 5})
 
 

@@ -50,7 +50,7 @@ def test_the_servers_words_come_without_classes_and_full_stop() -> None:
     assert str(told("Connection error.")).endswith("Connection error")
     assert str(told("still loading ...")).endswith("still loading ...")
     assert str(told('{"error": {"message": "not\\n now."}}')).endswith("not now")
-    assert "--anonymous" in str(told("content_policy_violation"))
+    assert "neutral names" in str(told("content_policy_violation"))
     assert "too long" in str(told("this model's maximum context length is 8192 tokens"))
 
 
@@ -114,7 +114,7 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
         (Step(status=413, message="Payload Too Large"), "use a plainer prompt variant"),
         (
             Step(status=400, message="Unrecognized request argument supplied: top_k"),
-            "drop --llm-option top_k",
+            "refuses the option top_k; drop it",
         ),
         (
             Step(status=403, message="Your organization must be verified to use o3"),

@@ -148,7 +148,7 @@ class TestModelFile:
         (tmp_path / "text.gguf").write_text("hello")
         with pytest.raises(ChatSetupError, match="not a GGUF file"):
             connect(str(tmp_path / "text.gguf"))
-        with pytest.raises(ChatSetupError, match="drop --api-base"):
+        with pytest.raises(ChatSetupError, match="drop api_base"):
             connect(str(model), api_base="http://127.0.0.1:1/v1")
         odd = tmp_path / "odd.gguf"
         odd.write_bytes(model.read_bytes().replace(b"llama", b"lxama"))

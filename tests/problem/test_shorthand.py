@@ -80,6 +80,6 @@ def test_values_that_mean_nothing_are_named(value: object) -> None:
         ({"values": ["p=1"], "ranges": ["p=0:1"]}, "p: --set keeps it constant, --search varies it"),
     ],
 )
-def test_a_name_is_given_once(options: dict[str, Any], message: str) -> None:
+def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_command_line: None) -> None:
     with pytest.raises(SpecError, match=message):
         changes_from_options(**options)

@@ -32,9 +32,9 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
         ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
         ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
-        ("inputs.u.range", [0], r"inputs\.u\.range\.1: a value is missing"),
+        ("inputs.u.range", [0], r"inputs\.u\.range, entry 2: a value is missing"),
         ("inputs.u.interpolation", "cubic", r"inputs\.u\.interpolation: .*'constant', got 'cubic'$"),
-        ("inputs.u.control_points", True, r"inputs\.u\.control_points: expected a number, got True$"),
+        ("inputs.u.control_points", True, r"inputs\.u\.control_points: expected a number, got true$"),
         ("model.stop_time", "50", r"model\.stop_time: expected a number, got '50'$"),
         ("inputs.u.control_points", 0, r"inputs\.u\.control_points: .*greater than or equal to 1, got 0$"),
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
@@ -44,6 +44,23 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"formul": "x"}, r"requirements\.R\.formul: unknown key; did you mean 'formula'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
+        ("requirements.R.template", "settles", r"requirements\.R\.formula: .* has a template, too; give one"),
+        (
+            "requirements.R",
+            "G (x <= 1)",
+            r"requirements\.R: expected a table: \[requirements\.R\] with",
+        ),
+        (
+            "parameters.p",
+            [0, 1],
+            r"parameters\.p: expected a table: \[parameters\.p\] with range",
+        ),
+        (
+            "parameters.p",
+            {"range": [0, 1], "control_points": 3},
+            r"parameters\.p\.control_points: only inputs have control_points: write \[inputs\.p\] if",
+        ),
+        ("parameters.p", {"range": [0, 1], "foo": 3}, r"parameters\.p\.foo: unknown key; known: range"),
         ("profiles.p.inputs.u.hodl", 1, r"profiles\.p\.inputs\.u\.hodl: unknown key; did you mean 'hold'"),
     ],
 )
@@ -53,7 +70,7 @@ def test_errors_name_file_key_and_cure(path: str, value: object, message: str) -
 
 
 def test_a_file_without_requirements_is_told_what_is_missing() -> None:
-    with pytest.raises(SpecError, match=r"my\.toml: requirements: this key is missing \(What to falsify"):
+    with pytest.raises(SpecError, match=r"my\.toml: requirements: this key is missing: What to falsify"):
         parse_spec({"model": GOOD["model"]}, file="my.toml")
 
 
@@ -63,6 +80,9 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text("[model\n")
     with pytest.raises(SpecError, match=r"bad\.toml: not valid TOML: .*line 1"):
+        read_spec(bad)
+    bad.write_text("[requirements.R1]\n[requirements.R1]\n")
+    with pytest.raises(SpecError, match=r"Cannot declare \[requirements\.R1\] twice"):
         read_spec(bad)
     bad.write_text("[model]\n", encoding="utf-16")
     with pytest.raises(SpecError, match=r"bad\.toml: is written in UTF-16; .* save the file"):
@@ -101,7 +121,7 @@ def test_fixed_and_searched_replace_each_other() -> None:
     [
         ({"template": "order", "conditions": ["a", "b"], "inputs": {"u": {"rang": [0, 1]}}}, "inputs.u.rang"),
         ({"formula": "G (x <= 1)", "inputs": {"u": {"range": [1, 0]}}}, "inputs.u.range"),
-        ({"template": "order", "conditions": ["a", "b ="]}, "conditions.1"),
+        ({"template": "order", "conditions": ["a", "b ="]}, "conditions, entry 2"),
         ({}, "formula"),
     ],
 )

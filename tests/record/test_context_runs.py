@@ -72,7 +72,7 @@ def test_nothing_is_asked_or_recorded_if_a_file_looks_like_a_secret(tmp_path: Pa
 
 def test_context_and_anonymous_exclude_each_other(file: Path) -> None:
     hidden = LLMSettings(name="openai/x", api_base="http://127.0.0.1:1", anonymous=True)
-    with pytest.raises(SpecError, match="--anonymous hides what the system is, and context would tell it"):
+    with pytest.raises(SpecError, match="anonymous hides what the system is, and context would tell it"):
         falsify(with_file(file), llm=hidden, budget=1)
     with pytest.raises(SpecError, match="the prompt variant MP4 does not tell it; use MP6"):
         falsify(with_file(file), llm=hidden.model_copy(update={"variant": "MP4"}), budget=1)

@@ -121,7 +121,7 @@ def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
         together.wait(HANG)
         return evaluate(problem, candidate)
 
-    monkeypatch.setattr("falsifier.evaluation.workers.evaluate", simulated)
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate_any", simulated)
     events: list[Event] = []
     (resumed,) = resume(tmp_path, problems=[problem], listeners=[events.append])
     assert keys(resumed) == keys(whole)

@@ -44,7 +44,7 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     stated = Problem.from_fmu(fmu_path("Lag_2"), formula, inputs={"u": (-1, 1, 5)}, stop_time=10.0)
     assert told(stated) == (
         "Faster inputs were not tried: u had 5 control points (pchip) and needed 2.5 s from -1 to 1. The "
-        "formula's smallest window is 1 s. To try them: --parameterization free:0.05."
+        "formula's smallest window is 1 s. To try them: shortest_piece=0.05."
     )
     assert stated.source is not None
     asked = stated.source.model_copy(update={"parameterization": "fixed"})
@@ -55,9 +55,9 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
 def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
     free = lag_problem(free=FREE)
     assert not told(free)
-    assert "--engine surrogate" in told(free, "cma")
+    assert "engine='surrogate'" in told(free, "cma")
     fixed = load_problem("AT1", parameterization="fixed")
-    assert "--parameterization free" in told(fixed)
+    assert "parameterization='free'" in told(fixed)
 
 
 def test_constant_and_held_inputs_are_described_as_such() -> None:

@@ -48,8 +48,8 @@ def test_several_requirements_have_engines_that_draw_different_points() -> None:
     ("engine", "llm", "settings", "named"),
     [
         ("corner", None, {}, "'corners'"),
-        ("llm", None, {}, "--llm"),
-        ("hybrid", None, {}, "--llm"),
+        ("llm", None, {}, "llm=NAME"),
+        ("hybrid", None, {}, "llm=NAME"),
         ("uniform", "script", {}, "uniform"),
         (None, "script", {"variant": "MP9"}, "MP9"),
     ],
@@ -63,7 +63,7 @@ def test_names_that_do_not_go_together_are_refused_before_anything_is_made(
 
 def test_a_limit_on_money_needs_a_price() -> None:
     asked = request(llm="hosted_vllm/mine").model_copy(update={"budget": Budget(cost=1.0)})
-    with pytest.raises(SpecError, match="price=SENT:RECEIVED"):
+    with pytest.raises(SpecError, match=r"price=\(SENT, RECEIVED\)"):
         make_engines(asked, [PROBLEM], None)
     priced = LLMSettings(name="hosted_vllm/mine", price=(0.25, 2.0), cache=False)
     (engine,) = make_engines(asked.model_copy(update={"llm": priced}), [PROBLEM], None)

@@ -65,11 +65,7 @@ _LIBRARY_SUFFIX = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
 
 
 def file_hash(path: Path) -> str:
-    """Return the SHA-256 of a file as hexadecimal digits.
-
-    Raises:
-        ModelError: if the file cannot be read.
-    """
+    """Return the SHA-256 of a file as hexadecimal digits; ModelError if the file cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -119,7 +115,7 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
             with archive.open(name) as file:
                 return file.read() if first is None else file.read(first)
         except KeyError:
-            raise ModelError(
+            raise ModelFileError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except UNREADABLE as error:

@@ -31,19 +31,13 @@ _UNKNOWN = frozenset('\\"')
 
 @dataclass(frozen=True, slots=True)
 class Libraries:
-    """Which files of an FMU are its libraries.
+    """Which files of an FMU are its libraries."""
 
-    Attributes:
-        here: path inside the archive of this platform's library, by interface; missing if there is none.
-        windows: the same for 64-bit Windows.
-        lacking: why there is none for this platform and what to do, by interface.
-        notes: what the user should know, one sentence each.
-    """
-
+    # Path inside the archive of this platform's library, by interface; missing if there is none.
     here: Mapping[Interface, PurePosixPath]
-    windows: Mapping[Interface, PurePosixPath]
-    lacking: Mapping[Interface, str]
-    notes: tuple[str, ...]
+    windows: Mapping[Interface, PurePosixPath]  # the same for 64-bit Windows
+    lacking: Mapping[Interface, str]  # why there is none for this platform and what to do, by interface
+    notes: tuple[str, ...]  # what the user should know, one sentence each
 
 
 def find_libraries(path: Path, fmi_version: str, identifiers: Mapping[Interface, str]) -> Libraries:

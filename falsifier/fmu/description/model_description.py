@@ -3,6 +3,7 @@
 Element and attribute names are those of the FMI standards 1.0.1, 2.0.5 and 3.0.2.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -11,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 from falsifier.core.arguments import path_of
 from falsifier.core.model import Interface, ModelInfo, Variable
-from falsifier.errors import ModelError, did_you_mean
+from falsifier.errors import ModelError, ModelFileError, did_you_mean
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.libraries import Libraries, can_run_windows, find_libraries, platforms
 from falsifier.fmu.description.variables import (
@@ -22,6 +23,7 @@ from falsifier.fmu.description.variables import (
     input_clocks,
     is_true,
     read_variables,
+    whole,
 )
 from falsifier.fmu.description.xml import read_xml
 
@@ -38,33 +40,20 @@ _SHOWN_NAMES = 10
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """Contents of a modelDescription.xml.
+    """Contents of a modelDescription.xml."""
 
-    Attributes:
-        info: what other packages need.
-        token: GUID (FMI 1 and 2) or instantiation token (FMI 3).
-        identifiers: model identifier by interface.
-        libraries: its libraries for this platform and for Windows.
-        slots: how to access each scalar variable, by name.
-        arrays: start values of all elements by value reference, for arrays only.
-        states: number of continuous states (FMI 1 and 2; FMI 3 reports it at run time).
-        indicators: number of event indicators (FMI 1 and 2).
-        event_mode: whether the co-simulation interface supports event mode (FMI 3).
-        needs_tool: names of interfaces that need the exporting tool to be installed.
-        saves_state: names of interfaces whose state can be saved and restored.
-    """
-
-    info: ModelInfo
-    token: str
-    identifiers: Mapping[Interface, str]
-    slots: Mapping[str, Slot]
-    libraries: Libraries = _NO_LIBRARIES
+    info: ModelInfo  # what other packages need
+    token: str  # GUID (FMI 1 and 2) or instantiation token (FMI 3)
+    identifiers: Mapping[Interface, str]  # model identifier by interface
+    slots: Mapping[str, Slot]  # how to access each scalar variable, by name
+    libraries: Libraries = _NO_LIBRARIES  # its libraries for this platform and for Windows
+    # Start values of all elements by value reference, for arrays only.
     arrays: Mapping[int, tuple[float, ...]] = field(default_factory=dict)
-    states: int = 0
-    indicators: int = 0
-    event_mode: bool = False
-    needs_tool: tuple[Interface, ...] = ()
-    saves_state: tuple[Interface, ...] = ()
+    states: int = 0  # number of continuous states (FMI 1 and 2; FMI 3 reports it at run time)
+    indicators: int = 0  # number of event indicators (FMI 1 and 2)
+    event_mode: bool = False  # whether the co-simulation interface supports event mode (FMI 3)
+    needs_tool: tuple[Interface, ...] = ()  # names of interfaces that need the exporting tool to be installed
+    saves_state: tuple[Interface, ...] = ()  # names of interfaces whose state can be saved and restored
 
     @property
     def major(self) -> int:
@@ -116,7 +105,7 @@ def describe(path: Path, sha256: str) -> Description:
         ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
     """
     text = archive.read_entry(path, "modelDescription.xml")
-    root = read_xml(text, f"{path}: modelDescription.xml", ModelError)
+    root = read_xml(text, f"{path}: modelDescription.xml", ModelFileError)
     described = parse(root, name=str(path))
     libraries = find_libraries(path, described.info.fmi_version, described.identifiers)
     notes, supported = (*described.info.notes, *libraries.notes), platforms(archive.entry_names(path))
@@ -139,16 +128,17 @@ def parse(root: Element, *, name: str) -> Description:
             element.set("description", f"{text[:LONGEST_NAME]} ...")
     try:
         return _parse(root, version)
-    except (KeyError, ValueError, IndexError) as error:
-        raise ModelError(
-            f"{name}: modelDescription.xml does not follow FMI {version} ({type(error).__name__}: {error})"
-        ) from error
+    except (KeyError, ValueError) as error:
+        said = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
+        raise ModelFileError(f"{name}: modelDescription.xml does not follow FMI {version}: {said}") from error
 
 
 def _parse(root: Element, version: str) -> Description:
     major = int(version[0])
     interfaces = _interfaces(root, major)
     identifiers = {interface: stated["modelIdentifier"] for interface, stated in interfaces.items()}
+    if folder := next((each for each in identifiers.values() if re.search(r"[/\\]", each)), None):
+        raise ValueError(f"modelIdentifier = {folder!r}: expected the name of a library, without a folder")
     needs_tool = tuple(i for i, stated in interfaces.items() if is_true(stated.get("needsExecutionTool")))
     tool = root.get("generationTool", "")
     for name in (root.attrib["modelName"], *identifiers.values(), tool):
@@ -161,10 +151,10 @@ def _parse(root: Element, version: str) -> Description:
         fmi_version=version,
         interfaces=tuple(identifiers),
         tool=tool,
-        start_time=finite(experiment.get("startTime")),
-        stop_time=_positive(experiment.get("stopTime")),
-        step_size=_positive(experiment.get("stepSize")),
-        tolerance=_positive(experiment.get("tolerance")),
+        start_time=finite(experiment, "startTime"),
+        stop_time=_positive(experiment, "stopTime"),
+        step_size=_positive(experiment, "stepSize"),
+        tolerance=_positive(experiment, "tolerance"),
         variables=variables,
         notes=_notes(root, variables, experiment, tool=tool, needs_tool=needs_tool),
     )
@@ -175,7 +165,7 @@ def _parse(root: Element, version: str) -> Description:
         slots=slots,
         arrays=arrays,
         states=_number_of_states(root, major),
-        indicators=int(root.get("numberOfEventIndicators", "0")),
+        indicators=whole(root.attrib, "numberOfEventIndicators", "0"),
         event_mode=is_true(interfaces.get("co-simulation", {}).get("hasEventMode")),
         needs_tool=needs_tool,
         saves_state=tuple(
@@ -186,7 +176,7 @@ def _parse(root: Element, version: str) -> Description:
 
 def _number_of_states(root: Element, major: int) -> int:
     if major == 1:
-        return int(root.get("numberOfContinuousStates", "0"))
+        return whole(root.attrib, "numberOfContinuousStates", "0")
     return len(root.findall("ModelStructure/Derivatives/Unknown"))
 
 
@@ -203,10 +193,10 @@ def _interfaces(root: Element, major: int) -> dict[Interface, Mapping[str, str]]
     return {"co-simulation": {**own, "needsExecutionTool": str(needs_tool).lower()}}
 
 
-def _positive(text: str | None) -> float | None:
+def _positive(experiment: Mapping[str, str], name: str) -> float | None:
     """Return a time or tolerance of the default experiment; None if no simulation could use it."""
-    number = finite(text)
-    return number if number is not None and number > 0.0 else None
+    found = finite(experiment, name)
+    return found if found is not None and found > 0.0 else None
 
 
 def _notes(
@@ -219,7 +209,7 @@ def _notes(
 ) -> tuple[str, ...]:
     """Return what the user should know about an FMU, one sentence each."""
     said = []
-    if start_time := finite(experiment.get("startTime")):
+    if start_time := finite(experiment, "startTime"):
         said.append(
             f"the default experiment starts at {start_time:g} s; here simulations start at 0 s and end at "
             "the stop time"

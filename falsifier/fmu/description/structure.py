@@ -16,17 +16,11 @@ _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit in terms of SI base units: a value v of it is ``factor * v + offset`` of these.
+    """A unit in terms of SI base units: a value v of it is ``factor * v + offset`` of these."""
 
-    Attributes:
-        exponents: exponents of kg, m, s, A, K, mol, cd and rad.
-        factor: factor to the SI unit.
-        offset: offset to the SI unit.
-    """
-
-    exponents: tuple[int, ...]
-    factor: float = 1.0
-    offset: float = 0.0
+    exponents: tuple[int, ...]  # exponents of kg, m, s, A, K, mol, cd and rad
+    factor: float = 1.0  # factor to the SI unit
+    offset: float = 0.0  # offset to the SI unit
 
 
 Units = Mapping[str, Unit]
@@ -140,16 +134,13 @@ class Structure:
 
     FMUs declare what outputs and derivatives of states depend on. What they keep in discrete variables is
     not part of it, so that a declared independence is strong evidence and no proof.
-
-    Attributes:
-        units: units that it defines, by name.
-        inputs_of: the inputs on which an output depends directly, by the output's name; an output that is
-            missing here may depend on all inputs.
-        reaching: the inputs on which an output can depend, directly or through states; likewise.
     """
 
-    units: Units
+    units: Units  # units that it defines, by name
+    # The inputs on which an output depends directly, by the output's name; an output that is missing here may
+    # depend on all inputs.
     inputs_of: Mapping[str, frozenset[str]]
+    # The inputs on which an output can depend, directly or through states; likewise.
     reaching: Mapping[str, frozenset[str]]
 
 

@@ -1,12 +1,14 @@
 """The variables of an FMU, as its description declares them, and how to access each of them."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
-from math import isfinite, prod
+from math import inf, isfinite, prod
 from xml.etree.ElementTree import Element
 
 from falsifier.core.model import Causality, Kind, Variable
+from falsifier.errors import did_you_mean
 
 # Element name -> (kind, type code). The type code names the FMU's get and set functions for the value.
 _TYPES_1_2: Mapping[str, tuple[Kind, str]] = {
@@ -37,6 +39,7 @@ _CAUSALITIES: Mapping[str, Causality] = {
     "structuralParameter": "parameter",
     "calculatedParameter": "calculatedParameter",
     "independent": "independent",
+    **dict.fromkeys(("local", "dependent", "internal", "none"), "local"),
 }
 _NO_ELEMENT = Element("none")
 # Causality, variability, and why the variable cannot be set; empty if it can.
@@ -53,25 +56,16 @@ _REFUSALS: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """How to access one scalar in the FMU.
+    """How to access one scalar in the FMU."""
 
-    Attributes:
-        reference: value reference of the variable or, for an element, of its array.
-        type: type code, e.g. ``Real``, ``Float32``, ``Boolean``.
-        offset: position in the array in row-major order, 0 for scalars.
-        size: number of elements of the array, 1 for scalars.
-        negated: whether it is an FMI 1 alias with the opposite sign.
-        refusal: why it cannot be set; empty if it can.
-        declared: name in modelDescription.xml, if another: an array's for its elements, the variable's for
-            aliases (FMI 3).
-    """
-
-    reference: int
-    type: str
-    offset: int = 0
-    size: int = 1
-    negated: bool = False
-    refusal: str = ""
+    reference: int  # value reference of the variable or, for an element, of its array
+    type: str  # type code, e.g. ``Real``, ``Float32``, ``Boolean``
+    offset: int = 0  # position in the array in row-major order, 0 for scalars
+    size: int = 1  # number of elements of the array, 1 for scalars
+    negated: bool = False  # whether it is an FMI 1 alias with the opposite sign
+    refusal: str = ""  # why it cannot be set; empty if it can
+    # Name in modelDescription.xml, if another: an array's for its elements, the variable's for aliases of
+    # FMI 3.
     declared: str = ""
 
 
@@ -92,6 +86,8 @@ def read_variables(
     slots: dict[str, Slot] = {}
     for variable, slot in _variables_3(root, arrays) if major == 3 else _variables_1_2(root, major):
         check_length(variable.name)
+        if not variable.name:
+            raise ValueError("a variable has an empty name")
         if variable.name in slots:
             raise ValueError(f"two variables are named {variable.name!r}")
         if not 0 <= slot.reference <= _LARGEST_REFERENCE:
@@ -99,6 +95,26 @@ def read_variables(
         variables.append(variable)
         slots[variable.name] = slot
     return *_with_aliases_marked(variables, slots), arrays
+
+
+@contextmanager
+def about(element: Element) -> Iterator[None]:
+    """Let errors raised within, which name an attribute, name the element, too."""
+    try:
+        yield
+    except (LookupError, ValueError) as error:
+        said = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
+        raise ValueError(f"{element.tag} {element.get('name', '')!r}: {said}") from None
+
+
+def whole(attributes: Mapping[str, str], name: str, default: str | None = None) -> int:
+    """Return an attribute as a whole number; ValueError naming it if it is missing or none."""
+    if (text := attributes.get(name, default)) is None:
+        raise ValueError(f"{name} is missing")
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{name} = {text[:40]!r}: expected a whole number") from None
 
 
 def check_length(name: str) -> None:
@@ -139,71 +155,90 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
     elements = root.findall("ModelVariables/ScalarVariable")
     states = _states_2(root, elements)
     for position, element in enumerate(elements, start=1):
-        typed = next((child for child in element if child.tag in _TYPES_1_2), None)
-        if typed is None:
-            raise ValueError(f"variable {element.attrib['name']!r} has no type")
-        kind, code = _TYPES_1_2[typed.tag]
-        definition = next(iter(types.get(typed.get("declaredType", ""), ())), _NO_ELEMENT)
-        role = _role(element, major, has_start=typed.get("start") is not None)
-        start, is_state = _start(kind, typed.get("start")), position in states
-        variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
-        reference, negated = int(element.attrib["valueReference"]), element.get("alias") == "negatedAlias"
-        yield variable, Slot(reference, code, negated=negated, refusal=role[2])
+        with about(element):
+            typed = next((child for child in element if child.tag in _TYPES_1_2), None)
+            if typed is None:
+                raise ValueError("it has no type")
+            kind, code = _TYPES_1_2[typed.tag]
+            definition = next(iter(types.get(typed.get("declaredType", ""), ())), _NO_ELEMENT)
+            role = _role(element, major, has_start=typed.get("start") is not None)
+            start, is_state = _start(kind, typed.attrib), position in states
+            variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
+            reference, negated = (
+                whole(element.attrib, "valueReference"),
+                element.get("alias") == "negatedAlias",
+            )
+            yield variable, Slot(reference, code, negated=negated, refusal=role[2])
 
 
 def _states_2(root: Element, elements: list[Element]) -> set[int]:
     """Return the positions, counted from 1, of the continuous states; FMI 1 does not list them."""
     states = set()
     for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
-        derivative = elements[int(unknown.attrib["index"]) - 1].find("Real")
+        if (index := whole(unknown.attrib, "index")) > len(elements):
+            raise ValueError(f"ModelStructure: index = {index}: there are {len(elements)} variables")
+        derivative = elements[index - 1].find("Real")
         if derivative is not None and derivative.get("derivative"):
-            states.add(int(derivative.attrib["derivative"]))
+            states.add(whole(derivative.attrib, "derivative"))
     return states
+
+
+class _ByReference(dict[int, Element]):
+    def __missing__(self, reference: int) -> Element:
+        raise ValueError(f"valueReference = {reference}: there is no such variable")
 
 
 def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterator[tuple[Variable, Slot]]:
     types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/*")}
-    elements = {int(e.attrib["valueReference"]): e for e in root.findall("ModelVariables/*")}
+    elements = _ByReference()
+    for element in root.findall("ModelVariables/*"):
+        with about(element):
+            elements[whole(element.attrib, "valueReference")] = element
     states = {
-        int(elements[int(d.attrib["valueReference"])].attrib["derivative"])
+        whole(elements[whole(d.attrib, "valueReference")].attrib, "derivative")
         for d in root.findall("ModelStructure/ContinuousStateDerivative")
     }
     ticked = set(input_clocks(root))
     for reference, element in elements.items():
         if element.tag not in _TYPES_3:
             continue
-        kind, code = _TYPES_3[element.tag]
-        definition = types.get(element.get("declaredType", ""), _NO_ELEMENT)
-        starts = _starts_3(kind, element)
-        default = "continuous" if kind == "real" else "discrete"
-        role = _role(element, 3, default, has_start=bool(starts))
-        clocks = set(map(int, element.get("clocks", "").split()))
-        if clocks:
-            role = (*role[:2], "it belongs to a clock; only the FMU itself may change it")
-        shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
-        count = prod(shape)
-        if not 0 <= count <= _MAX_ELEMENTS:
-            raise ValueError(f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}")
-        starts = starts * count if len(starts) == 1 else starts
-        if shape and kind != "string":
-            arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
-        variable = _variable(element, element, definition, (kind, code), role, is_state=reference in states)
-        is_clocked = bool(clocks) and (clocks <= ticked or variable.causality == "input")
-        names = [(variable.name, variable.description)]
-        names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
-        for name, description in names:
-            for offset, index in enumerate(product(*(range(1, n + 1) for n in shape))):
-                suffix = f"[{','.join(map(str, index))}]" if shape else ""
-                yield (
-                    replace(
-                        variable,
-                        name=name + suffix,
-                        description=description,
-                        start=starts[offset] if starts else None,
-                        is_clocked=is_clocked,
-                    ),
-                    Slot(reference, code, offset, count, refusal=role[2], declared=variable.name),
+        with about(element):
+            kind, code = _TYPES_3[element.tag]
+            definition = types.get(element.get("declaredType", ""), _NO_ELEMENT)
+            starts = _starts_3(kind, element)
+            default = "continuous" if kind == "real" else "discrete"
+            role = _role(element, 3, default, has_start=bool(starts))
+            clocks = set(map(int, element.get("clocks", "").split()))
+            if clocks:
+                role = (*role[:2], "it belongs to a clock; only the FMU itself may change it")
+            shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
+            count = prod(shape)
+            if not 0 <= count <= _MAX_ELEMENTS:
+                raise ValueError(
+                    f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}"
                 )
+            starts = starts * count if len(starts) == 1 else starts
+            if shape and kind != "string":
+                arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
+            variable = _variable(
+                element, element, definition, (kind, code), role, is_state=reference in states
+            )
+            is_clocked = bool(clocks) and (clocks <= ticked or variable.causality == "input")
+            names = [(variable.name, variable.description)]
+            names += [(a.attrib["name"], a.get("description", "")) for a in element.findall("Alias")]
+            for name, description in names:
+                for offset, index in enumerate(product(*(range(1, n + 1) for n in shape))):
+                    suffix = f"[{','.join(map(str, index))}]" if shape else ""
+                    yield (
+                        replace(
+                            variable,
+                            name=name + suffix,
+                            description=description,
+                            start=starts[offset] if starts else None,
+                            is_clocked=is_clocked,
+                        ),
+                        Slot(reference, code, offset, count, refusal=role[2], declared=variable.name),
+                    )
 
 
 def _variable(
@@ -226,9 +261,9 @@ def _variable(
         variability=role[1],
         unit=_unit(attributes.get("unit")),
         display_unit=_unit(attributes.get("displayUnit")),
-        low=_limit(attributes.get("min")),
-        high=_limit(attributes.get("max")),
-        nominal=finite(attributes.get("nominal")),
+        low=_limit(attributes, "min"),
+        high=_limit(attributes, "max"),
+        nominal=finite(attributes, "nominal"),
         start=start,
         settable=not role[2],
         is_state=is_state,
@@ -253,7 +288,9 @@ def _role(element: Element, major: int, default_variability: str = "continuous",
         refusal = "" if initial in ("exact", "approx") else "the model computes its initial value"
     if variability == "constant":
         refusal = "it is a constant"
-    return _CAUSALITIES.get(causality, "local"), variability, refusal
+    if causality not in _CAUSALITIES:
+        raise ValueError(f"causality = {causality!r}: {did_you_mean(causality, _CAUSALITIES)}")
+    return _CAUSALITIES[causality], variability, refusal
 
 
 def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
@@ -265,25 +302,33 @@ def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
 def _starts_3(kind: Kind, element: Element) -> tuple[float | str | None, ...]:
     if kind == "string":
         return tuple(s.get("value", "") for s in element.findall("Start"))
-    return tuple(_start(kind, word) for word in element.get("start", "").split())
+    return tuple(_start(kind, {"start": word}) for word in element.get("start", "").split())
 
 
-def _start(kind: Kind, text: str | None) -> float | str | None:
+def _start(kind: Kind, attributes: Mapping[str, str]) -> float | str | None:
+    text = attributes.get("start")
     if text is None or kind == "string":
         return text
-    return float(is_true(text)) if kind == "boolean" else float(text)
+    return float(is_true(text)) if kind == "boolean" else _real(attributes, "start")
 
 
-def finite(text: str | None) -> float | None:
+def finite(attributes: Mapping[str, str], name: str) -> float | None:
     """Return the number of an attribute; None without one, and for NaN and infinity, which limit nothing."""
-    number = None if text is None else float(text)
-    return number if number is not None and isfinite(number) else None
+    found = _real(attributes, name) if name in attributes else inf
+    return found if isfinite(found) else None
 
 
-def _limit(text: str | None) -> float | None:
+def _real(attributes: Mapping[str, str], name: str) -> float:
+    try:
+        return float(attributes[name])
+    except ValueError:
+        raise ValueError(f"{name} = {attributes[name][:40]!r}: expected a number") from None
+
+
+def _limit(attributes: Mapping[str, str], name: str) -> float | None:
     """Return a min or max; None for the huge numbers with which tools write that there is none."""
-    number = finite(text)
-    return None if number is None or not abs(number) < _NO_LIMIT else number
+    found = finite(attributes, name)
+    return None if found is None or not abs(found) < _NO_LIMIT else found
 
 
 def is_true(text: str | None) -> bool:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 import numpy as np
 
 from falsifier.errors import ModelError
-from falsifier.fmu.description.libraries import windows_path
+from falsifier.fmu.description.libraries import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process.network import Member
 
@@ -113,6 +113,8 @@ def fmu(member: Member, folder: Path, *, logging: bool, through_wine: bool) -> b
     found = libraries.windows if through_wine else libraries.here
     if interface not in found:
         raise ModelError(f"{member.path}: {libraries.lacking[interface]}")
+    if through_wine and find_wine() is None:
+        raise ModelError(f"{member.path}: its library runs through Wine, which is missing: {HOW_TO_INSTALL}")
     library = folder / found[interface]
     resources = folder / "resources"
     if through_wine:

@@ -3,9 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
+from falsifier.core.arguments import one_of, positive, whole
 from falsifier.core.model import Interface
+from falsifier.errors import SpecError
 from falsifier.fmu.description.model_description import Description
 
 T = TypeVar("T")
@@ -31,6 +33,9 @@ class Coupling:
             converged.
         max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
         isolation: ``together``: all components run in one process; ``each``: each in one of its own.
+
+    Raises:
+        SpecError: naming the attribute that is not as above.
     """
 
     method: Method = "gauss-seidel"
@@ -40,6 +45,18 @@ class Coupling:
     max_rounds: int = 100
     isolation: Isolation = "together"
 
+    def __post_init__(self) -> None:
+        words = {"method": Method, "loops": Loops, "extrapolation": Extrapolation, "isolation": Isolation}
+        for name, kind in words.items():
+            one_of(f"coupling.{name}", getattr(self, name), get_args(kind))
+        positive("coupling.tolerance", self.tolerance)
+        whole("coupling.max_rounds", self.max_rounds, least=1)
+        if self.loops == "iterate" and self.method == "jacobi":
+            raise SpecError(
+                'coupling.loops: with the method "jacobi" every connection has a delay, and no step is '
+                'iterated; use method = "gauss-seidel" or loops = "delay"'
+            )
+
 
 # Position of the system itself in a Place: an input of the whole, which feeds inputs of components.
 SYSTEM = -1
@@ -47,23 +64,14 @@ SYSTEM = -1
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One component.
+    """One component."""
 
-    Attributes:
-        name: its name; empty for a single FMU.
-        path: path of its FMU.
-        sha256: hash of the FMU.
-        description: description of the FMU, with the component's name in place of the model's.
-        step: step of its own in s; None for the communication step.
-        interface: interface to simulate with.
-    """
-
-    name: str
-    path: Path
-    sha256: str
-    description: Description
-    step: float | None
-    interface: Interface
+    name: str  # its name; empty for a single FMU
+    path: Path  # path of its FMU
+    sha256: str  # hash of the FMU
+    description: Description  # description of the FMU, with the component's name in place of the model's
+    step: float | None  # step of its own in s; None for the communication step
+    interface: Interface  # interface to simulate with
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,48 +84,30 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A connection between two scalars: ``target = factor * source + offset``.
+    """A connection between two scalars: ``target = factor * source + offset``."""
 
-    Attributes:
-        source: an output, or an input of the system.
-        target: an input.
-        factor: factor of the conversion.
-        offset: offset of the conversion.
-        start: value of the input before the source is known.
-        is_linear: whether the input follows the course of the last two values.
-    """
-
-    source: Place
-    target: Place
-    factor: float
-    offset: float
-    start: float
-    is_linear: bool
+    source: Place  # an output, or an input of the system
+    target: Place  # an input
+    factor: float  # factor of the conversion
+    offset: float  # offset of the conversion
+    start: float  # value of the input before the source is known
+    is_linear: bool  # whether the input follows the course of the last two values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Network:
-    """What is simulated: a checked system, or a single FMU as its only component.
+    """What is simulated: a checked system, or a single FMU as its only component."""
 
-    Attributes:
-        name: what errors of loading call it: the name of a system, the path of a single FMU.
-        members: the components.
-        links: the connections.
-        order: positions of the components in the order in which they step.
-        loops: first position in the order, and the one after the last, of components that iterate together.
-        coupling: how they exchange values.
-        description: variables of all components, as ``component.variable``; of a single FMU, its own.
-        places: where each of these variables is.
-    """
-
-    name: str
-    members: tuple[Member, ...]
-    links: tuple[Link, ...]
-    order: tuple[int, ...]
+    name: str  # what errors of loading call it: the name of a system, the path of a single FMU
+    members: tuple[Member, ...]  # the components
+    links: tuple[Link, ...]  # the connections
+    order: tuple[int, ...]  # positions of the components in the order in which they step
+    # First position in the order, and the one after the last, of components that iterate together.
     loops: tuple[tuple[int, int], ...]
-    coupling: Coupling
+    coupling: Coupling  # how they exchange values
+    # Variables of all components, as ``component.variable``; of a single FMU, its own.
     description: Description
-    places: Mapping[str, Place]
+    places: Mapping[str, Place]  # where each of these variables is
 
     def stepped(self, position: int) -> str:
         """Return the name of the component at a position of the order; empty if there is none."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import GRID_ROUNDING, Experiment
-from falsifier.errors import ModelError, SimulationError, SpecError, did_you_mean
+from falsifier.core.model import Experiment
+from falsifier.errors import ModelError, SimulationError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 
 _DEFAULT_TIME_LIMIT = 60.0
@@ -17,40 +17,25 @@ HEADER = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """What all simulations of a search have in common.
+    """What all simulations of a search have in common."""
 
-    Attributes:
-        model: name of the FMU or system.
-        inputs: names of the inputs that are set, in the order of their rows.
-        parameters: names of the parameters and start values that are set.
-        outputs: names of the recorded variables, in the order of their rows.
-        units: units of the outputs by name.
-        limits: smallest and largest number of the types of inputs and parameters, by name; not of reals.
-        times: the output grid in s.
-        every: communication steps per output interval (co-simulation).
-        pieces: maximum number of pieces of an input, see ``Signal.pieces``.
-        max_step: maximum step of the solver in s (model exchange).
-        tolerance: relative tolerance; None for the model's default.
-        time_limit: maximum wall-clock time of one simulation in s.
-        has_limit: whether that is for the whole simulation; else for each tenth of the simulated time, so
-            that slow models are simulated, and those that hang are ended.
-        strings: names and values of string parameters.
-    """
-
-    model: str
-    inputs: tuple[str, ...]
-    parameters: tuple[str, ...]
-    outputs: tuple[str, ...]
-    units: Mapping[str, str]
+    model: str  # name of the FMU or system
+    inputs: tuple[str, ...]  # names of the inputs that are set, in the order of their rows
+    parameters: tuple[str, ...]  # names of the parameters and start values that are set
+    outputs: tuple[str, ...]  # names of the recorded variables, in the order of their rows
+    units: Mapping[str, str]  # units of the outputs by name
+    # Smallest and largest number of the types of inputs and parameters, by name; not of reals.
     limits: Mapping[str, tuple[float, float]]
-    times: NDArray[np.float64]
-    every: int
-    pieces: int
-    max_step: float
-    tolerance: float | None
-    time_limit: float
+    times: NDArray[np.float64]  # the output grid in s
+    every: int  # communication steps per output interval (co-simulation)
+    pieces: int  # maximum number of pieces of an input, see ``Signal.pieces``
+    max_step: float  # maximum step of the solver in s (model exchange)
+    tolerance: float | None  # relative tolerance; None for the model's default
+    time_limit: float  # maximum wall-clock time of one simulation in s
+    # Whether that is for the whole simulation; else for each tenth of the simulated time, so that slow models
+    # are simulated, and those that hang are ended.
     has_limit: bool
-    strings: tuple[tuple[str, str], ...]
+    strings: tuple[tuple[str, str], ...]  # names and values of string parameters
 
     @property
     def stop_time(self) -> float:
@@ -119,7 +104,7 @@ def make_plan(
         units={name: variables[name].unit for name in experiment.outputs if variables[name].unit},
         limits={n: limits for n in (*inputs, *parameters) if (limits := variables[n].type_limits)},
         times=times,
-        every=_steps_per_output(experiment),
+        every=experiment.steps_per_output,
         pieces=pieces,
         max_step=experiment.step_size or experiment.output_interval,
         tolerance=experiment.tolerance,
@@ -127,20 +112,6 @@ def make_plan(
         strings=experiment.strings,
         has_limit=experiment.time_limit is not None,
     )
-
-
-def _steps_per_output(experiment: Experiment) -> int:
-    interval, step = experiment.output_interval, experiment.step_size
-    if step is None:
-        return 1
-    count = max(round(interval / step), 1)
-    if abs(interval / step - count) > GRID_ROUNDING * count:
-        raise SpecError(
-            f"output_interval = {interval:g} s is not an integer multiple of step_size = {step:g} s; "
-            f"try step_size = {interval / count:g}",
-            key="step_size",
-        )
-    return count
 
 
 def given_values(

@@ -7,7 +7,7 @@ from pathlib import Path
 from shlex import quote
 
 from falsifier.core.literals import printable
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, written
 
 # Letters and bits of worker/platform/sandbox.h.
 _WRITABLE, _READABLE, _HIDDEN, _PROGRAMS, _NETWORK, _WINE, _MEMORY, _COMMAND = b"WRHPNIMC"
@@ -44,7 +44,6 @@ _OF_ROOT = """
 
 # The refusals that an error tells.
 _SHOWN_REFUSALS = 3
-_ADVICE = "allow it with `--allow {}`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +103,10 @@ def resolved(allow: Iterable[str], folder: Path) -> tuple[str, ...]:
     return tuple(found)
 
 
+def _advice(word: str) -> str:
+    return f"allow it with {written(f'`--allow {quote(word)}`', f'allow=[{word!r}]')}"
+
+
 def _kind_and_path(word: str) -> tuple[str, Path | None]:
     """Split what is allowed with a path; None for all else."""
     kind, _, path = word.partition(":")
@@ -154,17 +157,11 @@ def encoded(
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the guard of a worker has told.
+    """What the guard of a worker has told."""
 
-    Attributes:
-        cause: what ended the process, empty if the guard does not know.
-        refusals: what was refused before, and how it can be allowed; empty if nothing.
-        enforced: what is enforced, as bits of ``enum enforced`` in worker/platform/sandbox.h.
-    """
-
-    cause: str = ""
-    refusals: str = ""
-    enforced: int = 0
+    cause: str = ""  # what ended the process, empty if the guard does not know
+    refusals: str = ""  # what was refused before, and how it can be allowed; empty if nothing
+    enforced: int = 0  # what is enforced, as bits of ``enum enforced`` in worker/platform/sandbox.h
 
 
 def read_told(data: bytes) -> Told:
@@ -180,10 +177,10 @@ def read_told(data: bytes) -> Told:
             case b"e":
                 enforced = ord(part[1:2] or b"0") - ord("0")
             case b"w":
-                advice = _ADVICE.format(quote(f"write:{Path(path).parent}"))
+                advice = _advice(f"write:{Path(path).parent}")
                 refused.append(f"tried to change {path}, which was refused; {advice}")
             case b"x":
-                advice = _ADVICE.format(_PROGRAMS_WORD)
+                advice = _advice(_PROGRAMS_WORD)
                 refused.append(f"tried to execute {path}, which was refused; {advice}")
             case b"s":
                 refused.append("tried to signal another process, which was refused")

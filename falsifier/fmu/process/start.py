@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
 from falsifier.errors import ModelError
-from falsifier.fmu.description.libraries import HOW_TO_INSTALL, find_wine, windows_path
+from falsifier.fmu.description.libraries import find_wine, windows_path
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment
 
@@ -51,11 +51,7 @@ class Memory:
         self._count = 0
 
     def fit(self, count: int) -> None:
-        """Make room for at least this many values.
-
-        Raises:
-            OSError: if there is none, or files may not be so large.
-        """
+        """Make room for at least this many values; OSError if there is none, or files may not be so large."""
         if count > self._count:
             posix_files.enlarge(self.file, 8 * count)
             self._count = count
@@ -117,17 +113,14 @@ class Started:
         exception: the exception of Windows that has ended it, if it has told one.
 
     Raises:
-        ModelError: if there is no program for this machine, or Wine is not installed.
+        ModelError: if there is no program for this machine.
     """
 
     def __init__(self, workplace: Workplace, folder: Path, rights: Rights, *, through_wine: bool) -> None:
         path = workplace.program()
         command: tuple[str, ...] = ()
         if through_wine:
-            wine = find_wine()
-            if wine is None:
-                raise ModelError(f"Windows libraries run through Wine, which is missing: {HOW_TO_INSTALL}")
-            command = (str(wine), windows_path(workplace.program(windows=True)))
+            command = (str(find_wine()), windows_path(workplace.program(windows=True)))
         self._scratch = scratch = workplace.scratch()
         self._code: int | None = None
         self.exception: int | None = None

@@ -63,11 +63,7 @@ class Package:
         self.description = path
 
     def file(self, source: str) -> Path:
-        """Return the path of a file.
-
-        Raises:
-            SpecError: if it is missing or outside the package.
-        """
+        """Return the path of a file; SpecError if it is missing or outside the package."""
         try:
             parts = urlsplit(source)
         except ValueError:

@@ -7,7 +7,7 @@ from math import ceil, gcd, lcm
 from pathlib import Path
 from typing import get_args
 
-from falsifier.core.arguments import one_of, positive
+from falsifier.core.arguments import finite, instance, one_of, positive
 from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
@@ -66,6 +66,14 @@ class Connection:
     factor: float | None = None
     offset: float | None = None
     extrapolation: Extrapolation | None = None
+
+    def __post_init__(self) -> None:
+        instance("source", self.source, str, "an output, as component.variable")
+        for name in ("factor", "offset"):
+            if getattr(self, name) is not None:
+                finite(f"{self.source}: {name}", getattr(self, name))
+        if self.extrapolation is not None:
+            one_of(f"{self.source}: extrapolation", self.extrapolation, get_args(Extrapolation))
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,14 +5,13 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
-from typing import get_args
 
-from falsifier.core.arguments import instance, one_of, positive, whole
+from falsifier.core.arguments import instance
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.process.network import Coupling, Extrapolation, Isolation, Loops, Method, Network
+from falsifier.fmu.process.network import Coupling, Network
 from falsifier.fmu.process.order import Order, own_steps
 from falsifier.fmu.process.registry import Isolated, simulate
 from falsifier.fmu.systems.components import Component, Connection, Frame
@@ -78,7 +77,6 @@ class System(Isolated):
         }
         object.__setattr__(self, "components", components)
         object.__setattr__(self, "connections", connections)
-        _check_coupling(self.coupling)
         object.__setattr__(self, "key", _key(self))
         _order(self)
 
@@ -156,17 +154,3 @@ def _order(system: System) -> Order:
         logging=system.logging,
         rights=system.rights,
     )
-
-
-def _check_coupling(coupling: Coupling) -> None:
-    one_of("coupling.method", coupling.method, get_args(Method))
-    one_of("coupling.loops", coupling.loops, get_args(Loops))
-    one_of("coupling.extrapolation", coupling.extrapolation, get_args(Extrapolation))
-    one_of("coupling.isolation", coupling.isolation, get_args(Isolation))
-    positive("coupling.tolerance", coupling.tolerance)
-    whole("coupling.max_rounds", coupling.max_rounds, least=1)
-    if coupling.loops == "iterate" and coupling.method == "jacobi":
-        raise SpecError(
-            'coupling.loops: with the method "jacobi" every connection has a delay, and no step is iterated; '
-            'use method = "gauss-seidel" or loops = "delay"'
-        )

@@ -2,23 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import get_args
 
-from falsifier.core.arguments import finite, one_of
 from falsifier.core.model import Variable
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description.model_description import describe
 from falsifier.fmu.description.structure import Structure, conversion, read_structure
-from falsifier.fmu.process.network import (
-    SYSTEM,
-    Coupling,
-    Extrapolation,
-    Link,
-    Member,
-    Network,
-    Place,
-    full_name,
-)
+from falsifier.fmu.process.network import SYSTEM, Coupling, Link, Member, Network, Place, full_name
 from falsifier.fmu.systems.components import Component, Connection, Frame, merged
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 
@@ -49,8 +38,8 @@ def make_network(
         raise SpecError(
             f"{shown}: these depend directly on each other (an algebraic loop), as their FMUs declare; "
             "export one of the components without the direct dependency, for example with a delay, or accept "
-            'a delay of one communication step: [coupling] loops = "delay"; or repeat their steps until they '
-            'agree: loops = "iterate"',
+            'a delay of one communication step in the coupling: loops = "delay"; or repeat their steps until '
+            'they agree: loops = "iterate"',
             key="connections",
         )
     loops: tuple[tuple[int, int], ...] = ()
@@ -180,7 +169,6 @@ class _Joiner:
         if (factor, offset) != (1.0, 0.0) and b.kind != "real":
             raise SpecError(f"values of type {b.kind} cannot be converted; remove factor and offset")
         extrapolation = connection.extrapolation or self._coupling.extrapolation
-        one_of("extrapolation", extrapolation, get_args(Extrapolation))
         if connection.extrapolation == "linear" and not b.is_continuous:
             raise SpecError('only continuous real inputs follow a line; use extrapolation = "hold"')
         start = float(b.start) if isinstance(b.start, int | float) else 0.0
@@ -190,10 +178,10 @@ class _Joiner:
     def _conversion(self, source: Place, target: Place, connection: Connection) -> tuple[float, float, str]:
         """Return factor and offset, and what is done with units unless the user has stated a conversion."""
         if connection.factor is not None or connection.offset is not None:
-            factor = 1.0 if connection.factor is None else finite("factor", connection.factor)
+            factor = 1.0 if connection.factor is None else connection.factor
             if factor == 0.0:
                 raise SpecError("factor = 0 passes nothing on; state another, or remove it and fix the input")
-            return factor, finite("offset", connection.offset or 0.0), ""
+            return factor, connection.offset or 0.0, ""
         a, b = self._variable(source).unit, self._variable(target).unit
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
@@ -201,8 +189,7 @@ class _Joiner:
         if found is None:
             raise SpecError(
                 f"the output is in {a}, the input in {b}, and neither FMU defines how to convert "
-                f"one to the other; connect like units, or state the conversion: "
-                f'{{ from = "{connection.source}", factor = NUMBER, offset = NUMBER }}'
+                "one to the other; connect like units, or state factor and offset of this connection"
             )
         if found != (1.0, 0.0):
             shown = f" {found[1]:+.6g}" if found[1] else ""

@@ -166,7 +166,7 @@ class Questions:
         if size > MOST_PROMPT_TOKENS:
             raise ChatError(
                 f"the prompt needs {size} tokens without any history, but the limit is {MOST_PROMPT_TOKENS}: "
-                "choose a plainer prompt variant (--variant)"
+                "choose a plainer prompt variant"
             )
         lasting, latest = self._lasting(), self._latest()
         if size + self._count(latest) > self._aim:

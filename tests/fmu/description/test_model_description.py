@@ -60,6 +60,7 @@ def test_enumerations_tell_their_literals(name: str) -> None:
     assert info["in_Enumeration"].kind == "enumeration"
 
 
+DERIVATIVE = '<Derivatives><Unknown index="9"/></Derivatives>'
 ROLES = """
 <fmiModelDescription fmiVersion="2.0" modelName="M" guid="g"><CoSimulation modelIdentifier="M"/>
 <ModelVariables>
@@ -104,7 +105,21 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     ("text", "message"),
     [
         ('<fmiModelDescription fmiVersion="4.0"/>', "fmiVersion is '4.0'; export it as FMI"),
-        ('<fmiModelDescription fmiVersion="2.0"/>', "does not follow FMI 2.0"),
+        ('<fmiModelDescription fmiVersion="2.0"/>', "does not follow FMI 2.0: modelName is missing"),
+        (ROLES.replace(' modelIdentifier="M"', ""), "does not follow FMI 2.0: modelIdentifier is missing"),
+        (ROLES.replace('Identifier="M"', 'Identifier="../../M"'), r"= '\.\./\.\./M': .* without a folder"),
+        (ROLES.replace(' valueReference="5"', ""), "ScalarVariable 'p': valueReference is missing"),
+        (
+            ROLES.replace('"5"', '"six"'),
+            "ScalarVariable 'p': valueReference = 'six': expected a whole number",
+        ),
+        (ROLES.replace('start="1"/></S', 'start="0,0"/></S'), "'c': start = '0,0': expected a number"),
+        (ROLES.replace('"output"', '"outptu"'), "'y': causality = 'outptu': did you mean 'output'"),
+        (ROLES.replace('name="y"', 'name=""'), "a variable has an empty name"),
+        (
+            ROLES.replace("<ModelStructure/>", f"<ModelStructure>{DERIVATIVE}</ModelStructure>"),
+            "ModelStructure: index = 9: there are 6 variables",
+        ),
     ],
 )
 def test_wrong_descriptions_are_named(text: str, message: str) -> None:

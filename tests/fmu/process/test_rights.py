@@ -36,12 +36,16 @@ def test_the_guard_is_told_paths_without_links(tmp_path: Path) -> None:
     assert told[4:].decode().split("\0") == [f"W{real}", f"W{real}/logs", "H/hidden", "P", "M7", ""]
 
 
+def test_at_the_command_line_the_way_out_is_written_as_a_shell_takes_it(at_the_command_line: None) -> None:
+    assert "`--allow 'write:/my logs'`" in read_told(b"w/my logs/x\0").refusals
+
+
 def test_what_was_refused_is_told_with_the_way_out() -> None:
     told = read_told(b"w/etc/x\0w/etc/x\0x/bin/sh\0s\0")
     assert told.cause == "" and told.refusals.count("/etc/x") == 1
-    for said in ("--allow write:/etc`", "/bin/sh", "--allow programs`", "signal"):
+    for said in ("allow=['write:/etc']", "/bin/sh", "allow=['programs']", "signal"):
         assert said in told.refusals
-    assert "`--allow 'write:/my logs'`" in read_told(b"w/my logs/x\0").refusals, "as a shell takes it"
+    assert "allow=['write:/my logs']" in read_told(b"w/my logs/x\0").refusals
     assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
     assert read_told(b"r/bin/true\0").cause.endswith("/bin/true")
     assert read_told(b"") == read_told(b"?unknown\0")

@@ -150,7 +150,10 @@ def test_without_wine_the_message_says_how_to_get_it(monkeypatch: pytest.MonkeyP
     if not libraries.can_run_windows():
         pytest.skip("Windows libraries are not simulated on this machine, with or without Wine")
     model = FmuModel(FOLDER / "Lag_2.fmu")
-    with pytest.raises(ModelError, match=r"run through Wine, which is missing: .*apt-get install wine64"):
+    with pytest.raises(
+        ModelError,
+        match=r"Lag_2\.fmu: its library runs through Wine, which is missing: .*apt-get install wine64",
+    ):
         run(model, ("y",))
 
 
