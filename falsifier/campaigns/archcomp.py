@@ -126,31 +126,22 @@ def _matrix(text: str) -> Matrix:
 
 
 class Row(BaseModel):
-    """One row of a validation file, which describes one run.
-
-    Attributes:
-        number: number of the row, from 1.
-        requirement: our name of the property.
-        instance: ``1`` or ``2``.
-        input: times in s in the first column, then one column per input, shape (n, 1 + inputs).
-        parameters: parameter values in the order of the problem, shape (1, parameters).
-        falsified: whether the tool claims a counterexample.
-        simulations: number of simulations used.
-        robustness: robustness that the tool claims, if stated.
-        stop_time: end of the simulation in s, if stated.
-    """
+    """One row of a validation file, which describes one run."""
 
     model_config = ConfigDict(arbitrary_types_allowed=True, frozen=True)
 
-    number: int
+    number: int  # number of the row, from 1
+    # Our name of the property.
     requirement: Annotated[str, BeforeValidator(_our_name)] = Field(alias="property")
     instance: Literal["1", "2"] = "1"
+    # Times in s in the first column, then one column per input, shape (n, 1 + inputs).
     input: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
+    # Parameter values in the order of the problem, shape (1, parameters).
     parameters: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
-    falsified: bool = False
-    simulations: int = Field(ge=0)
-    robustness: float | None = None
-    stop_time: float | None = Field(None, alias="stop time")
+    falsified: bool = False  # whether the tool claims a counterexample
+    simulations: int = Field(ge=0)  # number of simulations used
+    robustness: float | None = None  # robustness that the tool claims, if stated
+    stop_time: float | None = Field(None, alias="stop time")  # end of the simulation in s, if stated
 
 
 @dataclass(frozen=True, slots=True)

@@ -149,15 +149,11 @@ def run_name(request: RunRequest) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Ceiling:
-    """What is asked of language models if nothing is found early.
+    """What is asked of language models if nothing is found early."""
 
-    Attributes:
-        cost: US dollars for sending all questions with prompts at their longest; None if a price is unknown.
-        text: number of questions and cost in a sentence.
-    """
-
+    # US dollars for sending all questions with prompts at their longest; None if a price is unknown.
     cost: float | None
-    text: str
+    text: str  # number of questions and cost in a sentence
 
 
 def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:

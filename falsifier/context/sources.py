@@ -22,17 +22,12 @@ _MAX_VALUE = 400  # characters of a value
 
 
 class Assigned(NamedTuple):
-    """A value that a file gives to a name: of ``a.b`` or ``a->b`` to its last part.
+    """A value that a file gives to a name: of ``a.b`` or ``a->b`` to its last part."""
 
-    Attributes:
-        name: what is set, equated, declared with a value, modified or defined.
-        value: as written; empty if it is long.
-        is_constant: whether it declares a macro, constant or parameter. What does not, may in Modelica modify
-            one: ``Base(limit = 8)``.
-    """
-
-    name: str
-    value: str
+    name: str  # what is set, equated, declared with a value, modified or defined
+    value: str  # as written; empty if it is long
+    # Whether it declares a macro, constant or parameter. What does not, may in Modelica modify one:
+    # ``Base(limit = 8)``.
     is_constant: bool
 
 

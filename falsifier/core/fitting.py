@@ -13,15 +13,10 @@ from falsifier.errors import CandidateError
 
 @dataclass(frozen=True, slots=True)
 class Fitted:
-    """A candidate of a search space, made from one that may not have fitted.
+    """A candidate of a search space, made from one that may not have fitted."""
 
-    Attributes:
-        candidate: the candidate as it will be simulated.
-        notes: what was changed, in words; empty if nothing was.
-    """
-
-    candidate: Candidate
-    notes: tuple[str, ...]
+    candidate: Candidate  # the candidate as it will be simulated
+    notes: tuple[str, ...]  # what was changed, in words; empty if nothing was
 
 
 def fit(space: SearchSpace, candidate: Candidate) -> Fitted:

@@ -147,21 +147,13 @@ class ParameterRange(Range):
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """One coordinate of the vector form.
+    """One coordinate of the vector form."""
 
-    Attributes:
-        name: name of the input or parameter.
-        time: time of the control point in s; None for a parameter.
-        low: lower bound.
-        high: upper bound.
-        unit: unit of the value.
-    """
-
-    name: str
-    time: float | None
-    low: float
-    high: float
-    unit: str = ""
+    name: str  # name of the input or parameter
+    time: float | None  # time of the control point in s; None for a parameter
+    low: float  # lower bound
+    high: float  # upper bound
+    unit: str = ""  # unit of the value
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -33,13 +33,9 @@ from falsifier.search.result import Result
 
 @dataclass(frozen=True, slots=True)
 class Database:
-    """A folder of counterexample files, one folder per requirement.
+    """A folder of counterexample files, one folder per requirement."""
 
-    Attributes:
-        folder: the folder; it need not exist yet.
-    """
-
-    folder: Path
+    folder: Path  # the folder; it need not exist yet
 
     def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
         """Write a counterexample; one with the same candidate is overwritten."""
@@ -58,21 +54,14 @@ class Database:
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """Result of a check.
+    """Result of a check."""
 
-    Attributes:
-        problem: what was checked.
-        counterexample: a confirmed violation, or None.
-        file: where it is stored, or None.
-        replayed: results of the stored counterexamples, up to the first that still violates.
-        result: result of the search; None if a stored counterexample still violates.
-    """
-
-    problem: Problem
-    counterexample: Confirmation | None
-    file: Path | None
+    problem: Problem  # what was checked
+    counterexample: Confirmation | None  # a confirmed violation, or None
+    file: Path | None  # where it is stored, or None
+    # Results of the stored counterexamples, up to the first that still violates.
     replayed: tuple[Replayed, ...]
-    result: Result | None
+    result: Result | None  # result of the search; None if a stored counterexample still violates
 
 
 def check(

@@ -16,23 +16,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Registered:
-    """One registered engine.
+    """One registered engine."""
 
-    Attributes:
-        target: ``module:class``; the class is called as ``class(problem, seed=seed, **options)``.
-        summary: one line for ``--help``.
-        extra: extra of this project that installs the package which the engine needs; it has the engine's
-            name.
-        is_free: whether it chooses control points itself if the space allows it; the others search the fixed
-            parameterization.
-        uses_context: whether it tries the levels that context files give.
-    """
-
-    target: str
-    summary: str
+    target: str  # ``module:class``; the class is called as ``class(problem, seed=seed, **options)``
+    summary: str  # one line for ``--help``
+    # Extra of this project that installs the package which the engine needs; it has the engine's name.
     extra: str = ""
+    # Whether it chooses control points itself if the space allows it; the others search the fixed
+    # parameterization.
     is_free: bool = False
-    uses_context: bool = False
+    uses_context: bool = False  # whether it tries the levels that context files give
 
     def load(self) -> Any:
         """Import the engine's class.

@@ -19,17 +19,11 @@ _STEP_RAMP = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class InputFile:
-    """The inputs in a file.
+    """The inputs in a file."""
 
-    Attributes:
-        signals: input signals by name.
-        unused: columns that are variables of the model, but not inputs.
-        end: time of the last row in s; after it, inputs keep their last values.
-    """
-
-    signals: Mapping[str, Signal]
-    unused: tuple[str, ...]
-    end: float
+    signals: Mapping[str, Signal]  # input signals by name
+    unused: tuple[str, ...]  # columns that are variables of the model, but not inputs
+    end: float  # time of the last row in s; after it, inputs keep their last values
 
 
 def read_inputs(path: Path, info: ModelInfo) -> InputFile:

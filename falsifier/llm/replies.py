@@ -34,21 +34,14 @@ _NUMBERS = schema_of_list({"type": "number"})
 
 @dataclass(frozen=True, slots=True)
 class ReplyForm:
-    """What a reply must contain.
+    """What a reply must contain."""
 
-    Attributes:
-        space: search space that candidates must fit.
-        named: signals and parameters by name; else one list of numbers in the order of the dimensions.
-        free: whether a free parameterization may be used if the space allows it.
-        count: number of candidates.
-        lessons: whether the LLM may write down what it is to be told again.
-    """
-
-    space: SearchSpace
+    space: SearchSpace  # search space that candidates must fit
+    # Signals and parameters by name; else one list of numbers in the order of the dimensions.
     named: bool = True
-    free: bool = False
-    count: int = 1
-    lessons: bool = False
+    free: bool = False  # whether a free parameterization may be used if the space allows it
+    count: int = 1  # number of candidates
+    lessons: bool = False  # whether the LLM may write down what it is to be told again
 
     def schema(self) -> dict[str, Any]:
         """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps.

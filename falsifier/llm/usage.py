@@ -33,16 +33,12 @@ _GROUPS_DIGITS = ("gpt-", "gpt_", "/o1", "/o3", "/o4", "llama-3", "llama3", "lla
 class Price:
     """What an LLM costs.
 
-    Attributes:
-        prompt: US dollars per million tokens sent.
-        completion: US dollars per million tokens received.
-
     Raises:
         SpecError: if a price is negative, infinite or not a number: a limit on the cost would not hold.
     """
 
-    prompt: float
-    completion: float
+    prompt: float  # US dollars per million tokens sent
+    completion: float  # US dollars per million tokens received
 
     def __post_init__(self) -> None:
         for price in (self.prompt, self.completion):

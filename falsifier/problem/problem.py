@@ -22,19 +22,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """An input or a parameter of the model that is not searched.
-
-    Attributes:
-        name: its name.
-        causality: whether it is an input or a parameter.
-        value: the number or text at which it is held; None: the model's own, which it does not state.
-        reason: why it is not searched, in words.
-    """
+    """An input or a parameter of the model that is not searched."""
 
     name: str
-    causality: Literal["input", "parameter"]
+    causality: Literal["input", "parameter"]  # whether it is an input or a parameter
+    # The number or text at which it is held; None: the model's own, which it does not state.
     value: float | str | None
-    reason: str
+    reason: str  # why it is not searched, in words
 
 
 @dataclass(frozen=True, slots=True, repr=False)

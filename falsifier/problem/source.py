@@ -21,17 +21,12 @@ Parameterization = Literal["free", "fixed"]
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What a target means; requirement names may contain anything, colons and file endings too.
+    """What a target means; requirement names may contain anything, colons and file endings too."""
 
-    Attributes:
-        kind: ``spec`` file, ``fmu`` or SSP package, ``python`` for a problem made in Python, or ``bundled``.
-        file: path of the spec file or the FMU; empty for the other kinds.
-        requirement: name of the requirement, or of the problem made in Python; empty if there is none.
-    """
-
+    # ``spec`` file, ``fmu`` or SSP package, ``python`` for a problem made in Python, or ``bundled``.
     kind: Literal["spec", "fmu", "python", "bundled"]
-    file: str = ""
-    requirement: str = ""
+    file: str = ""  # path of the spec file or the FMU; empty for the other kinds
+    requirement: str = ""  # name of the requirement, or of the problem made in Python; empty if there is none
 
     @classmethod
     def parse(cls, text: str) -> "Target":

@@ -16,17 +16,11 @@ from falsifier.stl.margins import signed
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What came of one candidate.
+    """What came of one candidate."""
 
-    Attributes:
-        index: index of its evaluation.
-        candidate: what was proposed.
-        text: robustness, or why there is none, and whether a violation was confirmed; empty if it was not
-            simulated.
-    """
-
-    index: int
-    candidate: Candidate
+    index: int  # index of its evaluation
+    candidate: Candidate  # what was proposed
+    # Robustness, or why there is none, and whether a violation was confirmed; empty if it was not simulated.
     text: str
 
 

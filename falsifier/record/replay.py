@@ -32,16 +32,11 @@ from falsifier.search.steps import Steps, proposals
 
 @dataclass(kw_only=True)
 class ReplayedSteps(Steps):
-    """The steps that a journal contains, then live ones.
+    """The steps that a journal contains, then live ones."""
 
-    Attributes:
-        asked: what engines suggested, by the index of the first candidate's evaluation.
-        evaluations: recorded evaluations by index.
-        confirmed: recorded confirmations by evaluation index and requirement.
-    """
-
-    asked: dict[int, AskedRecord]
-    evaluations: dict[int, Evaluation]
+    asked: dict[int, AskedRecord]  # what engines suggested, by the index of the first candidate's evaluation
+    evaluations: dict[int, Evaluation]  # recorded evaluations by index
+    # Recorded confirmations by evaluation index and requirement.
     confirmed: dict[tuple[int, str], ConfirmedRecord]
     _next: int = 0
 

@@ -140,18 +140,12 @@ _CLOCK_TOLERANCE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class RunChat:
-    """Answers with recorded replies in their order; then asks, and checks the budget before every request.
+    """Answers with recorded replies in their order; then asks, and checks the budget before every request."""
 
-    Attributes:
-        inner: chat to ask.
-        budget: limits of the run.
-        spent: returns what the run has spent so far.
-        recorded: what was recorded and not played yet; chats that share it play each reply once.
-    """
-
-    inner: Chat
-    budget: Budget
-    spent: Callable[[], Spent]
+    inner: Chat  # chat to ask
+    budget: Budget  # limits of the run
+    spent: Callable[[], Spent]  # returns what the run has spent so far
+    # What was recorded and not played yet; chats that share it play each reply once.
     recorded: Iterator[Exchange]
 
     @property

@@ -17,29 +17,17 @@ from falsifier.search.vacuity import Vacuity
 
 @dataclass(slots=True)
 class RequirementState:
-    """One requirement in a running search.
+    """One requirement in a running search."""
 
-    Attributes:
-        problem: what is to be falsified.
-        engine: searches for a violation.
-        evaluations: all so far, without trajectories.
-        doubtful: violations that were not confirmed.
-        best: evaluation with the smallest robustness, with its trajectory.
-        smallest: its robustness.
-        counterexample: the confirmed violation.
-        spent: what the run had spent by then.
-        untold: evaluations that the engine has not been told.
-    """
-
-    problem: Problem
-    engine: Engine
-    evaluations: list[Evaluation] = field(default_factory=list)
-    doubtful: list[Confirmation] = field(default_factory=list)
-    best: Evaluation | None = None
-    smallest: float = inf
-    counterexample: Confirmation | None = None
-    spent: Spent | None = None
-    untold: list[Evaluation] = field(default_factory=list)
+    problem: Problem  # what is to be falsified
+    engine: Engine  # searches for a violation
+    evaluations: list[Evaluation] = field(default_factory=list)  # all so far, without trajectories
+    doubtful: list[Confirmation] = field(default_factory=list)  # violations that were not confirmed
+    best: Evaluation | None = None  # evaluation with the smallest robustness, with its trajectory
+    smallest: float = inf  # its robustness
+    counterexample: Confirmation | None = None  # the confirmed violation
+    spent: Spent | None = None  # what the run had spent by then
+    untold: list[Evaluation] = field(default_factory=list)  # evaluations that the engine has not been told
     vacuity: Vacuity = field(init=False)
 
     def __post_init__(self) -> None:

@@ -19,20 +19,14 @@ from falsifier.search.budget import Spent
 
 @dataclass
 class Steps:
-    """Carries out every step; a resumed run has others, which take what they can from its record.
+    """Carries out every step; a resumed run has others, which take what they can from its record."""
 
-    Attributes:
-        executor: runs the simulations; None: this process.
-        replayed: number of evaluations taken from a record.
-        seconds: wall-clock seconds of the recorded part of the run.
-        exchanges: recorded exchanges with a language model, which are played back first.
-        unrepeated: what the recorded part spent on questions to a language model that are not played back.
-    """
-
-    executor: Executor | None = None
-    replayed: int = 0
-    seconds: float = 0.0
+    executor: Executor | None = None  # runs the simulations; None: this process
+    replayed: int = 0  # number of evaluations taken from a record
+    seconds: float = 0.0  # wall-clock seconds of the recorded part of the run
+    # Recorded exchanges with a language model, which are played back first.
     exchanges: Iterator[Exchange] = field(default_factory=lambda: iter(()))
+    # What the recorded part spent on questions to a language model that are not played back.
     unrepeated: Spent = field(default_factory=Spent)
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:

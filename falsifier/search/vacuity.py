@@ -40,19 +40,12 @@ class _Extreme:
 
 @dataclass(slots=True)
 class _Seen:
-    """What a search has seen of one part, wherever it stands in the same formula.
+    """What a search has seen of one part, wherever it stands in the same formula."""
 
-    Attributes:
-        formula: the implication or disjunction to which the part belongs; for a predicate itself.
-        part: the condition of an implication, an operand of a disjunction, or a predicate.
-        lowest: its smallest margin.
-        highest: its largest margin.
-    """
-
-    formula: Formula
-    part: Formula
-    lowest: _Extreme = _Extreme(inf)
-    highest: _Extreme = _Extreme(-inf)
+    formula: Formula  # the implication or disjunction to which the part belongs; for a predicate itself
+    part: Formula  # the condition of an implication, an operand of a disjunction, or a predicate
+    lowest: _Extreme = _Extreme(inf)  # its smallest margin
+    highest: _Extreme = _Extreme(-inf)  # its largest margin
 
     @property
     def distance(self) -> float:

@@ -45,32 +45,20 @@ _MOST_SIGNALS = 4
 
 @dataclass(frozen=True, slots=True)
 class Shortfall:
-    """A comparison that had to hold and did not.
+    """A comparison that had to hold and did not."""
 
-    Attributes:
-        part: the comparison, as it had to hold.
-        quantity: what it compares, the side that is not a plain number.
-        value: its value at ``time``.
-        limit: value of the other side at ``time``.
-        start: start of the violating interval in s, the one with ``time`` if there are several; of what was
-            never reached, of its window.
-        end: end of that interval in s.
-        time: when it was farthest from holding, in s; of what was never reached, when it was nearest.
-        never: whether it had to hold at some time of the interval only, and never did.
-        what: the comparison, the interval and the value in words.
-        context: what made it necessary, such as conditions that held, in words.
-    """
-
-    part: str
-    quantity: str
-    value: float
-    limit: float
+    part: str  # the comparison, as it had to hold
+    quantity: str  # what it compares, the side that is not a plain number
+    value: float  # its value at ``time``
+    limit: float  # value of the other side at ``time``
+    # Start of the violating interval in s, the one with ``time`` if there are several; of what was never
+    # reached, of its window.
     start: float
-    end: float
-    time: float
-    never: bool
-    what: str
-    context: tuple[str, ...] = ()
+    end: float  # end of that interval in s
+    time: float  # when it was farthest from holding, in s; of what was never reached, when it was nearest
+    never: bool  # whether it had to hold at some time of the interval only, and never did
+    what: str  # the comparison, the interval and the value in words
+    context: tuple[str, ...] = ()  # what made it necessary, such as conditions that held, in words
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,23 +163,14 @@ class _Demand(NamedTuple):
 
 
 class _Spot(NamedTuple):
-    """Where a demand was not met.
+    """Where a demand was not met."""
 
-    Attributes:
-        sample: the sample.
-        scope: window in which it had to be met throughout; None if at this sample only.
-        guards: demands from the operator of that window down to here.
-        held: conditions at this sample that were met, which made it necessary.
-        notes: what else made it necessary, in words.
-        sought: what held at no time of a window, in words; here it came nearest.
-    """
-
-    sample: int
-    scope: Span | None = None
-    guards: tuple[_Demand, ...] = ()
-    held: tuple[_Demand, ...] = ()
-    notes: tuple[str, ...] = ()
-    sought: str = ""
+    sample: int  # the sample
+    scope: Span | None = None  # window in which it had to be met throughout; None if at this sample only
+    guards: tuple[_Demand, ...] = ()  # demands from the operator of that window down to here
+    held: tuple[_Demand, ...] = ()  # conditions at this sample that were met, which made it necessary
+    notes: tuple[str, ...] = ()  # what else made it necessary, in words
+    sought: str = ""  # what held at no time of a window, in words; here it came nearest
 
     def under(self, *conditions: _Demand) -> "_Spot":
         return self._replace(held=(*self.held, *conditions))

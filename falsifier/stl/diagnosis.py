@@ -39,19 +39,12 @@ _OF_TRUTH = 0.5
 
 
 class Waypoint(NamedTuple):
-    """One sub-formula on the path.
+    """One sub-formula on the path."""
 
-    Attributes:
-        part: the compiled sub-formula.
-        sample: sample at which it was evaluated.
-        value: its robustness at that sample.
-        window: first and last sample of its operator's window; None if it has no window.
-    """
-
-    part: CompiledPart
-    sample: int
-    value: float
-    window: tuple[int, int] | None
+    part: CompiledPart  # the compiled sub-formula
+    sample: int  # sample at which it was evaluated
+    value: float  # its robustness at that sample
+    window: tuple[int, int] | None  # first and last sample of its operator's window; None if it has no window
 
 
 def path_to_decider(part: CompiledPart, buffer: Floats, sample: int = 0) -> list[Waypoint]:
@@ -97,21 +90,14 @@ def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One formula on the path to the deciding predicate.
+    """One formula on the path to the deciding predicate."""
 
-    Attributes:
-        formula: the formula.
-        time: time in s at which it was evaluated.
-        value: its robustness at that time.
-        window: start and end in s of its operator's window; None if it has no window.
-        text: what happened here, in words; empty within a chain of ``and`` or ``or``.
-    """
-
-    formula: Formula
-    time: float
-    value: float
+    formula: Formula  # the formula
+    time: float  # time in s at which it was evaluated
+    value: float  # its robustness at that time
+    # Start and end in s of its operator's window; None if it has no window.
     window: tuple[float, float] | None
-    text: str
+    text: str  # what happened here, in words; empty within a chain of ``and`` or ``or``
 
 
 @dataclass(frozen=True, slots=True)

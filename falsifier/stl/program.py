@@ -114,17 +114,11 @@ def until(a: Floats, b: Floats, out: Floats) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """Location of one part's values in the buffer.
+    """Location of one part's values in the buffer."""
 
-    Attributes:
-        base: the value at sample k has the offset ``base + k``.
-        first: first computed sample.
-        last: last computed sample.
-    """
-
-    base: int
-    first: int
-    last: int
+    base: int  # the value at sample k has the offset ``base + k``
+    first: int  # first computed sample
+    last: int  # last computed sample
 
     def at(self, sample: int) -> int:
         """Return the offset in the buffer of the value at this sample."""

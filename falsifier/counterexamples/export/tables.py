@@ -21,15 +21,10 @@ _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 
 @dataclass(frozen=True, slots=True)
 class InputTable:
-    """Input signals over time, linear between two rows.
+    """Input signals over time, linear between two rows."""
 
-    Attributes:
-        times: in s, shape (n,), from 0 to the stop time; a repeated time is a step.
-        columns: one array of shape (n,) per input, by name.
-    """
-
-    times: NDArray[np.float64]
-    columns: Mapping[str, NDArray[np.float64]]
+    times: NDArray[np.float64]  # in s, shape (n,), from 0 to the stop time; a repeated time is a step
+    columns: Mapping[str, NDArray[np.float64]]  # one array of shape (n,) per input, by name
 
 
 def input_table(problem: Problem, candidate: Candidate) -> InputTable:

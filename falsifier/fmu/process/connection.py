@@ -65,27 +65,16 @@ class Where(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Outcome of one request.
+    """Outcome of one request."""
 
-    Attributes:
-        where: where it stopped; ``Where``, or any other number.
-        status: FMI's status.
-        text: what the outcome needs to be told.
-        time: simulated time in s; -1 if unknown.
-        printed: position in its output at which the reply was sent.
-        more: whether another reply follows without a request.
-        leaving: whether the process ends after this reply.
-        component: position of the component of a system that has failed; -1 if unknown.
-    """
-
-    where: int
-    status: int = 0
-    text: str = ""
-    time: float = -1.0
-    printed: int = 0
-    more: bool = False
-    leaving: bool = False
-    component: int = -1
+    where: int  # where it stopped; ``Where``, or any other number
+    status: int = 0  # FMI's status
+    text: str = ""  # what the outcome needs to be told
+    time: float = -1.0  # simulated time in s; -1 if unknown
+    printed: int = 0  # position in its output at which the reply was sent
+    more: bool = False  # whether another reply follows without a request
+    leaving: bool = False  # whether the process ends after this reply
+    component: int = -1  # position of the component of a system that has failed; -1 if unknown
 
     @property
     def is_done(self) -> bool:

@@ -22,21 +22,13 @@ _DEFAULT_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Order:
-    """What a new worker needs to know.
+    """What a new worker needs to know."""
 
-    Attributes:
-        network: what it simulates.
-        key: what tells models apart that cannot share a process.
-        logging: whether to ask the FMUs for messages.
-        rights: what the FMUs may do.
-        through_wine: whether to simulate the library for Windows.
-    """
-
-    network: Network
-    key: Hashable
-    logging: bool
-    rights: Rights
-    through_wine: bool = False
+    network: Network  # what it simulates
+    key: Hashable  # what tells models apart that cannot share a process
+    logging: bool  # whether to ask the FMUs for messages
+    rights: Rights  # what the FMUs may do
+    through_wine: bool = False  # whether to simulate the library for Windows
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
         """Return the request to load what was unpacked to a folder.

@@ -156,18 +156,13 @@ def load(order: Order) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Isolated:
-    """What models have in common whose FMUs run in processes of their own.
-
-    Attributes:
-        logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
-        allow: what they may do; see Rights.
-        deny: what they may not do.
-    """
+    """What models have in common whose FMUs run in processes of their own."""
 
     has_own_processes: ClassVar[bool] = True
+    # Whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
     logging: bool = False
-    allow: tuple[str, ...] = ()
-    deny: tuple[str, ...] = ()
+    allow: tuple[str, ...] = ()  # what they may do; see Rights
+    deny: tuple[str, ...] = ()  # what they may not do
 
     @property
     def order(self) -> Order:

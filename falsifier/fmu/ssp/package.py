@@ -189,21 +189,13 @@ def transformation(element: Element) -> Transformation:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """A value that a package gives, before the variable that it is for is known.
+    """A value that a package gives, before the variable that it is for is known."""
 
-    Attributes:
-        name: its name in the parameter set.
-        value: a number, or the text of a string or of an enumeration's item.
-        is_item: whether it is the latter.
-        unit: its unit.
-        transformation: transformation by a mapping.
-    """
-
-    name: str
-    value: float | str
-    is_item: bool
-    unit: str
-    transformation: Transformation = Transformation()
+    name: str  # its name in the parameter set
+    value: float | str  # a number, or the text of a string or of an enumeration's item
+    is_item: bool  # whether it is the latter
+    unit: str  # its unit
+    transformation: Transformation = Transformation()  # transformation by a mapping
 
 
 def bound_values(element: Element, package: Package) -> dict[str, Given]:

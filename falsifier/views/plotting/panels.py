@@ -30,52 +30,35 @@ _LARGEST_DRAWN = 1e300
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bound:
-    """The bound that a predicate sets on a quantity, and the time window in which the formula evaluates it.
+    """The bound that a predicate sets on a quantity, and the time window in which it is evaluated."""
 
-    Attributes:
-        predicate: text of the predicate.
-        start: earliest time in s at which it is evaluated.
-        end: latest time in s at which it is evaluated.
-        values: the bound at the panel's times, shape (n,).
-    """
-
-    predicate: str
-    start: float
-    end: float
-    values: Array
+    predicate: str  # text of the predicate
+    start: float  # earliest time in s at which it is evaluated
+    end: float  # latest time in s at which it is evaluated
+    values: Array  # the bound at the panel's times, shape (n,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """One quantity over time.
+    """One quantity over time."""
 
-    Attributes:
-        title: name of the quantity, with its unit if known.
-        times: in s, shape (n,).
-        values: values at these times, shape (n,).
-        bounds: what it is compared with; empty for inputs.
-        critical: time in s to mark if this quantity broke, or if nothing broke and it decided the verdict.
-        decided: critical time in s if this quantity decided the verdict, but another one broke.
-        broken: intervals in s over which a comparison of it did not hold; of several, the worst one.
-        points: control points (time, value) of an input.
-        limits: range of an input.
-        steps: whether values are held until the next sample.
-        labels: names of its numbers if these are whole, empty if they have none; None for real values.
-        component: component of a system that it belongs to; empty for other models, and for a quantity of
-            several components.
-    """
-
-    title: str
-    times: Array
-    values: Array
-    bounds: tuple[Bound, ...] = ()
+    title: str  # name of the quantity, with its unit if known
+    times: Array  # in s, shape (n,)
+    values: Array  # values at these times, shape (n,)
+    bounds: tuple[Bound, ...] = ()  # what it is compared with; empty for inputs
+    # Time in s to mark if this quantity broke, or if nothing broke and it decided the verdict.
     critical: float | None = None
+    # Critical time in s if this quantity decided the verdict, but another one broke.
     decided: float | None = None
+    # Intervals in s over which a comparison of it did not hold; of several, the worst one.
     broken: tuple[tuple[float, float], ...] = ()
-    points: tuple[tuple[float, float], ...] = ()
-    limits: tuple[float, float] | None = None
-    steps: bool = False
+    points: tuple[tuple[float, float], ...] = ()  # control points (time, value) of an input
+    limits: tuple[float, float] | None = None  # range of an input
+    steps: bool = False  # whether values are held until the next sample
+    # Names of its numbers if these are whole, empty if they have none; None for real values.
     labels: Mapping[int, str] | None = None
+    # Component of a system that it belongs to; empty for other models, and for a quantity of several
+    # components.
     component: str = ""
 
 

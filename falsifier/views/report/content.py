@@ -26,23 +26,16 @@ Status = Literal["violated", "no violation found", "not finished", "failed"]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Shown:
-    """A run's counterexample, shrunk if it was, or its best simulation.
-
-    Attributes:
-        verdict: robustness, and what decided it; None if it could not be judged.
-        panels: what to draw; empty if the trajectory was not kept.
-        confirmed: why a counterexample counts.
-        is_lost: whether a trajectory was kept, but its file is damaged or missing.
-    """
+    """A run's counterexample, shrunk if it was, or its best simulation."""
 
     run: Run
     candidate: Candidate
-    verdict: Verdict | None
+    verdict: Verdict | None  # robustness, and what decided it; None if it could not be judged
     units: Mapping[str, str]
-    panels: list[Panel]
-    confirmed: str
+    panels: list[Panel]  # what to draw; empty if the trajectory was not kept
+    confirmed: str  # why a counterexample counts
     is_shrunk: bool = False
-    is_lost: bool = False
+    is_lost: bool = False  # whether a trajectory was kept, but its file is damaged or missing
 
     @property
     def what(self) -> str:
@@ -65,21 +58,14 @@ class Shown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
-    """The part of a report about one requirement.
-
-    Attributes:
-        heading: the name; of a formula without a name, the formula.
-        sentence: what it means.
-        by_method: its runs by method.
-        shown: counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of
-            all runs.
-    """
+    """The part of a report about one requirement."""
 
     name: str
-    heading: str
+    heading: str  # the name; of a formula without a name, the formula
     formula: str
-    sentence: str
-    by_method: dict[str, list[Run]]
+    sentence: str  # what it means
+    by_method: dict[str, list[Run]]  # its runs by method
+    # Counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of all runs.
     shown: list[Shown]
 
     @property
@@ -100,16 +86,11 @@ class Section:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Side:
-    """What a report says of one directory; a comparison has several.
+    """What a report says of one directory; a comparison has several."""
 
-    Attributes:
-        title: name of the directory.
-        table: statistics of the protocol; None if no method has several runs.
-    """
-
-    title: str
+    title: str  # name of the directory
     runs: list[Run]
-    table: Table | None
+    table: Table | None  # statistics of the protocol; None if no method has several runs
     sections: list[Section]
 
 
