@@ -1,7 +1,7 @@
 """Which engine finds the violations of two systems that are tuned by numbers?
 
-``python -m bench.function_tunings`` prints the table of ``bench/example_systems.py`` for four requirements that
-join conditions. They were written after the engine, which was not changed after the first look at them.
+``python -m bench.function_tunings`` prints the table of ``bench/example_systems.py`` for four requirements
+that join conditions. They were written after the engine, which was not changed after the first look at them.
 """
 
 from collections.abc import Mapping

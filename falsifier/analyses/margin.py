@@ -141,8 +141,11 @@ def margin(
 
 def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
     """Return the formula in which the threshold has this value; SpecError if it does not fit the problem."""
-    stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"), _stated())
-    return formula_of(stated, problem.info, problem.experiment, key="")
+    try:
+        stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"))
+        return formula_of(stated, problem.info, problem.experiment, key="")
+    except SpecError as error:
+        raise SpecError(error.message, file=_stated(), key=error.key) from None
 
 
 def _stated() -> str:

@@ -24,6 +24,8 @@ from weakref import WeakSet
 
 import httpx
 
+from falsifier.errors import setting
+
 T = TypeVar("T")
 
 # A reply of a million characters (messages.LONGEST_REPLY), each escaped, twice over.
@@ -257,9 +259,9 @@ def _redirection(asked: httpx.URL, location: str | None) -> str:
     if target == asked:
         return "the server redirects to the same address, or names none; check its address and its log"
     base = str(target).removesuffix("/chat/completions").removesuffix("/api/chat")[:200]
+    stated = setting("api_base", base)
     return (
-        f"the server redirects to {base}, and prompts do not follow; if that is the right address, state "
-        "it as the server's address"
+        f"the server redirects to {base}, and prompts do not follow; if that is the right address: {stated}"
     )
 
 

@@ -221,11 +221,11 @@ def _range(option: str) -> tuple[str, InputChoice]:
     )
 
 
-def requirement_of(text: str, place: str | None = None) -> AnyRequirement:
+def requirement_of(text: str) -> AnyRequirement:
     """Return the requirement that a text states: a formula, or the name of a template and its arguments.
 
     Arguments are ``key=value`` in any order. Values are written as in TOML; text needs no quotes of its own
-    unless it contains spaces. Errors name the place where it was stated, by default the setting stl.
+    unless it contains spaces.
 
     >>> requirement_of("settles signal=speed reference=80 within=2% time=3").expanded(50.0)
     'G[3,50] (abs(speed - 80) <= 1.6)'
@@ -233,7 +233,7 @@ def requirement_of(text: str, place: str | None = None) -> AnyRequirement:
     Raises:
         SpecError: naming the argument that is wrong, or what is not ``key=value``.
     """
-    place = place or setting("stl")
+    place = setting("stl")
     instance(place, text, str, "text")
     named = _TEMPLATE.match(text)
     if named is None or named[1] in RESERVED:

@@ -48,7 +48,7 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     )
     assert stated.source is not None
     asked = stated.source.model_copy(update={"parameterization": "fixed"})
-    assert told(replace(stated, source=asked)).endswith("To try them: --parameterization free:0.05.")
+    assert told(replace(stated, source=asked)).endswith("To try them: shortest_piece=0.05.")
     assert told(replace(stated, source=None)).endswith(" InputRange(..., free=Freedom(200, 0.05)).")
 
 
