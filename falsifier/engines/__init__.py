@@ -99,8 +99,8 @@ def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> 
         options: further arguments of the engine; ``hybrid`` requires ``adviser``.
 
     Raises:
-        SpecError: if the name is unknown, the engine's package is not installed, or the problem has nothing
-            to search.
+        SpecError: if the name is unknown, the engine's package is not installed, the hybrid has no adviser,
+            or the problem has nothing to search.
     """
     from falsifier.problem.problem import check_problem
 
@@ -109,5 +109,7 @@ def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> 
     whole("seed", seed, least=0)
     if not problem.space.names:
         raise SpecError("nothing to search; give at least one input or parameter a range")
+    if name == "hybrid" and "adviser" not in options:
+        raise SpecError("the hybrid takes an LLMEngine as adviser; falsify(..., llm=NAME) makes both")
     engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)
     return engine

@@ -60,11 +60,13 @@ def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
         make_engine("optuna", lag_problem(), seed=0)
 
 
-def test_a_wrong_name_and_nothing_to_vary_are_errors() -> None:
+def test_a_wrong_name_nothing_to_vary_and_no_adviser_are_errors() -> None:
     with pytest.raises(SpecError, match="did you mean 'sobol'"):
         make_engine("sobl", lag_problem(), seed=0)
     with pytest.raises(SpecError, match="nothing to search"):
         make_engine("uniform", lag_problem(inputs=0), seed=0)
+    with pytest.raises(SpecError, match="llm=NAME"):
+        make_engine("hybrid", lag_problem(), seed=0)
 
 
 def partly_searched(formula: str) -> Problem:
