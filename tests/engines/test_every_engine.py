@@ -128,6 +128,7 @@ def often_failing(
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("response", [constant, at_the_end_of_the_range, with_spikes, often_failing])
 @pytest.mark.parametrize("name", NAMES)
-def test_no_number_ends_a_search_or_warns(name: str, response: Response) -> None:
-    problem = lag_problem("G[0,10] (x <= 3)", free=FREE, points=2, parameters=[START], response=response)
+@pytest.mark.parametrize("formula", ["G[0,10] (x <= 3)", "G[0,10] (x <= 3) or F[0,10] (x >= 9)"])
+def test_no_number_ends_a_search_or_warns(formula: str, name: str, response: Response) -> None:
+    problem = lag_problem(formula, free=FREE, points=2, parameters=[START], response=response)
     assert len(drive(make(name, problem), partial(evaluate, problem), rounds=12)) == 12
