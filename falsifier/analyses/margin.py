@@ -3,11 +3,11 @@
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from math import ceil, floor, inf, log2, log10
+from math import ceil, floor, inf, isfinite, log2, log10
 from numbers import Real
 
 from falsifier.analyses.lint import ranges_of
-from falsifier.core.arguments import instance, list_of, whole
+from falsifier.core.arguments import finite, instance, list_of, whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE, make_engine
 from falsifier.errors import SimulationError, SpecError, setting, written
@@ -112,7 +112,9 @@ def margin(
         raise SpecError(
             f"{setting('between')}: expected two numbers (LOW, HIGH) with LOW < HIGH, got {between!r}"
         )
-    low, high = given
+    low, high = (finite("between", number) for number in given)
+    if not isfinite(high - low):
+        raise SpecError(f"{setting('between')}: {low:g} and {high:g} are too far apart")
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
     check_names(RunRequest(problems=(), engine=engine))
     lowest, highest = (formula_at(problem, vary, threshold) for threshold in (low, high))

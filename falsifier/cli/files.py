@@ -15,8 +15,8 @@ from falsifier.views.terminal import warn
 
 # File name extensions of pictures that users name.
 PICTURES = (".svg", ".png", ".pdf")
-# Which every picture names, as what has drawn it.
-DRAWN = b"Matplotlib"
+# Which every picture of ours names, as what has drawn it.
+DRAWN = b"falsifier"
 
 
 def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:

@@ -2,6 +2,7 @@
 
 import reprlib
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from math import isfinite
 from numbers import Real
 from operator import index
@@ -26,9 +27,10 @@ def whole(name: str, given: object, *, least: int) -> int:
 
 def finite(name: str, given: object) -> float:
     """Return a number that a user gave, numpy's too, as a float."""
-    if isinstance(given, Real) and not isinstance(given, bool) and isfinite(given):
-        return float(given)
-    raise SpecError(f"{name}: expected a finite number, got {given!r}")
+    with suppress(OverflowError):  # of an int that no float can be
+        if isinstance(given, Real) and not isinstance(given, bool) and isfinite(given):
+            return float(given)
+    raise SpecError(f"{name}: expected a finite number, got {reprlib.repr(given)}")
 
 
 def positive(name: str, given: object) -> float:
@@ -47,6 +49,8 @@ def instance(name: str, given: object, kind: type | tuple[type, ...], expected: 
 def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> Path:
     """Return the path that a user gave."""
     instance(name, given, (str, PathLike), expected)
+    if not given:
+        raise SpecError(f"{name}: expected {expected}, got an empty text")
     return Path(given)
 
 

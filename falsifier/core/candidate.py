@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from falsifier.core.arguments import finite, instance
 from falsifier.core.signals import Signal
 
 
@@ -16,12 +17,23 @@ class Candidate:
         parameters: parameter values by name.
         origin: name of the engine that proposed it.
         rationale: the engine's reason for proposing it.
+
+    Raises:
+        SpecError: naming what is no signal, or no finite number.
     """
 
     signals: Mapping[str, Signal] = field(default_factory=dict)
     parameters: Mapping[str, float] = field(default_factory=dict)
     origin: str = ""
     rationale: str = ""
+
+    def __post_init__(self) -> None:
+        for what, values in (("signals", self.signals), ("parameters", self.parameters)):
+            instance(what, values, Mapping, f"{what} by name")
+        for name, signal in self.signals.items():
+            instance(f"signals, {name!r}", signal, Signal, "a Signal")
+        for name, value in self.parameters.items():
+            finite(f"parameters, {name!r}", value)
 
     @property
     def key(self) -> tuple[object, ...]:

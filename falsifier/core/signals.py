@@ -49,7 +49,7 @@ class Signal:
     def __post_init__(self) -> None:
         try:
             is_finite = all(map(isfinite, (*self.times, *self.values)))
-        except TypeError:
+        except (TypeError, OverflowError):
             raise SpecError("control-point times and values: expected sequences of numbers") from None
         if len(self.times) != len(self.values) or not self.times:
             raise SpecError(

@@ -14,7 +14,7 @@ from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError
+from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, field_validator
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
@@ -86,6 +86,13 @@ class Spec(Strict):
         min_length=1, description="What to falsify, as [requirements.NAME]."
     )
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
+
+    @field_validator("requirements")
+    @classmethod
+    def _are_named(cls, found: dict[str, AnyRequirement]) -> dict[str, AnyRequirement]:
+        if not all(map(str.strip, found)):
+            raise ValueError("a requirement has an empty name; write [requirements.NAME]")
+        return found
 
     def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:
         """Return the sections that apply to this requirement with this profile; later ones override."""

@@ -86,6 +86,8 @@ def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
     [
         ("G[0,10] (x <= 1)", (0, 1), "in place of the threshold"),
         ("G[0,10] (x <= {limit})", (1, 0), "LOW < HIGH"),
+        ("G[0,10] (x <= {limit})", (-1e308, 1e308), "between: -1e.308 and 1e.308 are too far apart"),
+        ("G[0,10] (x <= {limit})", (0, 10**400), "between: expected a finite number"),
         ("G[0,10] (x <= {limit} - {limit})", (0, 1), "robustness is the same"),
         ("G[0,10] (abs(x - {limit}) <= 1)", (0, 1), "changes in either direction"),
         ("G[0,10] (x <= {limit}", (0, 1), r"vary: expected '\)' before the end"),

@@ -182,6 +182,8 @@ def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) ->
     refused = falsifier(*arguments, "my.fmu", cwd=tmp_path)
     assert (refused.code, own.read_bytes()) == (2, b"PK mine")
     assert "my.fmu exists and is not such a file: choose another name" in refused.err
+    same = falsifier(*arguments, "lg", "--out", "lg", cwd=tmp_path)
+    assert (same.code, "--fmu-log lg: --out is" in same.err, (tmp_path / "lg").exists()) == (2, True, False)
     refused = falsifier(*arguments, "gone/log", cwd=tmp_path)
     assert (refused.code, "no such folder gone" in refused.err) == (2, True)
     assert {path.name for path in tmp_path.iterdir()} == {"my.fmu"}

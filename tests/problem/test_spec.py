@@ -74,6 +74,12 @@ def test_a_file_without_requirements_is_told_what_is_missing() -> None:
         parse_spec({"model": GOOD["model"]}, file="my.toml")
 
 
+def test_requirements_have_names() -> None:
+    nameless = {"model": GOOD["model"], "requirements": {"": {"formula": "G (x <= 1)"}}}
+    with pytest.raises(SpecError, match=r"my\.toml: requirements: a requirement has an empty name"):
+        parse_spec(nameless, file="my.toml")
+
+
 def test_unreadable_files_are_named(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=r"gone\.toml: no such spec file"):
         read_spec(tmp_path / "gone.toml")
