@@ -49,7 +49,7 @@ def check_out(
         raise SpecError(f"{path} is the original, which is kept: choose another --out")
     content = path.read_bytes()
     if content and not (content.startswith(beginnings) and holds in content):
-        raise SpecError(f"{path} exists and is not such a file: choose another name, or delete it")
+        raise SpecError(f"{path} exists and is kept: choose another name, or delete it")
 
 
 def made_folder(directory: Path, *, holds: tuple[str, ...]) -> None:

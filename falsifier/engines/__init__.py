@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from falsifier.core.arguments import whole
 from falsifier.engines.protocol import Engine
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, setting
 
 if TYPE_CHECKING:
     from falsifier.problem.problem import Problem
@@ -86,7 +86,7 @@ def check_engine(name: str) -> None:
         SpecError: if there is none; lists the known names.
     """
     if name not in ENGINES:
-        raise SpecError(f"unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
+        raise SpecError(f"{setting('engine')}: unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
 
 
 def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> Engine:

@@ -180,18 +180,21 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
     (folder / "others" / "input.csv").write_text("mine")
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     for arguments, why in (
-        (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is not such a file"),
+        (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is kept"),
         (
             ["explain", "run", "--shrink", "--out", "run/counterexample.json"],
             "is the original, which is",
         ),
         (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
-        (["report", "run", "--out", "run/journal.jsonl"], "exists and is not such a file"),
-        (["report", "run", "--csv", "keep.fmu"], "exists and is not such a file"),
-        (["report", "run", "--markdown", "--out", "my.toml"], "exists and is not such a file"),
+        (["report", "run", "--out", "run/journal.jsonl"], "exists and is kept"),
+        (["report", "run", "--csv", "keep.fmu"], "exists and is kept"),
+        (["report", "run", "--markdown", "--out", "my.toml"], "exists and is kept"),
         (["report", "run", "--markdown", "--out", "x.png"], "x.png: expected a file name that ends in .md"),
-        (["explain", "run", "--shrink", "--out", "s.json"], "s.png exists and is not such a file"),
-        (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is not such a file"),
+        (
+            ["explain", "run", "--shrink", "--out", "s.json"],
+            "s.png exists and is kept",
+        ),
+        (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is kept"),
         (["export", "run", "--out", "run"], "run has other files, which are kept"),
         (["export", "run", "--out", "others"], "others has other files, which are kept"),
     ):

@@ -16,5 +16,5 @@ def test_only_our_pictures_are_replaced(ending: str, tmp_path: Path) -> None:
     save_figure(Figure(), picture)
     assert checked_picture(picture) == picture
     Figure().savefig(picture)
-    with pytest.raises(SpecError, match="exists and is not such a file"):
+    with pytest.raises(SpecError, match="exists and is kept"):
         checked_picture(picture)

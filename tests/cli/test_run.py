@@ -181,7 +181,7 @@ def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) ->
     own.write_bytes(b"PK mine")
     refused = falsifier(*arguments, "my.fmu", cwd=tmp_path)
     assert (refused.code, own.read_bytes()) == (2, b"PK mine")
-    assert "my.fmu exists and is not such a file: choose another name" in refused.err
+    assert "my.fmu exists and is kept: choose another name" in refused.err
     same = falsifier(*arguments, "lg", "--out", "lg", cwd=tmp_path)
     assert (same.code, "--fmu-log lg: --out is" in same.err, (tmp_path / "lg").exists()) == (2, True, False)
     refused = falsifier(*arguments, "gone/log", cwd=tmp_path)
