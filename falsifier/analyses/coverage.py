@@ -51,14 +51,22 @@ Tried = Iterable[tuple[Candidate, Trajectory | None]]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RangeCoverage:
-    """What was tried of one input or parameter."""
+    """What was tried of one input or parameter.
 
-    searched: InputRecord  # its name, range, unit and kind
-    low: float | None  # smallest value tried; None if nothing was
-    high: float | None  # largest value tried
-    parts: Counts  # number of simulations with a value in each part of the range, shape (p,)
-    times: Counts | None  # the same by slice of the simulated time, shape (SLICES, p); None for a parameter
-    # Number of simulations by the input's fastest change, as PACES; empty for a parameter.
+    Attributes:
+        searched: its name, range, unit and kind.
+        low: smallest value tried; None if nothing was.
+        high: largest value tried.
+        parts: number of simulations with a value in each part of the range, shape (p,).
+        times: the same by slice of the simulated time, shape (SLICES, p); None for a parameter.
+        paces: number of simulations by the input's fastest change, as PACES; empty for a parameter.
+    """
+
+    searched: InputRecord
+    low: float | None
+    high: float | None
+    parts: Counts
+    times: Counts | None
     paces: Mapping[str, int]
 
     @property
@@ -77,11 +85,16 @@ class RangeCoverage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairCoverage:
-    """Which combinations of two inputs or parameters were tried at the same time."""
+    """Which combinations of two inputs or parameters were tried at the same time.
 
-    first: str  # name of one
-    second: str  # name of the other
-    # Whether each combination of parts was tried, shape (parts of first, parts of second).
+    Attributes:
+        first: name of one.
+        second: name of the other.
+        tried: whether each combination of parts was tried, shape (parts of first, parts of second).
+    """
+
+    first: str
+    second: str
     tried: NDArray[np.bool_]
 
     @property
@@ -92,23 +105,38 @@ class PairCoverage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutputCoverage:
-    """Which values an output reached."""
+    """Which values an output reached.
+
+    Attributes:
+        name: its name.
+        unit: its unit, empty if unknown.
+        times: in s, shape (n,).
+        lows: smallest value at each time, shape (n,).
+        highs: largest value at each time, shape (n,).
+    """
 
     name: str
-    unit: str  # its unit, empty if unknown
-    times: Array  # in s, shape (n,)
-    lows: Array  # smallest value at each time, shape (n,)
-    highs: Array  # largest value at each time, shape (n,)
+    unit: str
+    times: Array
+    lows: Array
+    highs: Array
 
 
 @dataclass(frozen=True, slots=True)
 class ModeCoverage:
-    """Which values an integer, Boolean or enumeration had: their names, or the numbers as text."""
+    """Which values an integer, Boolean or enumeration had: their names, or the numbers as text.
+
+    Attributes:
+        name: its name.
+        seen: the values that it had.
+        never: values that are known to exist and that it did not have.
+        changes: the changes that happened, as pairs of values.
+    """
 
     name: str
-    seen: tuple[str, ...]  # the values that it had
-    never: tuple[str, ...]  # values that are known to exist and that it did not have
-    changes: tuple[tuple[str, ...], ...]  # the changes that happened, as pairs of values
+    seen: tuple[str, ...]
+    never: tuple[str, ...]
+    changes: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

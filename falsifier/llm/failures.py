@@ -113,7 +113,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         ("contextwindow", "context_length", "maximum context", "context size", "exceed_context"),
         ContextExceededError,
         "the prompt is too long for this LLM; {longer}use a plainer prompt variant or another LLM. "
-        " The server says: {detail}",
+        "The server says: {detail}",
     ),
     (
         (429,),

@@ -27,15 +27,22 @@ FindingKind = Literal[
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing that a search could not show."""
+    """One thing that a search could not show.
 
-    kind: FindingKind  # what it is about
-    text: str  # what it is, and what would have to happen, in words
-    # The part of the formula, or the input or parameter, that it is about; empty if it is about none.
+    Attributes:
+        kind: what it is about.
+        text: what it is, and what would have to happen, in words.
+        part: the part of the formula, or the input or parameter, that it is about; empty if it is about none.
+        margin: how far the part was from changing its truth; None if that has no meaning.
+        time: when it came closest, in s; None if that has no meaning.
+        simulation: index of the evaluation in which it came closest; None if that has no meaning.
+    """
+
+    kind: FindingKind
+    text: str
     part: str = ""
-    margin: float | None = None  # how far the part was from changing its truth; None if that has no meaning
-    time: float | None = None  # when it came closest, in s; None if that has no meaning
-    # Index of the evaluation in which it came closest; None if that has no meaning.
+    margin: float | None = None
+    time: float | None = None
     simulation: int | None = None
 
     @property

@@ -192,7 +192,7 @@ class _Loop:
         took all of it; a language model is not asked then.
         """
         spent = self.clock()
-        if self.count < max(self.steps.replayed, not self.asks_llm):
+        if self.count < self.steps.replayed or (self.count == 0 and not self.asks_llm):
             spent = replace(spent, seconds=0.0)
         return self.budget.exceeded(spent)
 

@@ -45,20 +45,32 @@ _MOST_SIGNALS = 4
 
 @dataclass(frozen=True, slots=True)
 class Shortfall:
-    """A comparison that had to hold and did not."""
+    """A comparison that had to hold and did not.
 
-    part: str  # the comparison, as it had to hold
-    quantity: str  # what it compares, the side that is not a plain number
-    value: float  # its value at ``time``
-    limit: float  # value of the other side at ``time``
-    # Start of the violating interval in s, the one with ``time`` if there are several; of what was never
-    # reached, of its window.
+    Attributes:
+        part: the comparison, as it had to hold.
+        quantity: what it compares, the side that is not a plain number.
+        value: its value at ``time``.
+        limit: value of the other side at ``time``.
+        start: start of the violating interval in s, the one with ``time`` if there are several; of what was
+            never reached, of its window.
+        end: end of that interval in s.
+        time: when it was farthest from holding, in s; of what was never reached, when it was nearest.
+        never: whether it had to hold at some time of the interval only, and never did.
+        what: the comparison, the interval and the value in words.
+        context: what made it necessary, such as conditions that held, in words.
+    """
+
+    part: str
+    quantity: str
+    value: float
+    limit: float
     start: float
-    end: float  # end of that interval in s
-    time: float  # when it was farthest from holding, in s; of what was never reached, when it was nearest
-    never: bool  # whether it had to hold at some time of the interval only, and never did
-    what: str  # the comparison, the interval and the value in words
-    context: tuple[str, ...] = ()  # what made it necessary, such as conditions that held, in words
+    end: float
+    time: float
+    never: bool
+    what: str
+    context: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,8 @@ class Conditions:
             return None
         if not self._monitors:
             self._monitors = [Monitor(part, trajectory.step, len(trajectory)) for part in self.parts]
-        return learnable([monitor.evaluate(trajectory).robustness for monitor in self._monitors])
+        columns = {name: column[None] for name, column in trajectory.columns.items()}
+        return learnable([monitor.batch(columns).item() for monitor in self._monitors])
 
     def lowest(self, low: Array, high: Array) -> Array:
         """Return the lowest robustness of the formula if the conditions lie between bounds.
