@@ -1,7 +1,7 @@
 """Linear dynamics learnt from whole trajectories, as deviations from the best one, with several lags.
 
 Deviations cancel initial transients and set points; lags account for hidden states. A roll-out predicts all
-candidates of a population at once: one matrix product per cell.
+candidates of a population at once: one matrix product per cell. Its errors at similar inputs correct it.
 """
 
 from collections.abc import Sequence
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.engines.layout import Array
+from falsifier.engines.surrogate.corrections import Corrections
 from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 
 # Number of cells that the dynamics look back; hidden states need several.
@@ -50,10 +51,11 @@ class LinearDynamics:
     Args:
         traces: at least two simulations.
         best: index of the trace from which deviations are learnt.
+        cells: number of cells that are predicted.
         rng: weighs the traces at random, so that repeated fits explore what the data do not determine.
     """
 
-    def __init__(self, traces: Sequence[Trace], best: int, rng: np.random.Generator) -> None:
+    def __init__(self, traces: Sequence[Trace], best: int, cells: int, rng: np.random.Generator) -> None:
         states, inputs = np.stack([t.states for t in traces]), np.stack([t.inputs for t in traces])
         self._base = traces[best]
         others = np.arange(len(traces)) != best
@@ -62,10 +64,10 @@ class LinearDynamics:
         dy, du = self._deviations(states[others], inputs[others])
         weights = rng.exponential(size=int(others.sum())) + 0.2
         features = _LAGS * (dy.shape[2] + du.shape[2])
-        cells = inputs.shape[1]
-        count, most = len(dy) * cells, int(min(_MOST_ROWS, _MOST_PRODUCTS / features**2))
+        length = inputs.shape[1]
+        count, most = len(dy) * length, int(min(_MOST_ROWS, _MOST_PRODUCTS / features**2))
         rows = np.arange(count) if count <= most else rng.choice(count, most, replace=False)
-        which, at = rows // cells, rows % cells
+        which, at = rows // length, rows % length
         x = np.concatenate([_lagged(part, which, at) for part in (dy, du)], axis=1)
         linear = _ridge(x, dy[which, at + _LAGS], weights[which]).T
         # In single precision: rounding is far below what the dynamics do not know.
@@ -77,9 +79,17 @@ class LinearDynamics:
         self._first, self._centre = states[:, 0].mean(axis=0), inputs[:, 0].mean(axis=0)
         z = inputs[:, 0] - self._centre
         self._start = np.linalg.solve(z.T @ z + 1e-6 * np.eye(z.shape[1]), z.T @ (states[:, 0] - self._first))
+        driven = inputs[:, :cells]
+        errors = (states[:, : cells + 1] - self._roll_out(driven)) / self._state_unit
+        self._corrections = Corrections(driven, errors[:, 1:])
 
     def predict(self, inputs: Array) -> Array:
         """Return the outputs, shape (m, cells + 1, outputs), for scaled inputs, shape (m, cells, inputs)."""
+        states = self._roll_out(inputs)
+        states[:, 1:] += self._corrections.at(inputs) * self._state_unit
+        return np.asarray(np.clip(states, self._low, self._high))
+
+    def _roll_out(self, inputs: Array) -> Array:
         count, cells, driven = inputs.shape
         start = self._first + (inputs[:, 0] - self._centre) @ self._start
         first, du = self._deviations(start[:, None], inputs)

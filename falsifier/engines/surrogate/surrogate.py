@@ -351,7 +351,7 @@ class Surrogate:
         latest = range(max(0, len(samples) - _MOST_TRACES), len(samples))
         kept = list(dict.fromkeys([*order[: _MOST_TRACES // 3], *reversed(latest)]))[:_MOST_TRACES]
         base = min(int(rng.exponential(_MEAN_RANK)), len(kept) - 1)
-        return LinearDynamics([samples[i].trace for i in kept], base, rng)
+        return LinearDynamics([samples[i].trace for i in kept], base, self.grid.cells, rng)
 
     def _margins(self, dynamics: LinearDynamics, points: Array) -> Margins:
         """Return the predicted margins of points, shape (m, d)."""

@@ -5,7 +5,8 @@ import pytest
 
 from falsifier.core.space import SearchSpace
 from falsifier.engines.layout import TimeGrid, planning_layout
-from falsifier.engines.surrogate.dynamics import LinearDynamics
+from falsifier.engines.surrogate.corrections import Corrections
+from falsifier.engines.surrogate.dynamics import LinearDynamics, Trace
 from falsifier.engines.surrogate.history import History
 from falsifier.engines.surrogate.predicted_cost import PredictedCost
 from falsifier.engines.surrogate.variation import random_points
@@ -60,7 +61,7 @@ def test_dynamics_predict_an_unseen_input_from_a_few_trajectories() -> None:
     for point in random_points(history.layout, rng, 12):
         history.add(evaluate(problem, history.layout.candidate(point, origin="t", rationale="t")), point)
     traces = [s.trace for s in history.samples]
-    fitted = LinearDynamics(traces[:-2], 0, np.random.default_rng(0))
+    fitted = LinearDynamics(traces[:-2], 0, 50, np.random.default_rng(0))
     for trace in traces[-2:]:
         predicted = fitted.predict(trace.inputs[None, :50])[0, :, 0]
         true = trace.states[:51, 0]
@@ -78,3 +79,37 @@ def test_inputs_on_the_grid_are_those_of_the_point_and_times_beyond_the_horizon_
     trace = sample.trace
     assert trace.inputs[:25] == pytest.approx(layout.inputs(point[None], grid)[0])
     assert trace.states.shape == (51, 1) and len(trace.inputs) == 50
+
+
+def test_errors_at_similar_inputs_correct_a_prediction_and_what_comes_later_does_not_matter() -> None:
+    rng, cells = np.random.default_rng(1), 23
+    inputs = np.broadcast_to(np.array([0.0, 0.4, 0.7, 1.0])[:, None, None], (4, cells, 2))
+    errors = rng.standard_normal((4, cells, 3))
+    corrections = Corrections(inputs, errors)
+    new = inputs[:1].copy()
+    new[:, 10:] = 1.0  # something else from then on
+    expected = corrections.at(np.concatenate([inputs[:1], new]))
+    assert expected.shape == (2, cells, 3)
+    assert np.abs(expected[0] - errors[0]).max() < 0.25 * np.abs(errors[0]).max()
+    assert expected[1, :10] == pytest.approx(expected[0, :10], abs=1e-6)
+    assert np.abs(corrections.at(np.full((1, cells, 2), 5.0))).max() < 1e-6  # nothing is known there
+
+
+def test_dynamics_do_not_repeat_what_they_got_wrong() -> None:
+    # An output that stops at a limit, which linear dynamics overshoot.
+    rng, cells = np.random.default_rng(2), 40
+    levels = rng.random((12, 1, 1))
+    inputs = np.broadcast_to(levels, (12, cells, 1)).copy()
+    rising = np.cumsum(np.concatenate([np.zeros((12, 1, 1)), inputs], axis=1), axis=1)
+    traces = [Trace(u, y) for u, y in zip(inputs, np.minimum(rising, 12.0), strict=True)]
+    highest = int(np.argmax(levels))
+    fitted = LinearDynamics(traces, int(np.argmin(levels)), cells, np.random.default_rng(0))
+    predicted = fitted.predict(inputs[highest : highest + 1])[0]
+    assert np.abs(predicted - traces[highest].states).max() < 2.5  # 4.9 without corrections
+
+
+def test_huge_outputs_are_corrected_in_their_own_unit() -> None:
+    rng = np.random.default_rng(3)
+    traces = [Trace(rng.random((10, 1)), 1e80 * rng.standard_normal((11, 1))) for _ in range(3)]
+    fitted = LinearDynamics(traces, 0, 10, rng)
+    assert np.isfinite(fitted.predict(np.stack([t.inputs for t in traces]))).all()
