@@ -116,6 +116,37 @@ def test_missing_signals_and_unequal_lengths_are_named() -> None:
 
 
 @pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ([0.0, 1.0, 1.5], "got 1.5 s after 1 s as recorded time 2"),
+        ([0.0, -1.0, -2.0], "got -1 s after 0 s as recorded time 1"),
+        ([0.0, 0.0, 0.0], "got 0 s after 0 s as recorded time 1"),
+        ([0.0, np.nan, 2.0], "got nan s after 0 s"),
+        ([1.0, 2.0, 3.0], r"expected 0 s as the first one, got \[1.0\]"),
+        ([], r"expected 0 s as the first one, got \[\]"),
+        ([[0.0, 1.0], [2.0, 3.0]], r"times: expected an array of numbers of shape \(n,\)"),
+        (["0", "1"], "times: expected an array of numbers"),
+    ],
+)
+def test_times_that_are_no_grid_are_refused(times: list[float], said: str) -> None:
+    with pytest.raises(MonitorError, match=said):
+        Trajectory(np.array(times), {"x": np.array(times)})
+
+
+def test_columns_that_are_no_numbers_are_refused() -> None:
+    for column in (np.array(["a"] * 11), np.array([None] * 11), np.zeros((11, 2))):
+        with pytest.raises(MonitorError, match="x: expected an array of numbers"):
+            Trajectory(TIMES, {"x": column})
+
+
+@pytest.mark.parametrize(("stop_time", "samples"), [(1e4, 1_000_001), (50.0, 20_001), (7.0, 3), (0.0, 1)])
+def test_grids_of_simulations_are_taken(stop_time: float, samples: int) -> None:
+    times = np.linspace(0.0, stop_time, samples)
+    for each in (times, np.arange(samples) * (stop_time / max(1, samples - 1)), np.array(times, float)):
+        assert len(Trajectory(each, {"x": each})) == samples
+
+
+@pytest.mark.parametrize(
     ("kind", "values", "expected"),
     [
         ("boolean", [0, 0], True),  # by its type
