@@ -56,9 +56,14 @@ def report(
         if file is not None and file.parent != first:  # whether that is a run is seen when it is read
             in_existing_folder(file)
         if file is not None and (file.is_file() or file.is_dir()):
-            check_out(file, beginnings=(begins,))
+            check_out(file, begins=begins)
         if file is not None and file.suffix not in ("", ".txt", ".htm", ".markdown"):
             check_ending(file, (ending,))
+    named = [file.resolve() for file, _, _ in outputs if file is not None]
+    if twice := [file for i, file in enumerate(named) if file in named[:i]]:
+        raise click.UsageError(
+            f"{twice[0]} is named twice; expected a file for each of --out, --csv, --arch-comp"
+        )
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")
         warn(f"{arch_comp} written")
