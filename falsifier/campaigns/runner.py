@@ -185,7 +185,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
 
     runs = tuple(request.named().values())
     for run in runs:
-        check_names(run)
+        check_names(run.engine, run.llm)
     for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
         preflight(llm.name, api_base=llm.api_base, options=llm.options)
         if is_model_file(llm.name):

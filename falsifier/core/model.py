@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import ceil
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -202,15 +203,18 @@ class ModelInfo:
 GRID_ROUNDING = 1e-6
 
 
-def _multiple(what: str, whole: float, part: str, period: float) -> None:
-    """Check that one time is an integer multiple of another."""
+def whole_steps(what: str, whole: float, part: str, period: float, *, key: str = "") -> int:
+    """Return how many times a period fits into a time; SpecError, with a round shorter one that does."""
     count = max(round(whole / period), 1)
     if abs(whole / period - count) > GRID_ROUNDING * count:
+        least = ceil(whole / period)
+        shorter = (f"{whole / n:.12g}" for n in range(least, min(2 * least, least + 1000) + 1))
         raise SpecError(
-            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try "
-            f"{part} = {whole / count:g}",
-            key=part,
+            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try {part} = "
+            f"{min(shorter, key=lambda text: len(text.partition('e')[0].strip('0.')))}",
+            key=key or part,
         )
+    return count
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,9 +252,9 @@ class Experiment:
                 positive(name, given)
         if not isinstance(self.outputs, tuple):
             raise SpecError(f"outputs: expected a tuple of names, got {self.outputs!r}")
-        _multiple("stop_time", self.stop_time, "output_interval", self.output_interval)
+        whole_steps("stop_time", self.stop_time, "output_interval", self.output_interval)
         if self.step_size is not None:
-            _multiple("output_interval", self.output_interval, "step_size", self.step_size)
+            whole_steps("output_interval", self.output_interval, "step_size", self.step_size)
 
     @property
     def steps_per_output(self) -> int:
