@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import one_of, positive
+from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError, SpecError, did_you_mean
@@ -208,10 +209,10 @@ def whole_steps(what: str, whole: float, part: str, period: float, *, key: str =
     count = max(round(whole / period), 1)
     if abs(whole / period - count) > GRID_ROUNDING * count:
         least = ceil(whole / period)
-        shorter = (f"{whole / n:.12g}" for n in range(least, min(2 * least, least + 1000) + 1))
+        shorter = (float(f"{whole / n:.12g}") for n in range(least, min(2 * least, least + 1000) + 1))
         raise SpecError(
             f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try {part} = "
-            f"{min(shorter, key=lambda text: len(text.partition('e')[0].strip('0.')))}",
+            f"{min(shorter, key=digits):.12g}",
             key=key or part,
         )
     return count
@@ -257,9 +258,9 @@ class Experiment:
             whole_steps("output_interval", self.output_interval, "step_size", self.step_size)
 
     @property
-    def steps_per_output(self) -> int:
-        """Number of communication steps in the output interval."""
-        return round(self.output_interval / (self.step_size or self.output_interval))
+    def step(self) -> float:
+        """Communication step or maximum solver step in s."""
+        return self.step_size or self.output_interval
 
     @property
     def samples(self) -> int:

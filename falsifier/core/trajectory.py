@@ -90,12 +90,6 @@ class Trajectory:
         k = self.index(time)
         return {name: float(column[k]) for name, column in self.columns.items()}
 
-    def with_columns(
-        self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
-    ) -> "Trajectory":
-        """Return this trajectory with further columns appended."""
-        return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
-
     def save(self, place: Path | IO[bytes]) -> None:
         """Write the trajectory, without its log, to a numpy archive (``.npz``)."""
         names = np.array(self.names)

@@ -1,6 +1,6 @@
-"""Candidates in words, the same on the terminal, in notebooks, in reports and in messages to an LLM."""
+"""Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -80,3 +80,22 @@ def listed(parts: Sequence[str]) -> str:
     ('a', 'a, b and c')
     """
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def aligned(
+    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), widest: int | None = None
+) -> list[str]:
+    """Return the rows of a table as lines with aligned columns, those of some numbers aligned right.
+
+    Cells longer than the widest column push the rest of their row to the right.
+    """
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    if widest is not None:
+        widths = [min(width, widest) for width in widths]
+    lines = []
+    for row in rows:
+        cells = enumerate(zip(row, widths, strict=True))
+        padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
+        lines.append("  ".join(padded).rstrip())
+    return lines

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import digits
 from falsifier.core.signals import Interpolation
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.problem.problem import Problem
@@ -58,15 +59,6 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
         tuple((s.times, s.values) for _, s in signals),
         tuple(v for _, v in parameters),
     )
-
-
-def digits(value: float) -> int:
-    """Number of significant decimal digits of a number.
-
-    >>> digits(100.0), digits(0.05), digits(33.25)
-    (1, 1, 4)
-    """
-    return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
 
 
 def rounder(value: float) -> Iterator[float]:

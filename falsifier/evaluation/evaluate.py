@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
@@ -89,7 +88,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
-    trajectory = outputs.with_columns(*_inputs(problem, candidate, outputs))
+    trajectory = _with_inputs(problem, candidate, outputs)
     try:
         verdict = monitor_for(problem).evaluate(trajectory)
     except MonitorError as error:
@@ -200,13 +199,12 @@ def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
     return Monitor(formula, step=step, samples=samples)
 
 
-def _inputs(
-    problem: Problem, candidate: Candidate, outputs: Trajectory
-) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
-    """Return columns and units of the inputs on the output grid, so that formulas and plots can use them."""
+def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:
+    """Return the trajectory with columns of the inputs, so that formulas and plots can use them."""
     columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
     for variable in problem.info.inputs:
         value = problem.parameters.get(variable.name, variable.start)
         if variable.name not in columns and isinstance(value, int | float):
             columns[variable.name] = np.full(outputs.times.shape, float(value))
-    return columns, {v.name: v.unit for v in problem.info.inputs if v.unit}
+    units = {v.name: v.unit for v in problem.info.inputs if v.unit}
+    return replace(outputs, columns={**outputs.columns, **columns}, units={**outputs.units, **units})

@@ -219,7 +219,7 @@ def _experiment(
 def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    step = experiment.step_size or experiment.output_interval
+    step = experiment.step
     for r in space.inputs:
         if r.hold is not None and r.hold < step:
             yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"

@@ -10,9 +10,9 @@ from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverag
 from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted, listed
+from falsifier.core.words import aligned, counted, listed
 from falsifier.stl.margins import margin_words, signed
-from falsifier.views.text import Fact, aligned, llm_use
+from falsifier.views.text import Fact, llm_use
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8

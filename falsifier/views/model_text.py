@@ -7,8 +7,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.words import counted
-from falsifier.views.text import aligned
+from falsifier.core.words import aligned, counted
 
 if TYPE_CHECKING:
     from falsifier.context.simulink import Diagram

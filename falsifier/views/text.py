@@ -1,7 +1,7 @@
 """The result of a run as text or JSON."""
 
 import shlex
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -167,25 +167,6 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact
 def fact_lines(facts: Iterable[Fact]) -> list[str]:
     """Return facts as rows of text."""
     return [f"  {name:<14} {text}" for name, text in facts]
-
-
-def aligned(
-    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), widest: int | None = None
-) -> list[str]:
-    """Return the rows of a table as lines with aligned columns, those of some numbers aligned right.
-
-    Cells longer than the widest column push the rest of their row to the right.
-    """
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    if widest is not None:
-        widths = [min(width, widest) for width in widths]
-    lines = []
-    for row in rows:
-        cells = enumerate(zip(row, widths, strict=True))
-        padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
-        lines.append("  ".join(padded).rstrip())
-    return lines
 
 
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:

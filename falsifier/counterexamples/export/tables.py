@@ -34,7 +34,7 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     there: one row with the value before and one with the value after. Redundant rows are omitted.
     """
     experiment = problem.experiment
-    steps = round(experiment.stop_time / (experiment.step_size or experiment.output_interval))
+    steps = round(experiment.stop_time / experiment.step)
     times = np.arange(steps + 1, dtype=np.float64) * np.float64(experiment.stop_time / steps)
     columns = {}
     for variable in problem.info.inputs:

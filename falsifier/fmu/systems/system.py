@@ -130,7 +130,7 @@ class System(Isolated):
             SpecError: naming the component and steps that fit.
         """
         for member in self.network.members:
-            own_steps(member, experiment.step_size or experiment.output_interval, experiment.stop_time)
+            own_steps(member, experiment.step, experiment.stop_time)
 
     @property
     def order(self) -> Order:
