@@ -11,7 +11,7 @@ import numpy as np
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING
+from falsifier.core.model import GRID_ROUNDING, Experiment
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
@@ -189,14 +189,15 @@ def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
 
 def monitor_for(problem: Problem) -> Monitor:
     """Return the monitor of the problem's requirement on its output grid, compiled once per process."""
-    return _monitor(
-        problem.requirement.formula, problem.experiment.output_interval, problem.experiment.samples
-    )
+    return compiled(problem.requirement.formula, problem.experiment)
 
 
-@lru_cache(maxsize=256)
-def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
-    return Monitor(formula, step=step, samples=samples)
+def compiled(formula: Formula, experiment: Experiment) -> Monitor:
+    """Return the monitor of a formula on an experiment's output grid, compiled once per process."""
+    return _compiled(formula, experiment.output_interval, experiment.samples)
+
+
+_compiled = lru_cache(maxsize=256)(Monitor)
 
 
 def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:

@@ -63,7 +63,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     model = ["[model]"]
     if isinstance(fmu, Path):
         model += [f"fmu = {_toml(fmu.as_posix())}"]
-        model += [f"interface = {_toml(default_interface(info) or 'co-simulation')}"]
+        model += [f"interface = {_toml(default_interface(info))}"]
     else:
         sections += _components(fmu, info)
     stop_time = info.stop_time or DEFAULT_STOP_TIME

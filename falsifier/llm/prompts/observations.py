@@ -3,13 +3,13 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
     Array,
@@ -145,13 +145,8 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
 
 
 def monitor_for(view: View) -> Monitor:
-    """Monitor of the requirement on its output grid; compiled once per requirement."""
-    return _monitor(view.requirement.formula, view.experiment.output_interval, view.experiment.samples)
-
-
-@lru_cache(maxsize=64)
-def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
-    return Monitor(formula, step=step, samples=samples)
+    """Monitor of the requirement on its output grid."""
+    return compiled(view.requirement.formula, view.experiment)
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
