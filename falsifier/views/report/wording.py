@@ -19,7 +19,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
 from falsifier.views.report.content import Section, Shown, Side, spent_on
-from falsifier.views.text import Fact, broken_facts, margin_facts
+from falsifier.views.text import Fact, broken_facts, margin_facts, untested
 
 _BETWEEN = {
     "constant": "held until the next row",
@@ -68,10 +68,7 @@ def result_text(section: Section) -> str:
     count = counted(spent_on(runs).simulations, "simulation")
     if not any(run.finished for run in runs):
         return f"not finished: no violation in {count} so far"
-    tested = ""
-    if any(finding.untested for run in runs for finding in run.findings):
-        tested = ", and a part of it was not tested"
-    return f"no violation found in {count}{tested}"
+    return f"no violation found in {count}{untested(f for run in runs for f in run.findings)}"
 
 
 def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
