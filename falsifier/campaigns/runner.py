@@ -11,7 +11,6 @@ from falsifier.campaigns.directory import (
     check_new,
     read_campaign,
     run_directory,
-    write_campaign,
 )
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
@@ -23,6 +22,7 @@ from falsifier.evaluation.workers import open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.files import CAMPAIGN, write_sealed
 from falsifier.record.journal import STOP, holds_run, open_journal
 from falsifier.record.manifest import (
     check_in_sight,
@@ -74,7 +74,7 @@ def run_campaign(
     with campaign_lock(directory):
         check_new(directory)
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
-        write_campaign(directory, record)
+        write_sealed(directory / CAMPAIGN, record)
         return _work(directory, record, problems, jobs, tuple(listeners))
 
 

@@ -176,8 +176,7 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
             written = [Database(store).save(problem, case.stored)]
         else:
             written = export_counterexample(problem, case.stored, evaluation, directory)
-    for path in written:
-        say(str(path))
+    say("\n".join(map(str, written)))
 
 
 def _shrink(
@@ -212,8 +211,9 @@ def _shrink(
             if not case.is_miss:
                 raise SpecError(f"{case.place}: {confirmation.reason}")
             confirmation = None
-        table = input_table(problem, found.candidate)
-        files = [write_csv(table, file, problem.model)] if case.is_miss else []
+        files = (
+            [write_csv(input_table(problem, found.candidate), file, problem.model)] if case.is_miss else []
+        )
         if confirmation is None:
             files += draw_evaluation(problem, found, file.with_suffix(".png"))
         else:

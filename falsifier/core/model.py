@@ -77,6 +77,11 @@ class Variable:
         one_of("causality of a variable", self.causality, get_args(Causality))
 
     @property
+    def start_number(self) -> float | None:
+        """Start value as a number; None if there is none, or it is a text."""
+        return None if isinstance(self.start, str | None) else float(self.start)
+
+    @property
     def is_bounded(self) -> bool:
         """Whether both ends of its range are known."""
         return None not in self.limits
@@ -332,7 +337,7 @@ class FunctionModel:
                 wrong shape or a value that is not finite.
         """
         times = experiment.times
-        constant = {v.name: parameters.get(v.name, _number(v.start)) for v in self.info.inputs}
+        constant = {v.name: parameters.get(v.name, v.start_number or 0.0) for v in self.info.inputs}
         inputs = {name: np.full(times.shape, value, dtype=np.float64) for name, value in constant.items()}
         inputs |= {name: signal.sample(times) for name, signal in signals.items()}
         others = {name: value for name, value in parameters.items() if name not in inputs}
@@ -368,10 +373,6 @@ class FunctionModel:
 
     def close(self) -> None:
         """Nothing to release: a function opens no processes or files."""
-
-
-def _number(start: float | str | None) -> float:
-    return 0.0 if start is None or isinstance(start, str) else start
 
 
 def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> None:

@@ -10,13 +10,18 @@ from falsifier.core.space import InputRange, SearchSpace
 _SHOWN_POINTS = 12
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit, if that is known, as in headers of tables and labels of axes."""
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
     Units are told if the search space is given, which has them.
     """
     units = {r.name: r.unit for r in (*space.inputs, *space.parameters)} if space is not None else {}
-    labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+    labels = {name: with_unit(name, unit) for name, unit in units.items()}
     return [
         *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in candidate.signals.items()),
         *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),

@@ -32,7 +32,9 @@ def rest_value(problem: Problem, name: str) -> float | None:
     nominal value of a parameter is the model's own value.
     """
     ranged = _range(problem, name)
-    known = ranged.nominal if isinstance(ranged, ParameterRange) else _start(problem, name)
+    known = problem.info[name].start_number if name in problem.info else None
+    if isinstance(ranged, ParameterRange):
+        known = ranged.nominal
     if known is not None and ranged.low <= known <= ranged.high:
         return known
     if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high:
@@ -87,8 +89,3 @@ def _roughness(ranged: InputRange | ParameterRange, value: float, rest: float | 
 def _range(problem: Problem, name: str) -> InputRange | ParameterRange:
     ranges: list[InputRange | ParameterRange] = [*problem.space.inputs, *problem.space.parameters]
     return next(r for r in ranges if r.name == name)
-
-
-def _start(problem: Problem, name: str) -> float | None:
-    start = problem.info[name].start if name in problem.info else None
-    return float(start) if isinstance(start, int | float) else None

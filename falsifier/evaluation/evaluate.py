@@ -204,8 +204,8 @@ def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) ->
     """Return the trajectory with columns of the inputs, so that formulas and plots can use them."""
     columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
     for variable in problem.info.inputs:
-        value = problem.parameters.get(variable.name, variable.start)
-        if variable.name not in columns and isinstance(value, int | float):
+        value = problem.parameters.get(variable.name, variable.start_number)
+        if variable.name not in columns and value is not None:
             columns[variable.name] = np.full(outputs.times.shape, float(value))
     units = {v.name: v.unit for v in problem.info.inputs if v.unit}
     return replace(outputs, columns={**outputs.columns, **columns}, units={**outputs.units, **units})

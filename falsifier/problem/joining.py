@@ -97,7 +97,7 @@ def join(
         if stated is not None:
             section, name, key = stated, stated_name, ""
         formula = formula_of(section, info, experiment, key=key)
-        known = {*space.names, *fixed, *(v.name for v in info.inputs if isinstance(v.start, int | float))}
+        known = {*space.names, *fixed, *(v.name for v in info.inputs if v.start_number is not None)}
         experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
         return Joined(
             model,
@@ -219,9 +219,8 @@ def _experiment(
 def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    step = experiment.step
     for r in space.inputs:
-        if r.hold is not None and r.hold < step:
+        if r.hold is not None and r.hold < (step := experiment.step):
             yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 

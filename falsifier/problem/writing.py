@@ -118,7 +118,7 @@ def _input(v: Variable) -> str:
 def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> str:
     lines = ["[parameters]"]
     for v in searched:
-        start = v.start if isinstance(v.start, int | float) else 0.0
+        start = v.start_number or 0.0
         reach = max(abs(start), 1.0) / 2
         low, high = v.limits
         limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)

@@ -237,10 +237,12 @@ def _doubt(v: Variable) -> str:
     """Say what of a variable's limits and start value cannot be meant; empty if nothing is wrong."""
     if v.low is not None and v.high is not None and v.low > v.high:
         return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}"
-    if not isinstance(v.start, float) or not isfinite(v.start):
-        return "" if v.start is None or isinstance(v.start, str) else f"start of {v.name!r} is {v.start}"
-    excess = v.excess(v.start, v.start)
-    return excess and f"start = {v.start:g} {excess}"
+    if (start := v.start_number) is None:
+        return ""
+    if not isfinite(start):
+        return f"start of {v.name!r} is {start}"
+    excess = v.excess(start, start)
+    return excess and f"start = {start:g} {excess}"
 
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, with_unit
 from falsifier.counterexamples.store import shrunk_file
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from
@@ -92,8 +92,7 @@ def input_table(shown: Shown) -> Table:
     }
     header, columns = ["time [s]"], []
     for name, signal in signals.items():
-        unit = shown.units.get(name, "")
-        header.append(f"{name}{f' [{unit}]' if unit else ''}, {_course(signal)}")
+        header.append(f"{with_unit(name, shown.units.get(name, ''))}, {_course(signal)}")
         columns.append({time: f"{v:.6g}" for time, v in zip(signal.times, signal.values, strict=True)})
     times = sorted({time for column in columns for time in column})
     rows = [(f"{time:.6g}", *(column.get(time, "") for column in columns)) for time in times]
