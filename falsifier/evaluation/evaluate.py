@@ -192,12 +192,10 @@ def monitor_for(problem: Problem) -> Monitor:
     return compiled(problem.requirement.formula, problem.experiment)
 
 
+@lru_cache(maxsize=256)
 def compiled(formula: Formula, experiment: Experiment) -> Monitor:
     """Return the monitor of a formula on an experiment's output grid, compiled once per process."""
-    return _compiled(formula, experiment.output_interval, experiment.samples)
-
-
-_compiled = lru_cache(maxsize=256)(Monitor)
+    return Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
 
 
 def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:

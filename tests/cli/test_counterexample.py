@@ -199,8 +199,8 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
         (["export", "run", "--out", "run"], "run has files, which are kept"),
         (["export", "run", "--out", "others"], "others has files, which are kept"),
         (["export", "run", "--store", "s", "--out", "o"], "--out: --store writes nothing else"),
-        (["report", "run", "--csv", "x.csv", "--arch-comp", "./x.csv"], "x.csv is named twice"),
-        (["report", "run", "--csv", "x", "--out", "x"], "x is named twice"),
+        (["report", "run", "--csv", "x.csv", "--arch-comp", "./x.csv"], "expected a file for each"),
+        (["report", "run", "--csv", "x", "--out", "x"], "expected a file for each"),
     ):
         done = run(folder, *arguments)
         assert (done.code, why in done.err) == (2, True), done.err

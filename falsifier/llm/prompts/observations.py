@@ -21,7 +21,7 @@ from falsifier.llm.prompts.courses import (
 )
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
 from falsifier.llm.prompts.view import View
-from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
+from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
@@ -78,7 +78,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
     if trajectory is None:
         return Observed((line,), (line,), line)
-    monitor = monitor_for(view)
+    monitor = compiled(view.requirement.formula, view.experiment)
     diagnosis = monitor.diagnose(trajectory)
     reasons = tuple(_reasons(verdict, diagnosis))
     over_time = monitor.courses(trajectory)
@@ -142,11 +142,6 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{_unit(view, name)}")
     return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
-
-
-def monitor_for(view: View) -> Monitor:
-    """Monitor of the requirement on its output grid."""
-    return compiled(view.requirement.formula, view.experiment)
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
