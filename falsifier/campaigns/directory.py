@@ -16,7 +16,7 @@ from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError, written
-from falsifier.record.files import CAMPAIGN, can_be_a_folder, locked, read_sealed
+from falsifier.record.files import CAMPAIGN, can_be_a_folder, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -50,6 +50,11 @@ def check_new(directory: Path) -> None:
             f"{directory} already contains a {what}: choose another directory, or to continue it: "
             + written(f"falsifier resume {directory}", f"resume_campaign({str(directory)!r})")
         )
+
+
+def write_campaign(directory: Path, record: CampaignRecord) -> None:
+    """Write campaign.json."""
+    write_sealed(directory / CAMPAIGN, record)
 
 
 def read_campaign(directory: Path) -> CampaignRecord:

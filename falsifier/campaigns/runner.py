@@ -11,10 +11,11 @@ from falsifier.campaigns.directory import (
     check_new,
     read_campaign,
     run_directory,
+    write_campaign,
 )
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
-from falsifier.campaigns.schedule import RunTask, Schedule
+from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
 from falsifier.core.arguments import whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError
@@ -22,7 +23,6 @@ from falsifier.evaluation.workers import open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.files import CAMPAIGN, write_sealed
 from falsifier.record.journal import STOP, holds_run, open_journal
 from falsifier.record.manifest import (
     check_in_sight,
@@ -39,9 +39,6 @@ from falsifier.search.make_engines import check_names, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
-
-# Time in s to wait for the lock of a worker that died: the operating system takes a moment to release it.
-_PATIENCE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +71,7 @@ def run_campaign(
     with campaign_lock(directory):
         check_new(directory)
         record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
-        write_sealed(directory / CAMPAIGN, record)
+        write_campaign(directory, record)
         return _work(directory, record, problems, jobs, tuple(listeners))
 
 
@@ -219,7 +216,7 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     (summary,) = RunFollower(directory, [Summary()]).look()
     if summary.status not in ("waiting", "running"):
         return
-    with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
+    with open_journal(directory, keep=task.request.keep, patience=PATIENCE) as journal:
         if not holds_run(directory):
             method = method_of(task.request).label
             write(directory, describe(task.request, [task.problem], method, task.hashes))

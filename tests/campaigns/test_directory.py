@@ -8,16 +8,16 @@ from falsifier.campaigns.directory import (
     read_campaign,
     run_directories,
     run_directory,
+    write_campaign,
 )
 from falsifier.errors import JournalError
-from falsifier.record.files import CAMPAIGN, write_sealed
 from falsifier.record.run import falsify
 from tests.problems import impossible
 
 
 def test_only_runs_that_have_begun_are_listed(campaign: Path, tmp_path: Path) -> None:
     record = read_campaign(campaign)
-    write_sealed(tmp_path / CAMPAIGN, record)
+    write_campaign(tmp_path, record)
     assert run_directories(tmp_path) == []
     second = list(record.request.named())[1]
     place = run_directory(tmp_path, second)

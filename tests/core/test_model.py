@@ -142,7 +142,7 @@ def test_columns_that_are_no_numbers_are_refused() -> None:
 @pytest.mark.parametrize(("stop_time", "samples"), [(1e4, 1_000_001), (50.0, 20_001), (7.0, 3), (0.0, 1)])
 def test_grids_of_simulations_are_taken(stop_time: float, samples: int) -> None:
     times = np.linspace(0.0, stop_time, samples)
-    for each in (times, np.arange(samples) * (stop_time / max(1, samples - 1)), np.array(times, float)):
+    for each in (times, np.arange(samples, dtype=np.float64) * (stop_time / max(1, samples - 1))):
         assert len(Trajectory(each, {"x": each})) == samples
 
 
