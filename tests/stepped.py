@@ -23,7 +23,7 @@ class EulerModel:
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
     ) -> Trajectory:
-        step = experiment.step_size or experiment.output_interval
+        step = experiment.step
         if step < self.smallest_step:
             raise SimulationError(f"the step {step:g} s is too small")
         every = round(experiment.output_interval / step)

@@ -20,7 +20,6 @@ from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.loop import search
 from falsifier.search.make_engines import check_names
-from falsifier.search.request import RunRequest
 from falsifier.stl import Formula
 from falsifier.stl.tell_apart import differences
 
@@ -116,7 +115,7 @@ def margin(
     if not isfinite(high - low):
         raise SpecError(f"{setting('between')}: {low:g} and {high:g} are too far apart")
     budget, seed = whole("budget", budget, least=20), whole("seed", seed, least=0)
-    check_names(RunRequest(problems=(), engine=engine))
+    check_names(engine, None)
     lowest, highest = (formula_at(problem, vary, threshold) for threshold in (low, high))
     experiment = problem.experiment
     step, samples = experiment.output_interval, experiment.samples
@@ -147,7 +146,8 @@ def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
         stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"))
         return formula_of(stated, problem.info, problem.experiment, key="")
     except SpecError as error:
-        raise SpecError(error.message, file=_stated(), key=error.key) from None
+        place = f"{_stated()} with {LIMIT} = {threshold:g}"
+        raise SpecError(error.message, file=place, key=error.key) from None
 
 
 def _stated() -> str:

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from filelock import FileLock, Timeout
 from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
@@ -118,7 +117,7 @@ def is_worked_on(directory: Path) -> bool:
     if not path.exists():
         return False
     try:
-        with FileLock(path, timeout=0):
+        with locked(path, busy=""):
             return False
-    except (Timeout, OSError):  # OSError: without write access the lock cannot be tested
+    except (JournalError, OSError):  # OSError: without write access the lock cannot be tested
         return True

@@ -15,7 +15,7 @@ from falsifier.campaigns.directory import (
 )
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
-from falsifier.campaigns.schedule import RunTask, Schedule
+from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
 from falsifier.core.arguments import whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError
@@ -39,9 +39,6 @@ from falsifier.search.make_engines import check_names, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
-
-# Time in s to wait for the lock of a worker that died: the operating system takes a moment to release it.
-_PATIENCE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +182,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
 
     runs = tuple(request.named().values())
     for run in runs:
-        check_names(run)
+        check_names(run.engine, run.llm)
     for llm in {repr(r.llm): r.llm for r in runs if r.llm is not None}.values():
         preflight(llm.name, api_base=llm.api_base, options=llm.options)
         if is_model_file(llm.name):
@@ -219,7 +216,7 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     (summary,) = RunFollower(directory, [Summary()]).look()
     if summary.status not in ("waiting", "running"):
         return
-    with open_journal(directory, keep=task.request.keep, patience=_PATIENCE) as journal:
+    with open_journal(directory, keep=task.request.keep, patience=PATIENCE) as journal:
         if not holds_run(directory):
             method = method_of(task.request).label
             write(directory, describe(task.request, [task.problem], method, task.hashes))

@@ -23,6 +23,11 @@ if TYPE_CHECKING:
     import pandas
 
 
+# Columns that are attributes of a run's method, and of what it has spent.
+_OF_METHOD = ("engine", "llm", "effort", "variant", "parameterization", "profile")
+_OF_SPENT = ("simulation_seconds", "engine_seconds", "seconds", "tokens", "cost")
+
+
 @dataclass(eq=False, kw_only=True)
 class Run(Summary):
     """One requirement in one run, read from its directory: its numbers (see Summary) and what was requested.
@@ -148,22 +153,13 @@ def _row(run: Run) -> dict[str, Any]:
     return {
         "requirement": run.requirement,
         "method": run.method.label,
-        "engine": run.method.engine,
-        "llm": run.method.llm,
-        "effort": run.method.effort,
-        "variant": run.method.variant,
-        "parameterization": run.method.parameterization,
-        "profile": run.method.profile,
+        **{name: getattr(run.method, name) for name in _OF_METHOD},
         "seed": run.seed,
         "status": run.status,
         "falsified": run.falsified,
         "simulations": run.simulations,
         "robustness": run.verdict.robustness if run.verdict else None,
         "critical_time": run.verdict.critical_time if run.verdict else None,
-        "simulation_seconds": run.spent.simulation_seconds,
-        "engine_seconds": run.spent.engine_seconds,
-        "seconds": run.spent.seconds,
-        "tokens": run.spent.tokens,
-        "cost": run.spent.cost,
+        **{name: getattr(run.spent, name) for name in _OF_SPENT},
         "directory": str(run.directory),
     }

@@ -16,8 +16,8 @@ from falsifier.search.request import RunRequest
 
 # Maximum time in s between two ticks while runs are in progress.
 _TICK = 0.25
-# Time in s to wait for a run's lock: the workers of a killed campaign take a moment to end.
-_PATIENCE = 10.0
+# Time in s to wait for a run's lock: workers that died, and those of a killed campaign, take a moment to end.
+PATIENCE = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ def run_task(task: RunTask) -> None:
         hashes=task.hashes,
         listeners=[StopFile(task.campaign / STOP)],
         resume=True,
-        patience=_PATIENCE,
+        patience=PATIENCE,
     )
 
 

@@ -12,6 +12,7 @@ from falsifier.campaigns.runs import Run
 from falsifier.campaigns.statistics import Interval, Statistics, group, statistics
 from falsifier.core.files import bundled
 from falsifier.core.literals import csv_text, markdown_text, one_line
+from falsifier.core.words import aligned
 from falsifier.stl.margins import shown
 
 NONE = "–"
@@ -162,12 +163,8 @@ class Table:
     def text(self) -> str:
         """Format as plain text with aligned columns."""
         rows = [tuple(map(one_line, row)) for row in (self.header, *self.rows)]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(self.header))]
-        lines = [
-            "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows
-        ]
-        lines.insert(1, "  ".join("-" * w for w in widths))
-        return "\n".join([self.title, "", *lines, *(["", *self.notes] if self.notes else [])])
+        rows.insert(1, tuple("-" * max(map(len, column)) for column in zip(*rows, strict=True)))
+        return "\n".join([self.title, "", *aligned(rows), *(["", *self.notes] if self.notes else [])])
 
 
 def main_table(runs: Iterable[Run], published: Published) -> Table:

@@ -11,6 +11,7 @@ import click
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import (
     DRAWN,
+    check_ending,
     check_out,
     checked_picture,
     draw_evaluation,
@@ -41,7 +42,6 @@ from falsifier.counterexamples.store import EXPLANATION, beside
 from falsifier.counterexamples.store import replay as replay_stored
 from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface
-from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
@@ -148,12 +148,12 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
 
 @command()
 @run_argument
-@out_option("Directory to write; default: export in RUN's directory.", metavar="DIR")
+@out_option("New directory to write; default: export in RUN's directory.", metavar="DIR")
 @click.option(
     "--store",
     type=PATH,
     metavar="DIR",
-    help="Only store the counterexample in this folder, for pytest --falsifier.",
+    help="Store the counterexample in this folder, for pytest --falsifier, and write nothing else.",
 )
 @policy_options
 def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) -> None:
@@ -163,31 +163,36 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
     """
     from falsifier.counterexamples.export import export_counterexample
 
+    if store is not None:
+        refuse("--store writes nothing else; export to it in another command", out=out)
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
-    directory = None if store is not None and out is None else out or beside(case.file, "export")
-    if directory is not None:
-        made_folder(directory, holds=("counterexample.json", "start_values.json", "inputs.mat"))
+    directory = out or beside(case.file, "export")
+    if store is None:
+        made_folder(directory)
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
         if store is not None:
-            say(str(Database(store).save(problem, case.stored)))
-        if directory is not None:
-            for path in export_counterexample(problem, case.stored, evaluation, directory):
-                say(str(path))
+            written = [Database(store).save(problem, case.stored)]
+        else:
+            written = export_counterexample(problem, case.stored, evaluation, directory)
+    say("\n".join(map(str, written)))
 
 
 def _shrink(
     case: Case, rights: Mapping[str, Any], budget: int, at_most: float | None, out: Path | None
 ) -> Told:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
-    # A link is followed, not replaced.
-    file = (
-        beside(case.file, "shrunk.csv" if case.is_miss else "shrunk.json") if out is None else out.resolve()
-    )
-    check_out(file, beginnings=(b'"time"' if case.is_miss else _FORMAT,), kept=case.file)
-    check_out(file.with_suffix(".json"), beginnings=(_FORMAT,), kept=case.file)
-    check_out(file.with_suffix(".npz"), beginnings=(b"PK",))
+    from falsifier.counterexamples.export.tables import input_table, write_csv
+
+    ending = ".csv" if case.is_miss else ".json"
+    file = out or beside(case.file, f"shrunk{ending}")
+    check_ending(file, (ending,))
+    file = file.resolve() if file.is_symlink() else file  # a link is followed, not replaced
+    if case.is_miss:
+        check_out(file)
+    check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)
+    check_out(file.with_suffix(".npz"), begins=b"PK")
     check_out(file.with_suffix(".png"), holds=DRAWN)
     with _loaded(case, rights) as problem:
         original = case.simulated(problem)
@@ -206,10 +211,13 @@ def _shrink(
             if not case.is_miss:
                 raise SpecError(f"{case.place}: {confirmation.reason}")
             confirmation = None
+        files = (
+            [write_csv(input_table(problem, found.candidate), file, problem.model)] if case.is_miss else []
+        )
         if confirmation is None:
-            files = _written_inputs(problem, found, file)
+            files += draw_evaluation(problem, found, file.with_suffix(".png"))
         else:
-            files = write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
+            files += write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
             if found.trajectory is not None:  # for reports, which simulate nothing
                 found.trajectory.save(file.with_suffix(".npz"))
         beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
@@ -239,13 +247,6 @@ def _shrink(
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
     lines.append(f"  files          {', '.join(map(str, files))}")
     return list(map(one_line, lines)), content
-
-
-def _written_inputs(problem: Problem, evaluation: Evaluation, file: Path) -> list[Path]:
-    from falsifier.counterexamples.export.tables import input_table, write_csv
-
-    written = write_csv(input_table(problem, evaluation.candidate), file, problem.model)
-    return [written, *draw_evaluation(problem, evaluation, file.with_suffix(".png"))]
 
 
 def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:

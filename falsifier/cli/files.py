@@ -33,13 +33,13 @@ def write_counterexample(confirmation: Confirmation, directory: Path, *, name: s
     return [data, *draw_evaluation(confirmation.problem, confirmation.evaluation, picture)]
 
 
-def check_out(
-    path: Path, *, beginnings: tuple[bytes, ...] = (b"",), holds: bytes = b"", kept: Path | None = None
-) -> None:
-    """Check that writing a file destroys no ``kept`` one, and only what begins and holds what its kind does.
+def check_out(path: Path, *, begins: bytes = b"", holds: bytes = b"", kept: Path | None = None) -> None:
+    """Check that writing a file replaces at most one of its kind: one that begins with and holds these bytes.
+
+    Without them any file is kept, as users change inputs that were written for them.
 
     Raises:
-        SpecError: if something else is there.
+        SpecError: if something else is there, or the file ``kept``, from which is worked.
     """
     if not path.exists():
         return
@@ -48,16 +48,16 @@ def check_out(
     if kept is not None and kept.exists() and path.samefile(kept):
         raise SpecError(f"{path} is the original, which is kept: choose another --out")
     content = path.read_bytes()
-    if content and not (content.startswith(beginnings) and holds in content):
+    if content and not (begins + holds and content.startswith(begins) and holds in content):
         raise SpecError(f"{path} exists and is kept: choose another name, or delete it")
 
 
-def made_folder(directory: Path, *, holds: tuple[str, ...]) -> None:
-    """Make a folder to write to; SpecError if it has files, but not those (``holds``) of an earlier run."""
+def made_folder(directory: Path) -> None:
+    """Make a folder to write to; SpecError if it has files, which users may have changed."""
     with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
-    if any(directory.iterdir()) and not all((directory / name).is_file() for name in holds):
-        raise SpecError(f"{directory} has other files, which are kept: choose a new directory with --out")
+    if any(directory.iterdir()):
+        raise SpecError(f"{directory} has files, which are kept: choose another --out, or delete it")
 
 
 def checked_picture(path: Path) -> Path:

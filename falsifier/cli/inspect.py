@@ -24,7 +24,7 @@ from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, is_system, make_system, rights_of
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
-from falsifier.views.model_text import NO_INTERFACE, info_text, model_json, simulink_text
+from falsifier.views.model_text import info_text, model_json, simulink_text
 
 if TYPE_CHECKING:
     from falsifier.fmu import System
@@ -117,7 +117,7 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
     source = one_fmu(given)
     found = read_info(source)
     # Raises an error if the FMU cannot be simulated, before a useless spec is written.
-    FmuModel(source, interface=default_interface(found) or "co-simulation")
+    FmuModel(source, interface=default_interface(found))
     return starter_spec(_relative(source, path), found)
 
 
@@ -130,8 +130,6 @@ def _print_convergence(
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
     interface = default_interface(found)
-    if interface is None:
-        raise SpecError(f"{source}: {NO_INTERFACE}; export the model for co-simulation or model exchange")
     stop_time = found.stop_time or DEFAULT_STOP_TIME
     outputs = tuple(v.name for v in found.observables if v.kind != "string")[:_CHECKED_VARIABLES]
     if not outputs:

@@ -52,12 +52,17 @@ def report(
     path = out or (None if markdown else first / "report.html")
     page, kind = (b"# Falsification report: ", ".md") if markdown else (b"<!DOCTYPE html>", ".html")
     outputs = ((arch_comp, b"system,", ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
-    for file, begins, ending in outputs:
-        if file is not None and file.parent != first:  # whether that is a run is seen when it is read
+    named = [(file, begins, ending) for file, begins, ending in outputs if file is not None]
+    if len({file.resolve() for file, _, _ in named}) < len(named):
+        raise click.UsageError(
+            "--out, --csv and --arch-comp: expected a file for each, got one for two of them"
+        )
+    for file, begins, ending in named:
+        if file.parent != first:  # whether that is a run is seen when it is read
             in_existing_folder(file)
-        if file is not None and (file.is_file() or file.is_dir()):
-            check_out(file, beginnings=(begins,))
-        if file is not None and file.suffix not in ("", ".txt", ".htm", ".markdown"):
+        if file.is_file() or file.is_dir():
+            check_out(file, begins=begins)
+        if file.suffix not in ("", ".txt", ".htm", ".markdown"):
             check_ending(file, (ending,))
     if arch_comp is not None:
         arch_comp.write_text(export(first), encoding="utf-8")

@@ -109,7 +109,7 @@ def run(
         if out is not None and fmu_log.resolve() == out.resolve():
             raise click.UsageError(f"--fmu-log {fmu_log}: --out is a directory of this name; name a file")
         if in_existing_folder(fmu_log).is_file() or fmu_log.is_dir():  # not: a stream such as /dev/stderr
-            check_out(fmu_log, beginnings=(b"simulation 1: ",))
+            check_out(fmu_log, begins=b"simulation 1: ")
         source = source.model_copy(update={"changes": source.changes.model_copy(update={"logging": True})})
     sources = _sources(source)
     searched: Sequence[ProblemSource | Problem] = sources

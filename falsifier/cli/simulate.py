@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.cli.command import command
-from falsifier.cli.files import check_out, draw_evaluation, made_folder
+from falsifier.cli.files import draw_evaluation, made_folder
 from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
 from falsifier.cli.output import as_shown, conclude
 from falsifier.core.candidate import Candidate
@@ -27,14 +27,11 @@ from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
 
-# What is written into a directory, beside a picture.
-_FILES = ("trajectory.csv", "input.csv")
-
 
 @command()
 @partial(requirement_options, searches=False)
 @inputs_option("Inputs to simulate")
-@out_option("Directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
+@out_option("New directory for trajectory.csv, input.csv and trajectory.png.", metavar="DIR")
 @json_option
 def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: Any) -> None:
     """Simulate your own inputs and judge the requirement; ranges of the search do not apply.
@@ -66,9 +63,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
                 "values; --inputs u.csv or --set NAME=VALUE gives some"
             )
         if out is not None:
-            made_folder(out, holds=_FILES)
-            for name in _FILES:
-                check_out(out / name, kept=place)
+            made_folder(out)
         evaluation = simulate_inputs(
             problem,
             signals,
@@ -143,7 +138,6 @@ def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path
     trajectory = evaluation.trajectory
     assert trajectory is not None, "what was judged has a trajectory"
     rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
-    outputs, inputs = (out / name for name in _FILES)
-    files = [write_whole(outputs, csv_text([["time", *trajectory.names], *rows]))]
-    files.append(write_csv(input_table(problem, evaluation.candidate), inputs, problem.model))
-    return [*files, *draw_evaluation(drawn, evaluation, out / "trajectory.png")]
+    outputs = write_whole(out / "trajectory.csv", csv_text([["time", *trajectory.names], *rows]))
+    inputs = write_csv(input_table(problem, evaluation.candidate), out / "input.csv", problem.model)
+    return [outputs, inputs, *draw_evaluation(drawn, evaluation, out / "trajectory.png")]

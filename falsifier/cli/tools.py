@@ -78,7 +78,7 @@ def build(*, fmu: Path, out: Path | None) -> None:
 
     source = one_fmu(fmu)
     target = in_existing_folder(out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
-    check_out(target, beginnings=(b"PK",), kept=source)
+    check_out(target, begins=b"PK", kept=source)
     say(f"{compile_sources(source, target)} written")
 
 

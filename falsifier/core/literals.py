@@ -8,6 +8,7 @@ libraries do the rest.
 import csv
 import re
 from collections.abc import Iterable
+from decimal import Decimal
 from io import StringIO
 
 # What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
@@ -137,6 +138,15 @@ def markdown_code(text: str) -> str:
 
 def _python_escape(character: str) -> str:
     return f"\\{character}" if character in '"\\' else repr(character)[1:-1]
+
+
+def digits(value: float) -> int:
+    """Return the number of significant decimal digits of a number.
+
+    >>> digits(100.0), digits(0.05), digits(33.25)
+    (1, 1, 4)
+    """
+    return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
 
 
 def _writable(text: str) -> str:

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import ceil
 from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import one_of, positive
+from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError, SpecError, did_you_mean
@@ -73,6 +75,11 @@ class Variable:
     def __post_init__(self) -> None:
         one_of("kind of a variable", self.kind, get_args(Kind))
         one_of("causality of a variable", self.causality, get_args(Causality))
+
+    @property
+    def start_number(self) -> float | None:
+        """Start value as a number; None if there is none, or it is a text."""
+        return None if isinstance(self.start, str | None) else float(self.start)
 
     @property
     def is_bounded(self) -> bool:
@@ -202,15 +209,18 @@ class ModelInfo:
 GRID_ROUNDING = 1e-6
 
 
-def _multiple(what: str, whole: float, part: str, period: float) -> None:
-    """Check that one time is an integer multiple of another."""
+def whole_steps(what: str, whole: float, part: str, period: float, *, key: str = "") -> int:
+    """Return how many times a period fits into a time; SpecError, with a round shorter one that does."""
     count = max(round(whole / period), 1)
     if abs(whole / period - count) > GRID_ROUNDING * count:
+        least = ceil(whole / period)
+        shorter = (float(f"{whole / n:.12g}") for n in range(least, min(2 * least, least + 1000) + 1))
         raise SpecError(
-            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try "
-            f"{part} = {whole / count:g}",
-            key=part,
+            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try {part} = "
+            f"{min(shorter, key=digits):.12g}",
+            key=key or part,
         )
+    return count
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,14 +258,14 @@ class Experiment:
                 positive(name, given)
         if not isinstance(self.outputs, tuple):
             raise SpecError(f"outputs: expected a tuple of names, got {self.outputs!r}")
-        _multiple("stop_time", self.stop_time, "output_interval", self.output_interval)
+        whole_steps("stop_time", self.stop_time, "output_interval", self.output_interval)
         if self.step_size is not None:
-            _multiple("output_interval", self.output_interval, "step_size", self.step_size)
+            whole_steps("output_interval", self.output_interval, "step_size", self.step_size)
 
     @property
-    def steps_per_output(self) -> int:
-        """Number of communication steps in the output interval."""
-        return round(self.output_interval / (self.step_size or self.output_interval))
+    def step(self) -> float:
+        """Communication step or maximum solver step in s."""
+        return self.step_size or self.output_interval
 
     @property
     def samples(self) -> int:
@@ -327,7 +337,7 @@ class FunctionModel:
                 wrong shape or a value that is not finite.
         """
         times = experiment.times
-        constant = {v.name: parameters.get(v.name, _number(v.start)) for v in self.info.inputs}
+        constant = {v.name: parameters.get(v.name, v.start_number or 0.0) for v in self.info.inputs}
         inputs = {name: np.full(times.shape, value, dtype=np.float64) for name, value in constant.items()}
         inputs |= {name: signal.sample(times) for name, signal in signals.items()}
         others = {name: value for name, value in parameters.items() if name not in inputs}
@@ -363,10 +373,6 @@ class FunctionModel:
 
     def close(self) -> None:
         """Nothing to release: a function opens no processes or files."""
-
-
-def _number(start: float | str | None) -> float:
-    return 0.0 if start is None or isinstance(start, str) else start
 
 
 def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> None:

@@ -13,6 +13,8 @@ from falsifier.errors import MonitorError, did_you_mean
 
 # Maximum number of distinct values, all integers, of a real signal that is taken for discrete.
 _MAX_LEVELS = 16
+# By how much a step may differ from the others, and an end from where it should be, as a fraction of a step.
+TIME_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,6 +26,9 @@ class Trajectory:
         columns: one array of shape (n,) per signal, by name; Booleans and integers are stored as floats.
         units: units by signal name; signals without a known unit are missing.
         log: messages of the model during the simulation.
+
+    Raises:
+        MonitorError: if the times are no such grid, or a column is not of one number per time.
     """
 
     times: NDArray[np.float64]
@@ -34,11 +39,26 @@ class Trajectory:
     def __post_init__(self) -> None:
         for name, column in {"times": self.times, **self.columns}.items():
             instance(name, column, np.ndarray, "an array of numpy")
+            if column.ndim != 1 or column.dtype.kind not in "fiub":
+                raise MonitorError(
+                    f"{name}: expected an array of numbers of shape (n,), got {column.dtype} of shape "
+                    f"{column.shape}"
+                )
             if column.shape != self.times.shape:
                 raise MonitorError(
-                    f"signal {name!r} has {column.shape[0] if column.ndim else 0} samples, "
-                    f"expected {self.times.shape[0]} as in the time grid"
+                    f"signal {name!r} has {len(column)} samples, expected {len(self)} as in the time grid"
                 )
+        steps = np.diff(self.times)
+        bound = TIME_TOLERANCE * steps[:1]
+        uneven = np.flatnonzero(~(np.absolute(steps - steps[:1]) < bound))
+        if len(uneven):
+            before, time = self.times[uneven[0] : uneven[0] + 2]
+            raise MonitorError(
+                f"times: expected a constant, positive step, got {time:g} s after {before:g} s as recorded "
+                f"time {uneven[0] + 1}"
+            )
+        if not (len(self) and abs(self.times[0]) <= bound.sum()):
+            raise MonitorError(f"times: expected 0 s as the first one, got {self.times[:1].tolist()}")
 
     def __len__(self) -> int:
         return int(self.times.shape[0])
@@ -69,12 +89,6 @@ class Trajectory:
         """Return the values of all signals at the sample nearest to this time in s."""
         k = self.index(time)
         return {name: float(column[k]) for name, column in self.columns.items()}
-
-    def with_columns(
-        self, columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str] | None = None
-    ) -> "Trajectory":
-        """Return this trajectory with further columns appended."""
-        return Trajectory(self.times, {**self.columns, **columns}, {**self.units, **(units or {})}, self.log)
 
     def save(self, place: Path | IO[bytes]) -> None:
         """Write the trajectory, without its log, to a numpy archive (``.npz``)."""

@@ -1,6 +1,6 @@
-"""Candidates in words, the same on the terminal, in notebooks, in reports and in messages to an LLM."""
+"""Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -10,13 +10,18 @@ from falsifier.core.space import InputRange, SearchSpace
 _SHOWN_POINTS = 12
 
 
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit, if that is known, as in headers of tables and labels of axes."""
+    return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
     Units are told if the search space is given, which has them.
     """
     units = {r.name: r.unit for r in (*space.inputs, *space.parameters)} if space is not None else {}
-    labels = {name: f"{name} [{unit}]" if unit else name for name, unit in units.items()}
+    labels = {name: with_unit(name, unit) for name, unit in units.items()}
     return [
         *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in candidate.signals.items()),
         *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),
@@ -80,3 +85,22 @@ def listed(parts: Sequence[str]) -> str:
     ('a', 'a, b and c')
     """
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def aligned(
+    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), widest: int | None = None
+) -> list[str]:
+    """Return the rows of a table as lines with aligned columns, those of some numbers aligned right.
+
+    Cells longer than the widest column push the rest of their row to the right.
+    """
+    rows = list(rows)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    if widest is not None:
+        widths = [min(width, widest) for width in widths]
+    lines = []
+    for row in rows:
+        cells = enumerate(zip(row, widths, strict=True))
+        padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
+        lines.append("  ".join(padded).rstrip())
+    return lines

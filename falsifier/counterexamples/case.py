@@ -19,9 +19,10 @@ from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError, written
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
-from falsifier.fmu import FmuModel, System, resolved
+from falsifier.fmu import FmuModel, System
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
@@ -84,11 +85,11 @@ class Case:
         model = problem.model
         if not isinstance(model, FmuModel | System):
             return problem, ()
-        given = resolved(allow, Path())
+        given = given_rights(allow, deny)
         kept = tuple(word for word in model.allow if self.allow is None or word in self.allow)
-        withheld = tuple(word for word in model.allow if word not in (*kept, *given))
-        allowed = tuple(dict.fromkeys((*kept, *given)))
-        denied = tuple(dict.fromkeys((*model.deny, *self.deny, *deny)))
+        withheld = tuple(word for word in model.allow if word not in (*kept, *given["allow"]))
+        allowed = tuple(dict.fromkeys((*kept, *given["allow"])))
+        denied = tuple(dict.fromkeys((*model.deny, *self.deny, *given["deny"])))
         return replace(problem, model=replace(model, allow=allowed, deny=denied)), withheld
 
     def simulated(self, problem: Problem) -> Evaluation:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, with_unit
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
@@ -55,7 +55,7 @@ class Coordinate:
     def label(self) -> str:
         """Name, time and unit."""
         at = "" if self.time is None else f" from {self.time:.4g} s"
-        return f"{self.name}{at}" + (f" [{self.unit}]" if self.unit else "")
+        return with_unit(f"{self.name}{at}", self.unit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import digits
 from falsifier.core.signals import Interpolation
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.problem.problem import Problem
@@ -31,7 +32,9 @@ def rest_value(problem: Problem, name: str) -> float | None:
     nominal value of a parameter is the model's own value.
     """
     ranged = _range(problem, name)
-    known = ranged.nominal if isinstance(ranged, ParameterRange) else _start(problem, name)
+    known = problem.info[name].start_number if name in problem.info else None
+    if isinstance(ranged, ParameterRange):
+        known = ranged.nominal
     if known is not None and ranged.low <= known <= ranged.high:
         return known
     if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high:
@@ -60,15 +63,6 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
     )
 
 
-def digits(value: float) -> int:
-    """Number of significant decimal digits of a number.
-
-    >>> digits(100.0), digits(0.05), digits(33.25)
-    (1, 1, 4)
-    """
-    return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
-
-
 def rounder(value: float) -> Iterator[float]:
     """Yield numbers close to this one with fewer digits, the roundest and nearest first.
 
@@ -95,8 +89,3 @@ def _roughness(ranged: InputRange | ParameterRange, value: float, rest: float | 
 def _range(problem: Problem, name: str) -> InputRange | ParameterRange:
     ranges: list[InputRange | ParameterRange] = [*problem.space.inputs, *problem.space.parameters]
     return next(r for r in ranges if r.name == name)
-
-
-def _start(problem: Problem, name: str) -> float | None:
-    start = problem.info[name].start if name in problem.info else None
-    return float(start) if isinstance(start, int | float) else None

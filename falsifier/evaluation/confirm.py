@@ -114,8 +114,7 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
 def half_step(problem: Problem) -> Problem:
     """Return the problem with half its communication step; the monitored time grid stays the same."""
     experiment = problem.experiment
-    step = (experiment.step_size or experiment.output_interval) / 2
-    return replace(problem, experiment=replace(experiment, step_size=step))
+    return replace(problem, experiment=replace(experiment, step_size=experiment.step / 2))
 
 
 def other_interface(problem: Problem) -> Problem:
@@ -190,9 +189,8 @@ def step_convergence(
     Raises:
         SimulationError: if one of the simulations fails.
     """
-    step = experiment.step_size or experiment.output_interval
     coarse = model.simulate(signals, {}, experiment)
-    fine = model.simulate(signals, {}, replace(experiment, step_size=step / 2))
+    fine = model.simulate(signals, {}, replace(experiment, step_size=experiment.step / 2))
     moved = {}
     for name in coarse.names:
         distance = np.abs(fine[name] - coarse[name])
@@ -219,7 +217,7 @@ def sufficient_step(
     Raises:
         SimulationError: if a simulation fails.
     """
-    step = experiment.step_size or experiment.output_interval
+    step = experiment.step
     for _ in range(halvings + 1):
         moved = step_convergence(model, replace(experiment, step_size=step), signals)
         if all(each.relative <= share for each in moved.values()):

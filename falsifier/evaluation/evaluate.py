@@ -8,11 +8,10 @@ from time import perf_counter
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING
+from falsifier.core.model import GRID_ROUNDING, Experiment
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
@@ -89,7 +88,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
-    trajectory = outputs.with_columns(*_inputs(problem, candidate, outputs))
+    trajectory = _with_inputs(problem, candidate, outputs)
     try:
         verdict = monitor_for(problem).evaluate(trajectory)
     except MonitorError as error:
@@ -190,23 +189,21 @@ def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
 
 def monitor_for(problem: Problem) -> Monitor:
     """Return the monitor of the problem's requirement on its output grid, compiled once per process."""
-    return _monitor(
-        problem.requirement.formula, problem.experiment.output_interval, problem.experiment.samples
-    )
+    return compiled(problem.requirement.formula, problem.experiment)
 
 
 @lru_cache(maxsize=256)
-def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
-    return Monitor(formula, step=step, samples=samples)
+def compiled(formula: Formula, experiment: Experiment) -> Monitor:
+    """Return the monitor of a formula on an experiment's output grid, compiled once per process."""
+    return Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
 
 
-def _inputs(
-    problem: Problem, candidate: Candidate, outputs: Trajectory
-) -> tuple[dict[str, NDArray[np.float64]], dict[str, str]]:
-    """Return columns and units of the inputs on the output grid, so that formulas and plots can use them."""
+def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:
+    """Return the trajectory with columns of the inputs, so that formulas and plots can use them."""
     columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
     for variable in problem.info.inputs:
-        value = problem.parameters.get(variable.name, variable.start)
-        if variable.name not in columns and isinstance(value, int | float):
+        value = problem.parameters.get(variable.name, variable.start_number)
+        if variable.name not in columns and value is not None:
             columns[variable.name] = np.full(outputs.times.shape, float(value))
-    return columns, {v.name: v.unit for v in problem.info.inputs if v.unit}
+    units = {v.name: v.unit for v in problem.info.inputs if v.unit}
+    return replace(outputs, columns={**outputs.columns, **columns}, units={**outputs.units, **units})

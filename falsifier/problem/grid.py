@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, lcm
 
+from falsifier.core.literals import digits
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
@@ -126,14 +127,9 @@ def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> in
     if step_size is None or common % step_size:
         # Thirds of a second have no end in decimals, however many digits are looked at.
         candidates = range(count, min(2 * count, count + _MAX_INTERVALS) + 1)
-        return min(candidates, key=lambda n: (min(_digits(common / n), _MANY_DIGITS), n))
+        return min(candidates, key=lambda n: (min(digits(float(common / n)), _MANY_DIGITS), n))
     steps = int(common / step_size)
     return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
-
-
-def _digits(seconds: Fraction) -> int:
-    """Return the number of significant digits with which a time is written."""
-    return len(f"{float(seconds):.15g}".partition("e")[0].replace(".", "").strip("0"))
 
 
 def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step: float | None) -> str:

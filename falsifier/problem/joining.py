@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from falsifier.core.files import absent
-from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo
+from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
@@ -97,7 +97,7 @@ def join(
         if stated is not None:
             section, name, key = stated, stated_name, ""
         formula = formula_of(section, info, experiment, key=key)
-        known = {*space.names, *fixed, *(v.name for v in info.inputs if isinstance(v.start, int | float))}
+        known = {*space.names, *fixed, *(v.name for v in info.inputs if v.start_number is not None)}
         experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
         return Joined(
             model,
@@ -191,10 +191,6 @@ def _experiment(
         each = (getattr(section, key) for section in (*reversed(layers), spec.model))
         return next((value for value in each if value is not None), None)
 
-    def fitting(fmu_step: float | None, step_size: float | None = None) -> Grid:
-        times = formula_times(formulas_of(stop_time))
-        return choose_grid(stop_time, times=times, fmu_step=fmu_step, step_size=step_size)
-
     stop_time = stated("stop_time") or info.stop_time or 0.0
     if not stop_time:
         raise SpecError(f"the {info.noun} has no default stop time; add this key", key="model.stop_time")
@@ -202,21 +198,16 @@ def _experiment(
     changed = [k for k in ("output_interval", "step_size", "stop_time") if getattr(changes, k) is not None]
     with naming(setting(changed[0]) if changed else None):
         if output_interval is None:
-            grid = fitting(info.step_size, step_size)
+            times = formula_times(formulas_of(stop_time))
+            grid = choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
             output_interval = grid.interval
         check_steps(stop_time, output_interval, key="model.output_interval")
         check_steps(stop_time, step_size, key="model.step_size")
-        intervals = stop_time / output_interval
-        if round(intervals) < 1 or abs(intervals - round(intervals)) > GRID_ROUNDING * intervals:
-            raise SpecError(
-                f"the stop time {stop_time:g} s is not an integer multiple of the output interval "
-                f"{output_interval:g} s; an interval that fits: {fitting(output_interval).interval:.12g} s",
-                key="model.output_interval",
-            )
         with in_section(key="model"):
+            intervals = whole_steps("stop_time", stop_time, "output_interval", output_interval)
             experiment = Experiment(
                 stop_time=stop_time,
-                output_interval=stop_time / round(intervals),
+                output_interval=stop_time / intervals,
                 outputs=(),
                 step_size=step_size,
                 tolerance=stated("tolerance"),
@@ -228,9 +219,8 @@ def _experiment(
 def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    step = experiment.step_size or experiment.output_interval
     for r in space.inputs:
-        if r.hold is not None and r.hold < step:
+        if r.hold is not None and r.hold < (step := experiment.step):
             yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 

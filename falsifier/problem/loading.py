@@ -201,7 +201,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
             raise SpecError("shortest_piece makes inputs free: parameterization must be free, not fixed")
-        step = problem.experiment.step_size or problem.experiment.output_interval
+        step = problem.experiment.step
         if source.shortest_piece < step:
             raise SpecError(
                 f"pieces of {source.shortest_piece:g} s: inputs change at communication steps, "

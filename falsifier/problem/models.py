@@ -6,7 +6,7 @@ from pathlib import Path
 
 from falsifier.core.files import absent
 from falsifier.core.model import Interface, Model, ModelInfo
-from falsifier.errors import ModelError, SpecError, in_section
+from falsifier.errors import SpecError, in_section
 from falsifier.fmu import (
     Component,
     Connection,
@@ -114,22 +114,16 @@ def _existing(path: Path, fmu: str, key: str) -> Path:
     return found
 
 
-def default_interface(info: ModelInfo) -> Interface | None:
+def default_interface(info: ModelInfo) -> Interface:
     """Return the default interface: co-simulation if the FMU offers it, with its exporting tool's solver."""
-    if "co-simulation" in info.interfaces:
-        return "co-simulation"
-    return info.interfaces[0] if info.interfaces else None
+    # Also if it offers none: FmuModel says so.
+    return info.interfaces[0] if info.interfaces == ("model-exchange",) else "co-simulation"
 
 
 def _interface(stated: Interface | None, info: ModelInfo) -> Interface:
     """Return the stated interface, if the FMU offers it, or the only one that it offers."""
-    if not info.interfaces:
-        raise ModelError(
-            f"{info.name}: the FMU offers neither co-simulation nor model exchange, and scheduled execution "
-            "is not supported; export it for co-simulation"
-        )
-    if stated is None and len(info.interfaces) == 1:
-        return info.interfaces[0]
+    if not info.interfaces or (stated is None and len(info.interfaces) == 1):
+        return default_interface(info)
     if stated is None or stated not in info.interfaces:
         advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
         raise SpecError(f"the FMU offers {' and '.join(info.interfaces)}{advice}", key="model.interface")

@@ -132,7 +132,7 @@ def _parameter_range(variable: Variable, limits: tuple[float, float]) -> Paramet
     return ParameterRange(
         variable.name,
         *limits,
-        nominal=variable.start if isinstance(variable.start, int | float) else None,
+        nominal=variable.start_number,
         unit=variable.unit,
         description=variable.description,
         kind=_value_kind(variable),

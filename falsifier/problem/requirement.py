@@ -84,7 +84,7 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
     except FormulaError as error:
         fits = fitting_interval(formula, experiment.stop_time, experiment.output_interval)
         is_other = fits is not None and fits != experiment.output_interval
-        advice = f"; output_interval = {fits:.12g} fits all times" if is_other else ""
+        advice = f"; {setting('output_interval', f'{fits:.12g}')} fits all times" if is_other else ""
         raise SpecError(f"{error}{advice}") from None
     return formula
 

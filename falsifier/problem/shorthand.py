@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
 from falsifier.core.model import Interface
-from falsifier.errors import SpecError, first_fault, in_section, setting, written
+from falsifier.errors import SpecError, first_fault, in_section, naming, setting, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.spec import AnyRequirement, parse_spec
@@ -69,9 +69,7 @@ def changes_from(
         raise SpecError(f"{both[0]}: {why}; drop one of them")
     data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
-    rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
-    Rights.of(**rights)  # so that no spec is named for what an option or argument states
-    data |= {name: words for name, words in rights.items() if words}
+    data |= {name: words for name, words in given_rights(allow, deny).items() if words}
     try:
         return ModelChanges.model_validate(data)
     except ValidationError as error:
@@ -82,6 +80,15 @@ def changes_from(
         else:
             key = setting(key)
         raise SpecError(message, file=key) from None
+
+
+def given_rights(allow: Iterable[str], deny: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return what options or arguments allow and deny, with absolute paths; SpecError naming a wrong one."""
+    rights = {"allow": resolved(texts("allow", allow), Path()), "deny": texts("deny", deny)}
+    for name, words in rights.items():
+        with naming(setting(name)):
+            Rights.of(**{name: words})
+    return rights
 
 
 def stated_as(kind: str, name: str, *, searched: bool) -> str:

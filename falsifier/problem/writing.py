@@ -63,7 +63,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     model = ["[model]"]
     if isinstance(fmu, Path):
         model += [f"fmu = {_toml(fmu.as_posix())}"]
-        model += [f"interface = {_toml(default_interface(info) or 'co-simulation')}"]
+        model += [f"interface = {_toml(default_interface(info))}"]
     else:
         sections += _components(fmu, info)
     stop_time = info.stop_time or DEFAULT_STOP_TIME
@@ -118,7 +118,7 @@ def _input(v: Variable) -> str:
 def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> str:
     lines = ["[parameters]"]
     for v in searched:
-        start = v.start if isinstance(v.start, int | float) else 0.0
+        start = v.start_number or 0.0
         reach = max(abs(start), 1.0) / 2
         low, high = v.limits
         limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)

@@ -31,11 +31,6 @@ class Iteration:
     exchanges: tuple[Exchange, ...]
     samples: tuple[Sample, ...]
 
-    @property
-    def question_seconds(self) -> float:
-        """How long its questions took, in s."""
-        return sum(exchange.seconds for exchange in self.exchanges)
-
 
 def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
     """Return the calls of the engine of one requirement in order.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from time import monotonic, perf_counter
+from time import monotonic
 from typing import overload
 
 from falsifier.core.arguments import list_of, path_of, whole
@@ -263,7 +263,6 @@ def carry_out(
         resume: continue from the directory's journal; without a journal, start.
         patience: time in s to wait for another process that writes to the directory.
     """
-    started = perf_counter()
     if engine is not None and len(problems) > 1:
         raise SpecError(
             "an engine made in Python can search only one requirement: pass the name of an engine instead"
@@ -322,7 +321,6 @@ def carry_out(
             searched=searched_space(problems[0].space, request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,
-            prepared=perf_counter() - started,
         )
 
 

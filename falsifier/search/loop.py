@@ -44,7 +44,6 @@ def search(
     searched: SearchSpace | None = None,
     directory: Path | None = None,
     listeners: Iterable[Listener] = (),
-    prepared: float = 0.0,
 ) -> list[Result]:
     """Falsify one or more requirements of one system.
 
@@ -62,7 +61,6 @@ def search(
         searched: the part of the search space that the engines use; default: all of it.
         directory: where the run is recorded, to be stated in the results.
         listeners: called with every event.
-        prepared: seconds that the preparation of the run took, such as imports; they count.
 
     Returns:
         One result per problem, in their order.
@@ -84,7 +82,7 @@ def search(
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     space = searched or problems[0].space
     steps = steps or Steps()
-    began = perf_counter() - prepared - steps.seconds
+    began = perf_counter() - steps.seconds
     first = _Known(deque(known))
     loop = _Loop(states, first, space, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
     status: ResultStatus
@@ -188,8 +186,8 @@ class _Loop:
     def limit_reached(self) -> str | None:
         """Which limit is reached, in words.
 
-        The record of a run is repeated even if its time is used up, and one simulation made even if the start
-        took all of it; a language model is not asked then.
+        The record of a run is repeated even if its time is used up, and one simulation is made however short
+        it is; a language model is not asked then.
         """
         spent = self.clock()
         if self.count < self.steps.replayed or (self.count == 0 and not self.asks_llm):

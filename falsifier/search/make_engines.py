@@ -33,7 +33,7 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
             although the price is unknown.
         ChatError: for an unknown provider or a missing key.
     """
-    check_names(request)
+    check_names(request.engine, request.llm)
     seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
     llm = request.llm
     if llm is None:
@@ -74,14 +74,13 @@ def told_problems(
     return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
 
 
-def check_names(request: RunRequest) -> None:
+def check_names(engine: str | None, llm: LLMSettings | None) -> None:
     """Reject unknown names, without importing an engine or looking for a key.
 
     Raises:
         SpecError: for an unknown engine or prompt variant, or an engine that does not fit the language
             model.
     """
-    engine, llm = request.engine, request.llm
     if llm is None:
         if engine in _LLM_ENGINES:
             raise SpecError(

@@ -69,7 +69,6 @@ def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 
         formula.signals,
         step,
         samples,
-        np.arange(samples, dtype=np.float64) * step,
         tuple(compiler.steps),
         compiler.size,
         compiler.checked,

@@ -90,14 +90,21 @@ def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One formula on the path to the deciding predicate."""
+    """One formula on the path to the deciding predicate.
 
-    formula: Formula  # the formula
-    time: float  # time in s at which it was evaluated
-    value: float  # its robustness at that time
-    # Start and end in s of its operator's window; None if it has no window.
+    Attributes:
+        formula: the formula.
+        time: time in s at which it was evaluated.
+        value: its robustness at that time.
+        window: start and end in s of its operator's window; None if it has no window.
+        text: what happened here, in words; empty within a chain of ``and`` or ``or``.
+    """
+
+    formula: Formula
+    time: float
+    value: float
     window: tuple[float, float] | None
-    text: str  # what happened here, in words; empty within a chain of ``and`` or ``or``
+    text: str
 
 
 @dataclass(frozen=True, slots=True)

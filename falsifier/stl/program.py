@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import TIME_TOLERANCE, Trajectory
+from falsifier.core.words import counted
 from falsifier.errors import MonitorError, did_you_mean
 from falsifier.stl.formula import Formula, Predicate
 
 Floats = NDArray[np.float64]
-_TIME_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Changes a buffer; returns whether a checked value is not finite.
 Operation = Callable[[Floats], bool]
 # Fills ``out`` from none, one or two operands. The first operand of a sliding window is longer than the
@@ -172,7 +172,6 @@ class Program:
     signals: tuple[str, ...]  # names of the signals, in their order in the buffer
     step: float  # sampling step in s
     samples: int  # number of samples of one trajectory
-    times: NDArray[np.float64]  # the time grid in s, shape (n,)
     steps: tuple[Operation, ...]  # what fills the buffer, in order
     size: int  # length of the buffer
     # The predicate that each check is for, and its location, by the number of the step.
@@ -185,23 +184,17 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
     Raises:
         MonitorError: if the trajectory cannot be evaluated.
     """
-    n, times = program.samples, trajectory.times
-    if len(times) != n:
+    n, end = program.samples, (program.samples - 1) * program.step
+    last = float(trajectory.times[-1])
+    if len(trajectory) != n or abs(last - end) > TIME_TOLERANCE * program.step:
         raise MonitorError(
-            f"the trajectory has {len(times)} recorded times, expected {n} from 0 s to "
-            f"{(n - 1) * program.step:g} s every {program.step:g} s"
+            f"the trajectory has {counted(len(trajectory), 'recorded time')} up to {last:g} s, expected {n} "
+            f"up to {end:g} s, one every {program.step:g} s"
         )
     start = 0
     for name in program.signals:
         buffer[start : start + n] = trajectory[name]
         start += n
-    uneven = np.absolute(times - program.times)
-    if not uneven.max() <= _TIME_TOLERANCE * program.step:
-        position = int(np.flatnonzero(~(uneven <= _TIME_TOLERANCE * program.step))[0])
-        raise MonitorError(
-            f"the time grid is not uniform: recorded time {position} is {times[position]:g} s, expected "
-            f"{position * program.step:g} s"
-        )
     problem = _run(program, buffer, start)
     if problem:
         raise MonitorError(problem)

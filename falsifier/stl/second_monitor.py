@@ -51,10 +51,8 @@ def robustness(formula: Formula, trajectory: Trajectory) -> float:
 
     Raises:
         FormulaError: if the bound of a window is not a multiple of the trajectory's step.
-        MonitorError: if the trajectory is empty, too short, not finite or lacks a signal, or rtamt fails.
+        MonitorError: if the trajectory is too short, not finite or lacks a signal, or rtamt fails.
     """
-    if len(trajectory) == 0:
-        raise MonitorError("the trajectory is empty")
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
     # In samples, as each bound may be off its sample by a little, and their sum by more.
     if round(needed / (trajectory.step or 1.0)) >= len(trajectory):

@@ -10,9 +10,9 @@ from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverag
 from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted, listed
+from falsifier.core.words import aligned, counted, listed, with_unit
 from falsifier.stl.margins import margin_words, signed
-from falsifier.views.text import Fact, aligned, llm_use
+from falsifier.views.text import Fact, llm_use
 
 # Lists are cut after this many entries; JSON has all.
 _SHOWN = 8
@@ -39,7 +39,7 @@ def coverage_text(found: Coverage, name: str) -> str:
     if found.outputs:
         lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
         lines += _indented(
-            (_named(o.name, o.unit), f"{o.lows.min():.6g} to {o.highs.max():.6g}")
+            (with_unit(o.name, o.unit), f"{o.lows.min():.6g} to {o.highs.max():.6g}")
             for o in sorted(found.outputs, key=lambda o: o.name)
         )
     if found.modes:
@@ -108,7 +108,7 @@ def _range_row(r: RangeCoverage) -> tuple[str, ...]:
     tried = "nothing" if r.low is None else f"{r.low:.6g} to {r.high:.6g}"
     changes = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces.get(pace))
     return (
-        _named(r.searched.name, r.searched.unit),
+        with_unit(r.searched.name, r.searched.unit),
         f"{r.searched.low:.6g} to {r.searched.high:.6g}",
         tried,
         f"{r.tried} of {len(r.parts)}",
@@ -149,10 +149,6 @@ def _mode_row(mode: ModeCoverage) -> tuple[str, str]:
 def _cut(entries: Sequence[str]) -> str:
     more = [f"{len(entries) - _SHOWN} more"] if len(entries) > _SHOWN else []
     return ", ".join([*entries[:_SHOWN], *more])
-
-
-def _named(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
 def formalized_text(found: Formalized) -> str:

@@ -5,10 +5,9 @@ from contextlib import contextmanager
 from time import monotonic
 
 from falsifier.campaigns import Progress, RunProgress
-from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.stl.margins import signed
-from falsifier.views.terminal import error_console, live_line, unbroken
+from falsifier.views.terminal import error_console, line_writer, live_line, unbroken
 
 Show = Callable[[Progress], None]
 Write = Callable[[str], None]
@@ -21,10 +20,7 @@ _LINE_PERIOD = 30.0
 def campaign_display(*, quiet: bool = False) -> Iterator[Show]:
     """Show a campaign's progress while the context lasts."""
     console = error_console()
-
-    def write(text: str) -> None:
-        console.print(one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal)
-
+    write = line_writer(console)
     if quiet:
         yield lambda progress: None
     elif not console.is_terminal:

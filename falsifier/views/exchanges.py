@@ -36,8 +36,9 @@ def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
     first = f"before sample {one.samples[0].index + 1}" if one.samples else "at the end"
     asked = counted(len(one.exchanges), "question")
     tokens = sum(exchange.usage.tokens for exchange in one.exchanges)
+    seconds = sum(exchange.seconds for exchange in one.exchanges)
     came = "; ".join(o.text or "not simulated" for o in one.samples) or "no candidate"
-    heading = f"{asked} {first}, {tokens} tokens, {one.question_seconds:.3g} s: {came}"
+    heading = f"{asked} {first}, {tokens} tokens, {seconds:.3g} s: {came}"
     shown = []
     for exchange in one.exchanges:
         shown.append(exchange_html(exchange, before))

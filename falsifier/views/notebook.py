@@ -62,11 +62,6 @@ def problem_html(problem: Problem) -> str:
     return join(el("b", problem.name), table((), facts), table(header, rows))
 
 
-def verdict_html(verdict: Verdict) -> str:
-    """What broke, the robustness, and what decided it."""
-    return table((), [*broken_facts(verdict), *margin_facts(verdict, {})])
-
-
 def evaluation_html(evaluation: Evaluation) -> str:
     """What broke, the candidate, and what decided; without a verdict, the reason."""
     verdict, candidate = evaluation.verdict, evaluation.candidate
@@ -112,7 +107,7 @@ def result_html(result: Result) -> str:
 
 _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
     Problem: problem_html,
-    Verdict: verdict_html,
+    Verdict: lambda verdict: table((), [*broken_facts(verdict), *margin_facts(verdict, {})]),
     Evaluation: evaluation_html,
     Trajectory: trajectory_html,
     Result: result_html,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted
@@ -25,10 +25,7 @@ from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
 from falsifier.views.html import el, join
-from falsifier.views.terminal import error_console, live_line, unbroken
-
-if TYPE_CHECKING:
-    from rich.console import Console
+from falsifier.views.terminal import error_console, line_writer, live_line, unbroken
 
 # Number of failed simulations from which on a warning is due.
 _WARNED_FAILURES = 3
@@ -44,7 +41,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
         yield lambda event: None
     elif console.is_terminal and not console.is_jupyter:
         with live_line(console) as update:
-            line = _Line(lambda line: update(f"{line.title}: {line.text}"), _writer(console))
+            line = _Line(lambda line: update(f"{line.title}: {line.text}"), line_writer(console))
 
             def tell(_name: str, reached: float, stop_time: float) -> None:
                 update(f"{line.title}: simulated {reached:.4g} of {stop_time:g} s")
@@ -63,7 +60,7 @@ def progress() -> Listener:
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
         return _Line(_show_in_notebook, keep=None)  # there is no place for more lines
-    news, write = News(), _writer(console)
+    news, write = News(), line_writer(console)
 
     def show(event: Event) -> None:
         told = news.lines(event)
@@ -73,12 +70,6 @@ def progress() -> Listener:
             write(line)
 
     return unbroken(show)
-
-
-def _writer(console: "Console") -> Callable[[str], None]:
-    return lambda text: console.print(
-        one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal
-    )
 
 
 def _show_in_notebook(line: "_Line") -> None:

@@ -31,6 +31,13 @@ def error_console() -> "Console":
     return ErrorConsole(stderr=True)
 
 
+def line_writer(console: "Console") -> Callable[[str], None]:
+    """Return what prints a text as one plain line."""
+    return lambda text: console.print(
+        one_line(text), highlight=False, markup=False, soft_wrap=not console.is_terminal
+    )
+
+
 def unbroken(show: Callable[[T], None]) -> Callable[[T], None]:
     """Return a display that falls silent when its stream can no longer be written to."""
     silent = False

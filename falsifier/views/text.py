@@ -1,7 +1,7 @@
 """The result of a run as text or JSON."""
 
 import shlex
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
 from falsifier.stl import Verdict
@@ -26,8 +27,9 @@ Fact = tuple[str, str]
 
 def result_text(result: Result) -> str:
     """Format one result as text."""
-    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}{_untested(result)}"
-    lines = [f"{head} ({seconds_text(result.spent)})", *fact_lines(result_facts(result))]
+    head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
+    head += f"{untested(result.findings)} ({seconds_text(result.spent)})"
+    lines = [head, *fact_lines(result_facts(result))]
     if result.directory is not None:
         lines.append(f"  files          {result.directory}")
         if result.counterexample is not None:
@@ -73,8 +75,9 @@ def result_facts(result: Result) -> list[Fact]:
     return facts
 
 
-def _untested(result: Result) -> str:
-    return ", and a part of it was not tested" if any(f.untested for f in result.findings) else ""
+def untested(findings: Iterable[Finding]) -> str:
+    """Say, at the end of a result, that something was not tested; empty if all was."""
+    return ", and a part of it was not tested" if any(f.untested for f in findings) else ""
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -87,7 +90,7 @@ def results_text(results: Sequence[Result]) -> str:
         where = "" if found is None else f", {_picture(result)}"
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
-            f"{result.spent.simulations_text}{_untested(result)}{robustness}{where}"
+            f"{result.spent.simulations_text}{untested(result.findings)}{robustness}{where}"
         )
         below = [] if found is None else list(broken_lines(found.evaluation.verdict))
         below += [f"note: {finding.text}" for finding in result.findings]
@@ -167,25 +170,6 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact
 def fact_lines(facts: Iterable[Fact]) -> list[str]:
     """Return facts as rows of text."""
     return [f"  {name:<14} {text}" for name, text in facts]
-
-
-def aligned(
-    rows: Iterable[Sequence[str]], *, right: Collection[int] = (), widest: int | None = None
-) -> list[str]:
-    """Return the rows of a table as lines with aligned columns, those of some numbers aligned right.
-
-    Cells longer than the widest column push the rest of their row to the right.
-    """
-    rows = list(rows)
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    if widest is not None:
-        widths = [min(width, widest) for width in widths]
-    lines = []
-    for row in rows:
-        cells = enumerate(zip(row, widths, strict=True))
-        padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
-        lines.append("  ".join(padded).rstrip())
-    return lines
 
 
 def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:

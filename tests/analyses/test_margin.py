@@ -90,8 +90,8 @@ def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
         ("G[0,10] (x <= {limit})", (0, 10**400), "between: expected a finite number"),
         ("G[0,10] (x <= {limit} - {limit})", (0, 1), "robustness is the same"),
         ("G[0,10] (abs(x - {limit}) <= 1)", (0, 1), "changes in either direction"),
-        ("G[0,10] (x <= {limit}", (0, 1), r"vary: expected '\)' before the end"),
-        ("G[0,{limit}] (x <= 1)", (5, 50), "vary: .*50"),
+        ("G[0,10] (x <= {limit}", (0, 1), r"vary with .* = 0: expected '\)' before the end"),
+        ("G[0,{limit}] (x <= 1)", (5, 50), r"vary with \{limit\} = 50: .*50 s"),
     ],
 )
 def test_wrong_questions_are_refused(vary: str, between: tuple[float, float], said: str) -> None:

@@ -1,5 +1,4 @@
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -172,20 +171,22 @@ def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None
 
 
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
-    own = folder / "keep.fmu"
-    own.write_bytes(b"PK mine")
+    for own in ("keep.fmu", "keep.json"):
+        (folder / own).write_bytes(b"PK mine")
+    (folder / "folder.json").mkdir()
     (folder / "s.png").write_bytes(b"\x89PNG mine")
     (folder / "my.toml").write_text("# AT\n")
     (folder / "others").mkdir()
     (folder / "others" / "input.csv").write_text("mine")
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     for arguments, why in (
-        (["explain", "run", "--shrink", "--out", "keep.fmu"], "exists and is kept"),
+        (["explain", "run", "--shrink", "--out", "keep.json"], "exists and is kept"),
+        (["explain", "run", "--shrink", "--out", "x.csv"], "x.csv: expected a file name that ends in .json"),
         (
             ["explain", "run", "--shrink", "--out", "run/counterexample.json"],
             "is the original, which is",
         ),
-        (["explain", "run", "--shrink", "--out", os.devnull], "is not a file that can be replaced"),
+        (["explain", "run", "--shrink", "--out", "folder.json"], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is kept"),
         (["report", "run", "--csv", "keep.fmu"], "exists and is kept"),
         (["report", "run", "--markdown", "--out", "my.toml"], "exists and is kept"),
@@ -195,13 +196,16 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
             "s.png exists and is kept",
         ),
         (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is kept"),
-        (["export", "run", "--out", "run"], "run has other files, which are kept"),
-        (["export", "run", "--out", "others"], "others has other files, which are kept"),
+        (["export", "run", "--out", "run"], "run has files, which are kept"),
+        (["export", "run", "--out", "others"], "others has files, which are kept"),
+        (["export", "run", "--store", "s", "--out", "o"], "--out: --store writes nothing else"),
+        (["report", "run", "--csv", "x.csv", "--arch-comp", "./x.csv"], "expected a file for each"),
+        (["report", "run", "--csv", "x", "--out", "x"], "expected a file for each"),
     ):
         done = run(folder, *arguments)
         assert (done.code, why in done.err) == (2, True), done.err
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
-    assert [run(folder, "export", "run", "--out", "again").code for _ in range(2)] == [0, 0]
+    assert [run(folder, "export", "run", "--out", "again").code for _ in range(2)] == [0, 2]
     assert [run(folder, "report", "run", "--out", "r.html").code for _ in range(2)] == [0, 0]
 
 
@@ -220,5 +224,20 @@ def test_a_run_that_falsified_nothing_is_asked_about_its_nearest_miss(tmp_path: 
     assert all((tmp_path / "r" / name).exists() for name in pictures)
     shrunk = falsifier("simulate", never, "--inputs", "r/shrunk.csv", cwd=tmp_path)
     assert shrunk.code == 0 and "not violated by these inputs" in shrunk.out
+    (tmp_path / "r" / "shrunk.csv").write_text('"time","u"\n0,0.5\n')
+    for out, said in ((), "shrunk.csv exists and is kept"), (("--out", "x.json"), "ends in .csv"):
+        kept = falsifier("explain", "r", "--shrink", *out, cwd=tmp_path)
+        assert (kept.code, said in kept.err) == (2, True), kept.err
     refused = falsifier("explain", "r", "--map", "--at-most", "0.1", cwd=tmp_path)
     assert refused.code == 2 and "--at-most: applies to --shrink only" in refused.err
+
+
+def test_a_nearest_miss_that_becomes_a_violation_is_written_as_named(tmp_path: Path) -> None:
+    (tmp_path / "u.csv").write_text("time,u\n0,0.55\n4,0.5\n10,0.58\n")
+    hard = ("run", "python:tests.problems:hard", "--inputs", "u.csv", "--budget", "1", "--quiet")
+    assert falsifier(*hard, "--out", "r", cwd=tmp_path).code == 0
+    done = falsifier("explain", "r", "--shrink", "--out", "x.csv", "--json", cwd=tmp_path)
+    assert done.json["outcome"] == "confirmed", done.err
+    assert done.json["files"] == ["x.csv", "x.json", "x.png"]
+    for again, target in (("x.csv", ["simulate", hard[1], "--inputs"]), ("x.json", ["replay"])):
+        assert falsifier(*target, again, cwd=tmp_path).code == 1

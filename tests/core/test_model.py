@@ -80,7 +80,7 @@ def test_what_goes_wrong_is_a_failed_simulation(
     [
         ({"stop_time": 0.0}, "stop_time: expected a positive number, got 0.0"),
         ({"output_interval": -0.1}, "output_interval: expected a positive number"),
-        ({"output_interval": 0.3}, "not an integer multiple of output_interval = 0.3 s; try .* 0.333333"),
+        ({"output_interval": 0.3}, "not an integer multiple of output_interval = 0.3 s; try .* = 0.2$"),
         ({"output_interval": 2.0}, "not an integer multiple of output_interval = 2 s; try .* 1$"),
         ({"step_size": 0.0}, "step_size: expected a positive number"),
         ({"time_limit": math.inf}, "time_limit: expected a finite number"),
@@ -113,6 +113,37 @@ def test_missing_signals_and_unequal_lengths_are_named() -> None:
         TRAJECTORY["z"]
     with pytest.raises(MonitorError, match="'x' has 3 samples, expected 11 as in the time grid"):
         Trajectory(TIMES, {"x": np.zeros(3)})
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ([0.0, 1.0, 1.5], "got 1.5 s after 1 s as recorded time 2"),
+        ([0.0, -1.0, -2.0], "got -1 s after 0 s as recorded time 1"),
+        ([0.0, 0.0, 0.0], "got 0 s after 0 s as recorded time 1"),
+        ([0.0, np.nan, 2.0], "got nan s after 0 s"),
+        ([1.0, 2.0, 3.0], r"expected 0 s as the first one, got \[1.0\]"),
+        ([], r"expected 0 s as the first one, got \[\]"),
+        ([[0.0, 1.0], [2.0, 3.0]], r"times: expected an array of numbers of shape \(n,\)"),
+        (["0", "1"], "times: expected an array of numbers"),
+    ],
+)
+def test_times_that_are_no_grid_are_refused(times: list[float], said: str) -> None:
+    with pytest.raises(MonitorError, match=said):
+        Trajectory(np.array(times), {"x": np.array(times)})
+
+
+def test_columns_that_are_no_numbers_are_refused() -> None:
+    for column in (np.array(["a"] * 11), np.array([None] * 11), np.zeros((11, 2))):
+        with pytest.raises(MonitorError, match="x: expected an array of numbers"):
+            Trajectory(TIMES, {"x": column})
+
+
+@pytest.mark.parametrize(("stop_time", "samples"), [(1e4, 1_000_001), (50.0, 20_001), (7.0, 3), (0.0, 1)])
+def test_grids_of_simulations_are_taken(stop_time: float, samples: int) -> None:
+    times = np.linspace(0.0, stop_time, samples)
+    for each in (times, np.arange(samples, dtype=np.float64) * (stop_time / max(1, samples - 1))):
+        assert len(Trajectory(each, {"x": each})) == samples
 
 
 @pytest.mark.parametrize(

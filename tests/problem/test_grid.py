@@ -73,7 +73,7 @@ def test_times_are_those_that_were_meant() -> None:
 
 
 def test_a_stated_interval_that_does_not_fit_names_one_that_does(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"output_interval = 0\.25 fits all times"):
+    with pytest.raises(SpecError, match=r"output_interval=0\.25 fits all times"):
         Problem.from_fmu(
             fmu_path("Lag_2"), "G[0,0.75] (y <= 10)", inputs={"u": (-1.0, 1.0)}, output_interval=0.5
         )

@@ -81,7 +81,7 @@ def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
             {"options": {"values": ["throttle=3", "finalDrive=3"]}},
             "nothing to search: a value keeps throttle and finalDrive constant",
         ),
-        ({"options": {"output_interval": 0.03}}, "output_interval: the stop time"),
+        ({"options": {"output_interval": 0.03}}, "output_interval: stop_time = 40 s is not"),
     ],
 )
 def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -> None:

@@ -3,12 +3,15 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter, sleep
+from typing import Any
 
 import pytest
 from numpy import int64
 
 from falsifier.core.files import bundled
 from falsifier.engines import make_engine
+from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
@@ -19,6 +22,7 @@ from falsifier.record.journal import holds_run
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Event, RunStarted
+from falsifier.search.make_engines import make_engines
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
 from tests.problems import easy, easy_again, hard, impossible
@@ -64,6 +68,17 @@ def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None
     assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
     assert [r.problem.name for r in resume(tmp_path)] == ["low", "high"]
     assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
+
+
+def test_the_time_of_a_run_begins_with_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    def slowly(*arguments: Any) -> list[Engine]:
+        sleep(0.2)  # as if its modules were imported
+        return make_engines(*arguments)
+
+    monkeypatch.setattr("falsifier.record.run.make_engines", slowly)
+    began = perf_counter()
+    result = falsify(easy(), "corners", budget=5)
+    assert result.spent.seconds <= perf_counter() - began - 0.2
 
 
 def test_the_budget_of_a_run_that_has_falsified_stays_as_it_was_given(tmp_path: Path) -> None:

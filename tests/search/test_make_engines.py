@@ -58,7 +58,8 @@ def test_names_that_do_not_go_together_are_refused_before_anything_is_made(
     engine: str | None, llm: str | None, settings: dict[str, str], named: str
 ) -> None:
     with pytest.raises(SpecError, match=named):
-        check_names(request(engine, llm, **settings))
+        made = request(engine, llm, **settings)
+        check_names(made.engine, made.llm)
 
 
 def test_a_limit_on_money_needs_a_price() -> None:

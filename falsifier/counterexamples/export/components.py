@@ -74,9 +74,7 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
         for variable in (*member.description.info.inputs, *member.description.info.outputs)
         if variable.kind != "string"
     ]
-    step = experiment.stop_time / round(
-        experiment.stop_time / (experiment.step_size or experiment.output_interval)
-    )
+    step = experiment.stop_time / round(experiment.stop_time / experiment.step)
     recorded = system.simulate(
         candidate.signals,
         {**problem.parameters, **candidate.parameters},

@@ -34,7 +34,7 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     there: one row with the value before and one with the value after. Redundant rows are omitted.
     """
     experiment = problem.experiment
-    steps = round(experiment.stop_time / (experiment.step_size or experiment.output_interval))
+    steps = round(experiment.stop_time / experiment.step)
     times = np.arange(steps + 1, dtype=np.float64) * np.float64(experiment.stop_time / steps)
     columns = {}
     for variable in problem.info.inputs:
@@ -68,8 +68,8 @@ def _values(
     if variable.name in candidate.signals:
         values = candidate.signals[variable.name].sample(times)
         return values if variable.kind == "real" else np.rint(values)
-    value = problem.parameters.get(variable.name, variable.start)
-    return np.full(times.shape, float(value)) if isinstance(value, int | float) else None
+    value = problem.parameters.get(variable.name, variable.start_number)
+    return None if value is None else np.full(times.shape, float(value))
 
 
 def _steps(variable: Variable, signal: Signal) -> bool:
@@ -81,7 +81,8 @@ def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.f
     constant = np.ones(table.times.shape)
     return {
         declared: [
-            table.columns[e] if e in table.columns else constant * _start_of(model, e) for e in elements
+            table.columns[e] if e in table.columns else constant * (model.info[e].start_number or 0.0)
+            for e in elements
         ]
         for declared, elements in _by_declaration(model, table.columns).items()
     }
@@ -105,7 +106,7 @@ def write_json(start: Mapping[str, float | str], path: Path, model: Model) -> Pa
     texts = {name: value for name, value in start.items() if isinstance(value, str)}
     shown: dict[str, object] = {**texts}
     for declared, elements in _by_declaration(model, [n for n in start if n not in texts]).items():
-        values = [start[e] if e in start else _start_of(model, e) for e in elements]
+        values = [start[e] if e in start else model.info[e].start_number or 0.0 for e in elements]
         shown[declared] = values if len(values) > 1 else values[0]
     path.write_text(json.dumps(shown, indent=2) + "\n", encoding="utf-8")
     return path
@@ -155,9 +156,3 @@ def _by_declaration(model: Model, names: Iterable[str]) -> dict[str, tuple[str, 
         return {name: (name,) for name in names}
     declared = dict.fromkeys(model.place(name)[0] for name in names)
     return {name: model.elements(name) for name in declared}
-
-
-def _start_of(model: Model, name: str) -> float:
-    """Return the model's own start value; 0 if it states none."""
-    start = model.info[name].start
-    return float(start) if isinstance(start, int | float) else 0.0

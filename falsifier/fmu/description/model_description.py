@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from math import isfinite
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -227,7 +228,21 @@ def _notes(
         said.append(f"binary variables are ignored: {_listed(binary)}")
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
         said.append(f"two names of one input: {_listed(aliases)}; use the second")
+    if doubtful := [text for v in variables if (text := _doubt(v))]:
+        said.append(f"the description contradicts itself: {_listed(doubtful)}")
     return tuple(said)
+
+
+def _doubt(v: Variable) -> str:
+    """Say what of a variable's limits and start value cannot be meant; empty if nothing is wrong."""
+    if v.low is not None and v.high is not None and v.low > v.high:
+        return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}"
+    if (start := v.start_number) is None:
+        return ""
+    if not isfinite(start):
+        return f"start of {v.name!r} is {start}"
+    excess = v.excess(start, start)
+    return excess and f"start = {start:g} {excess}"
 
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from falsifier.core.model import GRID_ROUNDING, Interface
+from falsifier.core.model import GRID_ROUNDING, Interface, whole_steps
 from falsifier.errors import SpecError
 from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process import encoding
@@ -128,14 +128,7 @@ def own_steps(member: Member, step: float, stop_time: float) -> int:
             "never step; shorten its step",
             key=key,
         )
-    count = max(round(own / step), 1)
-    if abs(own / step - count) > GRID_ROUNDING * count:
-        raise SpecError(
-            f"{own:g} s is not an integer multiple of the communication step {step:g} s; set step_size = "
-            f"{own / (count + (own > count * step)):.12g}, or another step here",
-            key=key,
-        )
-    return count
+    return whole_steps("step", own, "step_size", step, key=key)
 
 
 def _is_held(description: Description, interface: Interface, name: str) -> bool:

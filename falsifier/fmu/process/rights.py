@@ -63,7 +63,7 @@ class Rights:
     network: bool = True
 
     @classmethod
-    def of(cls, allow: Collection[str], deny: Collection[str] = ()) -> "Rights":
+    def of(cls, allow: Collection[str] = (), deny: Collection[str] = ()) -> "Rights":
         """Return the rights by what a user allows and denies.
 
         Args:
@@ -78,14 +78,14 @@ class Rights:
             kind, path = _kind_and_path(word)
             if path is not None:
                 if not path.exists():
-                    raise SpecError(f"allow {word}: there is no such file or folder; create it first")
+                    raise SpecError(f"{word}: there is no such file or folder; create it first", key="allow")
                 paths[kind].append(path.resolve())
             elif word != _PROGRAMS_WORD:
                 near = did_you_mean(word, ("write:PATH", "read:PATH", _PROGRAMS_WORD))
-                raise SpecError(f"allow: unknown {word!r}; {near}")
+                raise SpecError(f"unknown {word!r}; {near}", key="allow")
         for word in deny:
             if word != _NETWORK_WORD:
-                raise SpecError(f"deny: unknown {word!r}; {did_you_mean(word, (_NETWORK_WORD,))}")
+                raise SpecError(f"unknown {word!r}; {did_you_mean(word, (_NETWORK_WORD,))}", key="deny")
         programs, network = _PROGRAMS_WORD in allow, _NETWORK_WORD not in deny
         return cls(tuple(paths["write"]), tuple(paths["read"]), programs, network)
 

@@ -118,7 +118,7 @@ class System(Isolated):
         driven = dict(signals)
         for variable in self.frame.inputs:
             if variable.name not in signals:
-                start = numbers.pop(variable.name, float(variable.start or 0.0))
+                start = numbers.pop(variable.name, variable.start_number or 0.0)
                 driven[variable.name] = Signal((0.0,), (start,), "constant")
         tables = {name: signal.pieces(experiment.stop_time) for name, signal in driven.items()}
         return simulate(self.order, experiment, tables, numbers)
@@ -130,7 +130,7 @@ class System(Isolated):
             SpecError: naming the component and steps that fit.
         """
         for member in self.network.members:
-            own_steps(member, experiment.step_size or experiment.output_interval, experiment.stop_time)
+            own_steps(member, experiment.step, experiment.stop_time)
 
     @property
     def order(self) -> Order:

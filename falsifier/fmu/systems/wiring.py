@@ -171,7 +171,7 @@ class _Joiner:
         extrapolation = connection.extrapolation or self._coupling.extrapolation
         if connection.extrapolation == "linear" and not b.is_continuous:
             raise SpecError('only continuous real inputs follow a line; use extrapolation = "hold"')
-        start = float(b.start) if isinstance(b.start, int | float) else 0.0
+        start = b.start_number or 0.0
         is_linear = extrapolation == "linear" and b.is_continuous
         return Link(source, target, factor, offset, start, is_linear), note
 

@@ -14,8 +14,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace, ValueKind
 from falsifier.core.trajectory import Trajectory
-from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.prompts.observations import monitor_for
+from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts.view import View
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import Verdict
@@ -75,7 +74,8 @@ class Disguise:
         if trajectory is not None:
             trajectory = Trajectory(trajectory.times, self.hidden_values(trajectory.columns))
         if verdict is not None:
-            told = monitor_for(self.view).evaluate(trajectory) if trajectory else self.hidden_verdict(verdict)
+            monitor = compiled(self.view.requirement.formula, self.view.experiment)
+            told = monitor.evaluate(trajectory) if trajectory else self.hidden_verdict(verdict)
             verdict = replace(told, robustness=verdict.robustness)
         candidate = self.hidden_candidate(evaluation.candidate)
         return Evaluation(candidate, evaluation.status, verdict, trajectory=trajectory)

@@ -3,13 +3,13 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.evaluation.evaluate import Evaluation
+from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
     Array,
@@ -21,7 +21,7 @@ from falsifier.llm.prompts.courses import (
 )
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
 from falsifier.llm.prompts.view import View
-from falsifier.stl import Diagnosis, Formula, Monitor, Verdict
+from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
@@ -78,7 +78,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
     if trajectory is None:
         return Observed((line,), (line,), line)
-    monitor = monitor_for(view)
+    monitor = compiled(view.requirement.formula, view.experiment)
     diagnosis = monitor.diagnose(trajectory)
     reasons = tuple(_reasons(verdict, diagnosis))
     over_time = monitor.courses(trajectory)
@@ -142,16 +142,6 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{_unit(view, name)}")
     return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
-
-
-def monitor_for(view: View) -> Monitor:
-    """Monitor of the requirement on its output grid; compiled once per requirement."""
-    return _monitor(view.requirement.formula, view.experiment.output_interval, view.experiment.samples)
-
-
-@lru_cache(maxsize=64)
-def _monitor(formula: Formula, step: float, samples: int) -> Monitor:
-    return Monitor(formula, step=step, samples=samples)
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:

@@ -15,7 +15,7 @@ from falsifier.analyses.coverage import (
     edges_of,
     labels_of,
 )
-from falsifier.core.words import counted
+from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, whole_ticks
 
@@ -95,7 +95,7 @@ def _plot_output(ax: "Axes", o: OutputCoverage) -> None:
     ax.fill_between(o.times, o.lows, o.highs, color=_TRIED, linewidth=0)
     for line in (o.lows, o.highs):
         ax.plot(o.times, line, color=OUTPUT, linewidth=0.8)
-    ax.set(xlabel="time [s]", ylabel=caption(f"{o.name} [{o.unit}]" if o.unit else o.name))
+    ax.set(xlabel="time [s]", ylabel=caption(with_unit(o.name, o.unit)))
     ax.set_title("smallest and largest value", fontsize=9)
 
 
@@ -127,7 +127,7 @@ def _whole(axis: "Axis", r: RangeCoverage) -> None:
 
 
 def _label(r: RangeCoverage) -> str:
-    return caption(f"{r.searched.name} [{r.searched.unit}]" if r.searched.unit else r.searched.name)
+    return caption(with_unit(r.searched.name, r.searched.unit))
 
 
 def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":

@@ -13,6 +13,7 @@ from falsifier.analyses.coverage import labels_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import with_unit
 from falsifier.record.manifest import InputRecord
 from falsifier.stl import Formula
 from falsifier.stl.breach import compared_sides
@@ -141,9 +142,8 @@ def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) 
     )
     shortfalls = verdict.breach.shortfalls if verdict and verdict.breach else ()
     own = [shortfall for shortfall in shortfalls if shortfall.quantity == str(expression)]
-    unit = unit_of(expression, trajectory.units)
     return Panel(
-        f"{expression} [{unit}]" if unit else str(expression),
+        with_unit(str(expression), unit_of(expression, trajectory.units)),
         trajectory.times,
         _evaluated(expression, trajectory),
         bounds,
@@ -156,7 +156,7 @@ def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) 
 def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
     signal = candidate.signals[r.name]
     return Panel(
-        f"{r.name} [{r.unit}]" if r.unit else r.name,
+        with_unit(r.name, r.unit),
         trajectory.times,
         _drawable(signal.held(None).sample(trajectory.times)),
         points=tuple(zip(signal.times, map(float, _drawable(signal.values)), strict=True)),

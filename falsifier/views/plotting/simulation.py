@@ -7,6 +7,7 @@ import numpy as np
 
 from falsifier.analyses.coverage import labels_of
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import with_unit
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -265,8 +266,7 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
     """Plot signals over time, those named or else all, one small panel per signal."""
     shown = [
-        Panel(f"{name} [{unit}]" if unit else name, trajectory.times, trajectory[name])
+        Panel(with_unit(name, trajectory.units.get(name, "")), trajectory.times, trajectory[name])
         for name in (trajectory.names if names is None else names)
-        for unit in [trajectory.units.get(name, "")]
     ]
     return plot_panels(shown, None)

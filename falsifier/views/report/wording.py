@@ -9,7 +9,7 @@ import numpy as np
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, with_unit
 from falsifier.counterexamples.store import shrunk_file
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from
@@ -19,7 +19,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
 from falsifier.views.report.content import Section, Shown, Side, spent_on
-from falsifier.views.text import Fact, broken_facts, margin_facts
+from falsifier.views.text import Fact, broken_facts, margin_facts, untested
 
 _BETWEEN = {
     "constant": "held until the next row",
@@ -68,10 +68,7 @@ def result_text(section: Section) -> str:
     count = counted(spent_on(runs).simulations, "simulation")
     if not any(run.finished for run in runs):
         return f"not finished: no violation in {count} so far"
-    tested = ""
-    if any(finding.untested for run in runs for finding in run.findings):
-        tested = ", and a part of it was not tested"
-    return f"no violation found in {count}{tested}"
+    return f"no violation found in {count}{untested(f for run in runs for f in run.findings)}"
 
 
 def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
@@ -95,8 +92,7 @@ def input_table(shown: Shown) -> Table:
     }
     header, columns = ["time [s]"], []
     for name, signal in signals.items():
-        unit = shown.units.get(name, "")
-        header.append(f"{name}{f' [{unit}]' if unit else ''}, {_course(signal)}")
+        header.append(f"{with_unit(name, shown.units.get(name, ''))}, {_course(signal)}")
         columns.append({time: f"{v:.6g}" for time, v in zip(signal.times, signal.values, strict=True)})
     times = sorted({time for column in columns for time in column})
     rows = [(f"{time:.6g}", *(column.get(time, "") for column in columns)) for time in times]

@@ -131,3 +131,20 @@ def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() 
     times = '<DefaultExperiment startTime="0" stopTime="-1" stepSize="0" tolerance="1e-6"/><ModelVariables>'
     (said,) = described(ROLES.replace("<ModelVariables>", times)).info.notes
     assert said == "ignored in the default experiment, as not greater than 0: stopTime = -1, stepSize = 0"
+
+
+@pytest.mark.parametrize(
+    ("attributes", "said"),
+    [
+        ('min="2" max="1" start="1.5"', "min = 2 of 'p' is greater than max = 1"),
+        ('start="NaN"', "start of 'p' is nan"),
+        ('min="0" max="1" start="5"', "start = 5 exceeds the model's limits for 'p', [0, 1]"),
+        ('min="0" max="1" start="1"', ""),
+    ],
+)
+def test_limits_and_start_values_that_cannot_be_meant_are_noted(attributes: str, said: str) -> None:
+    variable = f"""<ScalarVariable name="p" valueReference="7" causality="parameter" variability="fixed">
+        <Real {attributes}/></ScalarVariable>"""
+    text = ROLES.replace('"p"', '"q"').replace("<ModelVariables>", f"<ModelVariables>{variable}")
+    expected = (f"the description contradicts itself: {said}",) if said else ()
+    assert described(text).info.notes == expected

@@ -28,7 +28,7 @@ def test_wrong_names_are_refused_with_the_reason(
         make_plan(LAG, Experiment(1.0, 0.1, tuple(outputs)), inputs, parameters)
 
 
-@pytest.mark.parametrize(("step", "instead"), [(0.03, "0.0333333"), (0.2, "0.1")])
+@pytest.mark.parametrize(("step", "instead"), [(0.03, "0.02"), (0.2, "0.1")])
 def test_steps_must_fit(step: float, instead: str) -> None:
     with pytest.raises(SpecError, match=f"try step_size = {instead}") as caught:
         make_plan(LAG, Experiment(1.0, 0.1, ("y",), step_size=step), [], [])

@@ -64,7 +64,7 @@ def bundled(name: str) -> Case:
     """Twenty steps of a bundled system with the middle of its space."""
     problem = load_problem(name)
     assert isinstance(problem.model, System)
-    step = problem.experiment.step_size or problem.experiment.output_interval
+    step = problem.experiment.step
     candidate = problem.space.decode(problem.space.bounds.mean(axis=1))
     short = replace(problem.experiment, stop_time=20 * step, output_interval=step, step_size=None)
     return problem.model, short, candidate.signals, {**problem.parameters, **candidate.parameters}

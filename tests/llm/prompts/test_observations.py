@@ -8,8 +8,8 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
-from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.prompts.observations import monitor_for, observed
+from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
+from falsifier.llm.prompts.observations import observed
 from falsifier.llm.prompts.view import View
 from falsifier.testing import lag_problem
 
@@ -20,7 +20,7 @@ def seen(formula: str, x: NDArray[np.float64]) -> tuple[View, Evaluation]:
     """The lag's outputs replaced by a course of x."""
     problem = lag_problem(formula)
     trajectory = Trajectory(TIMES, {"x": x, "u": 0 * TIMES}, {"x": "m"})
-    verdict = monitor_for(View.of(problem)).evaluate(trajectory)
+    verdict = monitor_for(problem).evaluate(trajectory)
     candidate = Candidate({"u": Signal((0.0,), (0.0,), "constant")})
     return View.of(problem), Evaluation(candidate, "ok", verdict, "", trajectory)
 
