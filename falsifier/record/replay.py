@@ -126,6 +126,11 @@ def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
     again = Spent()
     for exchange in played:
         again = again.plus_requests(exchange.requests, exchange.usage)
-    numbers = ("calls", "timed_out", "prompt_tokens", "completion_tokens", "reasoning_tokens")
-    cost = None if spent.cost is None else max(0.0, round(spent.cost - (again.cost or 0.0), 12))
-    return Spent(cost=cost, **{name: getattr(spent, name) - getattr(again, name) for name in numbers})
+    return Spent(
+        calls=spent.calls - again.calls,
+        timed_out=spent.timed_out - again.timed_out,
+        prompt_tokens=spent.prompt_tokens - again.prompt_tokens,
+        completion_tokens=spent.completion_tokens - again.completion_tokens,
+        reasoning_tokens=spent.reasoning_tokens - again.reasoning_tokens,
+        cost=None if spent.cost is None else max(0.0, round(spent.cost - (again.cost or 0.0), 12)),
+    )

@@ -32,19 +32,24 @@ class Corrections:
         self._known = _by_block(inputs)
         count, cells, outputs = errors.shape
         filled = np.pad(errors, ((0, 0), (0, -cells % _BLOCK), (0, 0)))
-        self._errors = filled.reshape(count, -1, _BLOCK * outputs).swapaxes(0, 1).astype(np.float32)
+        by_block = filled.reshape(count, -1, _BLOCK * outputs).swapaxes(0, 1).astype(np.float32)
+        # One more column, so that a product with weights also returns their sum.
+        self._errors = np.pad(by_block, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
         self._outputs = outputs
 
     def at(self, inputs: Array) -> Array:
         """Return the errors expected at inputs, shape (m, cells, inputs), as (m, cells, outputs)."""
         count, cells, width = inputs.shape
         new, known = _by_block(inputs), self._known
-        squares = (new**2).sum(axis=2)[:, :, None] + (known**2).sum(axis=2)[:, None]
-        squares -= 2.0 * new @ known.swapaxes(1, 2)
-        so_far = np.arange(1.0, len(new) + 1.0, dtype=np.float32)[:, None, None] * width
-        weights = np.exp(np.cumsum(squares, axis=0) / so_far / (-2.0 * _WIDTH**2))
-        weights /= _NO_ERROR + weights.sum(axis=2, keepdims=True)
-        errors = (weights @ self._errors).swapaxes(0, 1)
+        # In place: these arrays are the largest of a plan.
+        distances = new @ known.swapaxes(1, 2)
+        distances *= -2.0
+        distances += (new**2).sum(axis=2)[:, :, None]
+        distances += (known**2).sum(axis=2)[:, None]
+        np.cumsum(distances, axis=0, out=distances)
+        distances /= np.arange(1, len(new) + 1, dtype=np.float32)[:, None, None] * (-2.0 * width * _WIDTH**2)
+        errors, total = np.split(np.exp(distances, out=distances) @ self._errors, [-1], axis=2)
+        errors = (errors / (_NO_ERROR + total)).swapaxes(0, 1)
         return np.asarray(errors.reshape(count, -1, self._outputs)[:, :cells])
 
 
