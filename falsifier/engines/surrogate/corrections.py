@@ -5,6 +5,8 @@ inputs say so (the discrepancy of a model: Kennedy and O'Hagan, J. R. Stat. Soc.
 weights are those of Nadaraya and Watson).
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from falsifier.engines.layout import Array
@@ -46,7 +48,8 @@ class Corrections:
         distances *= -2.0
         distances += (new**2).sum(axis=2)[:, :, None]
         distances += (known**2).sum(axis=2)[:, None]
-        np.cumsum(distances, axis=0, out=distances)
+        for before, own in pairwise(distances):
+            own += before
         distances /= np.arange(1, len(new) + 1, dtype=np.float32)[:, None, None] * (-2.0 * width * _WIDTH**2)
         errors, total = np.split(np.exp(distances, out=distances) @ self._errors, [-1], axis=2)
         errors = (errors / (_NO_ERROR + total)).swapaxes(0, 1)

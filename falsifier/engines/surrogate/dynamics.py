@@ -102,7 +102,8 @@ class LinearDynamics:
             after = dy[(k + lags) * n : (k + lags + 1) * n]
             np.matmul(self._own, dy[k * n : (k + lags) * n], out=after)
             after += self._driving @ drive[k * driven : (k + lags) * driven]
-            np.clip(after, -_FAR, _FAR, out=after)
+            np.minimum(after, _FAR, out=after)  # the two take half as long as np.clip
+            np.maximum(after, -_FAR, out=after)
         deviations = dy[(lags - 1) * n :].reshape(cells + 1, n, count).transpose(2, 0, 1)
         states = deviations * self._state_unit + self._base.states[: cells + 1]
         return np.asarray(np.clip(states, self._low, self._high))
