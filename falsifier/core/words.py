@@ -80,3 +80,12 @@ def listed(parts: Sequence[str]) -> str:
     ('a', 'a, b and c')
     """
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text; of one with more characters than this the beginning, marked as such.
+
+    >>> shortened("a short text", 20), shortened("a long text", 6)
+    ('a short text', 'a long ...')
+    """
+    return text if len(text) <= most else f"{text[:most]} ..."

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
@@ -278,7 +278,8 @@ class Questions:
         """A sample of a variant of our own: how much of it is told depends on those before it only."""
         candidate, verdict = evaluation.candidate, evaluation.verdict
         inputs = self._chosen(candidate)
-        notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
+        reason = shortened(" ".join(why.split()), _LONGEST_WHY)
+        notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
             failure = f"no verdict, the simulation {evaluation.outcome}".rstrip(": ")
             text = _text(inputs, failure, *notes)
@@ -355,8 +356,3 @@ def _counting(view: View) -> dict[str, dict[int, str]]:
         for name in view.experiment.outputs
         if view.kind(name) in ("integer", "enumeration") and name in view.info
     }
-
-
-def _shortened(why: str) -> str:
-    why = " ".join(why.split())
-    return why if len(why) <= _LONGEST_WHY else f"{why[:_LONGEST_WHY]} ..."
