@@ -106,13 +106,9 @@ class Briefing:
 
     def form(self, count: int) -> ReplyForm:
         """Return the form of replies with up to ``count`` candidates."""
-        return ReplyForm(
-            self.view.space,
-            named=self.variant.has("names"),
-            free=self.variant.has("freedom"),
-            count=count,
-            lessons=self.variant.has("lessons"),
-        )
+        space, has = self.view.space, self.variant.has
+        offered = space if has("freedom") else space.fixed
+        return ReplyForm(offered, named=has("names"), count=count, lessons=has("lessons"))
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
