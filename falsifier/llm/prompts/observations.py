@@ -140,7 +140,8 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
     there = []
     for name, value in trajectory.at(diagnosis.critical_time).items():
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
-        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{_unit(view, name)}")
+        unit = f" {unit}" if (unit := view.unit(name)) else ""
+        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{unit}")
     return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
 
 
@@ -211,8 +212,7 @@ def _predicates(
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
-    formula = view.requirement.formula
-    sides = {str(side): side for p in formula.predicates for side in (p.left, p.right)}
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns = {
         text: np.broadcast_to(side.evaluate(trajectory.columns), trajectory.times.shape)
         for text, side in sides.items()
@@ -236,8 +236,7 @@ def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array
 
 def told_accuracy(view: View, name: str, column: Array) -> float:
     """Distance from a signal, in its unit, up to which its course says nothing of being less exact."""
-    in_formula = name in view.requirement.formula.signals or name not in view.info
-    return (TOLERANCE if in_formula else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
+    return (TOLERANCE if _is_judged(view, name) else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
 
 
 def _drawn(
@@ -249,9 +248,8 @@ def _drawn(
     claimed = told_accuracy(view, name, column)
     wanted = np.full_like(inside.times, claimed)
     for predicate in view.requirement.formula.predicates:
-        if name in (str(predicate.left), str(predicate.right)):
-            left, right = (side.evaluate(inside.columns) for side in (predicate.left, predicate.right))
-            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(np.asarray(left) - np.asarray(right)))
+        if name in map(str, predicate.sides):
+            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
     return course(
         inside.times,
         column,
@@ -320,13 +318,17 @@ def _deciding(view: View, verdict: Verdict) -> set[str]:
     """What the deciding predicate compares."""
     formula = view.requirement.formula
     deciding = [p for p in formula.predicates if str(p) == verdict.predicate] or list(formula.predicates)
-    return {str(side) for p in deciding for side in (p.left, p.right)}
+    return {str(side) for p in deciding for side in p.sides}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
     """Decimals of a signal: more for signals of the formula, whose margin must be visible."""
-    in_formula = name in view.requirement.formula.signals or name not in view.info
-    return column_decimals(column, margin=abs(robustness) if in_formula else None)
+    return column_decimals(column, margin=abs(robustness) if _is_judged(view, name) else None)
+
+
+def _is_judged(view: View, name: str) -> bool:
+    """Whether the formula names a signal; what is compared and is no signal is a term of the formula."""
+    return name in view.requirement.formula.signals or name not in view.info
 
 
 def _clock(view: View) -> int:
@@ -334,8 +336,3 @@ def _clock(view: View) -> int:
     return min(
         6, max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
     )
-
-
-def _unit(view: View, name: str) -> str:
-    unit = view.unit(name)
-    return f" {unit}" if unit else ""

@@ -155,7 +155,7 @@ def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 
     The published models have outputs for such terms.
     """
-    sides = {str(side): side for p in view.requirement.formula.predicates for side in (p.left, p.right)}
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns: dict[str, Array] = {}
     for text, column in compared_columns(view, trajectory).items():
         names = sides[text].signals
@@ -169,9 +169,8 @@ def _clock(view: View, time: float) -> str:
 
 
 def _clock_decimals(formula: Formula) -> int:
-    windows = [f.window for f in formula.walk() if f.window]
-    bounds = (number_text(bound) for window in windows for bound in (window.start, window.end))
-    found = max((len(bound.partition(".")[2]) for bound in bounds), default=0)
+    limits = (number_text(limit) for window in formula.windows for limit in (window.start, window.end))
+    found = max((len(limit.partition(".")[2]) for limit in limits), default=0)
     return min(found, _MOST_CLOCK_DECIMALS) or 1
 
 
