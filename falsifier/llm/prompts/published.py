@@ -16,7 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
-from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, formula_text, reply_form
+from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, reply_form, requirement_text
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Formula
@@ -35,7 +35,6 @@ _TASK = (
     "Your task is to find {what} with which a system violates its specification. Each sample is judged by a "
     "number, its robustness: lower is better, and below 0 the specification is violated."
 )
-_REQUIREMENT = "Requirement, in Signal Temporal Logic with times in seconds:\n{formula}"
 _GUIDANCE = "Consider which combinations of values had the lower robustness."
 _GUIDANCE_ON_NUMBERS = "Consider what each number may stand for and how it may act on the system."
 _GUIDANCE_ON_MEANING = (
@@ -53,7 +52,7 @@ def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
     named, what = variant.has("names"), view.chosen
     sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
     if variant.has("requirement"):
-        sections.append(_REQUIREMENT.format(formula=formula_text(view.requirement.formula)))
+        sections.append(requirement_text(view.requirement.formula))
     if variant.has("outputs"):
         sections.append(_outputs(view))
     sections.append("\n".join(_numbers(view, named=named)))
