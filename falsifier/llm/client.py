@@ -144,15 +144,18 @@ class LiteLLMChat:
         sleep(delay)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Keep a valid reply."""
+        """Keep a valid reply, if the directory can be written: it is paid for, so that the run goes on."""
         if self.cache is None or reply.source == "cache":
             return
         path = self._place(self.cache, request)
-        path.parent.mkdir(parents=True, exist_ok=True)
         # Under a unique name first: several runs may store the same reply at the same time.
         partial = path.with_name(f"{path.name}.{uuid4().hex}")
-        partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
-        partial.replace(path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
+            partial.replace(path)
+        except OSError as error:
+            _LOG.warning("The reply is not kept for later runs: cannot write to %s (%s).", self.cache, error)
 
     def _place(self, cache: Path, request: ChatRequest) -> Path:
         asked = {

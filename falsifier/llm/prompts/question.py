@@ -223,7 +223,7 @@ class Questions:
         if is_own and self._samples:
             yield from self._standings()
         yield from notes
-        if lessons:
+        if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
         if waiting:
             yield "\n".join((_PENDING, *waiting))
