@@ -136,10 +136,8 @@ class LLMEngine:
 
         try:
             found = converse(self._chat, request, read, self._on_exchange)
-        except NoValidReplyError:
-            raise
         except ChatError as error:
-            if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
+            if dispensable and not isinstance(error, NoValidReplyError):  # whose replies are recorded
                 lost = Exchange(
                     llm=self._chat.llm, messages=messages, reply=None, lost=error.lost, problem=str(error)
                 )

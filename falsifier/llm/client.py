@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
-from itertools import count
 from pathlib import Path
 from random import uniform
 from time import perf_counter, sleep
@@ -110,18 +109,19 @@ class LiteLLMChat:
                 free = {"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"}
                 return kept.model_copy(update=free)
         lost: list[Usage] = []
+        attempt = 1
         try:
-            for attempt in count(1):
+            while True:
                 try:
                     reply = self._asked(request)
                     return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
                 except TransientChatError as error:
                     lost += [error.lost] if error.lost else []
                     self._wait(error, attempt, request)
+                    attempt += 1
         except ChatError as error:
             error.lost = sum(lost[1:], lost[0]) if lost else error.lost
             raise
-        raise AssertionError("the loop has no end of its own")
 
     def _wait(self, error: TransientChatError, attempt: int, request: ChatRequest) -> None:
         """Wait before the next request: as the server asks, else twice as long as before, with jitter.
