@@ -66,7 +66,8 @@ def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
 
 def _outputs(view: View) -> str:
     names = ", ".join(
-        f"{n} (0 is false, 1 is true)" if view.kind(n) == "boolean" else n for n in view.formula_outputs
+        f"{name} (0 is false, 1 is true)" if view.variable(name).kind == "boolean" else name
+        for name in view.formula_outputs
     )
     return f"Output signals: {names or 'none; the requirement refers to inputs only.'}"
 

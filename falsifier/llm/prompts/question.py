@@ -352,7 +352,7 @@ def _text(inputs: Sequence[str], *lines: str) -> str:
 def _counting(view: View) -> dict[str, dict[int, str]]:
     """Recorded signals that may count up, with the names of their values; none where no types are told."""
     return {
-        name: {number: item for item, number in view.info[name].literals.items()}
+        name: {number: item for item, number in view.variable(name).literals.items()}
         for name in view.experiment.outputs
-        if view.kind(name) in ("integer", "enumeration") and name in view.info
+        if view.variable(name).kind in ("integer", "enumeration")
     }

@@ -153,16 +153,15 @@ def _requirement(view: View) -> Iterator[str]:
 
 
 def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[str]:
-    recorded = dict.fromkeys((*view.formula_outputs, *view.experiment.outputs))
-    if not recorded:
+    if not view.recorded:
         yield "Output signals: none; the requirement refers to inputs only."
         return
     yield "Recorded signals:"
-    for name in recorded:
-        kind = view.kind(name)
-        values = ", ".join(view.items(name)) or (kind if kind in ("integer", "boolean") else "")
-        text = f"- {name}{_bracketed(view.unit(name))}{values and f', {values}'}"
-        text += _described(view.description(name))
+    for name in view.recorded:
+        known = view.variable(name)
+        items = ", ".join(f"{n} = {item}" for item, n in known.literals.items())
+        values = items or (known.kind if known.kind in ("integer", "boolean") else "")
+        text = f"- {name}{_bracketed(known.unit)}{values and f', {values}'}{_described(known.description)}"
         if name in start:
             low, high = start[name]
             # Some points of the search space show that it depends on these, but not how far it goes.
@@ -281,7 +280,7 @@ def _advice(view: View) -> Iterator[str]:
         inner = inner.operand
     if isinstance(inner, And):
         yield _CONJUNCTION
-    if len(formula.predicates) > 1 and len({view.unit(name) for name in formula.signals}) > 1:
+    if len(formula.predicates) > 1 and len({view.variable(name).unit for name in formula.signals}) > 1:
         yield _UNITS
     if any(isinstance(part, Implies) for part in formula.walk()):
         yield _IMPLICATION
