@@ -197,7 +197,8 @@ def preview(
         lessons: what the LLM wrote down in its last reply.
     """
     briefing = Briefing(problem, variant=variant, anonymous=anonymous)
-    briefing.simulations, briefing.lessons = simulations, lessons
+    briefing.simulations = simulations
+    briefing.lessons = briefing.reason(lessons)  # those of a run with real names have these
     doubts = {c.candidate.key: c for c in doubtful}
     for evaluation in evaluations:
         candidate = evaluation.candidate
