@@ -244,7 +244,7 @@ class LiteLLMChat:
         arguments = self._options()
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
-            if known(self.llm).effort == "allowed":
+            if known(self.llm).names_effort:
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
         schema = request.reply_schema
         if schema is not None and self.mode in ("bounded_schema", "json_schema"):

@@ -86,16 +86,18 @@ def converse(
             on_exchange(exchange)
             chat.accepted(request, reply)
             return value
-    text = (
+    raise NoValidReplyError(
         f"{chat.llm} gave no valid reply in {counted(len(problems), 'attempt')}; rejected because: "
-        f"{' | '.join(dict.fromkeys(problems))}"
+        f"{' | '.join(dict.fromkeys(problems))}{_advice(problems[-1])}"
     )
-    if problems[-1].startswith(_CUT_OFF):
-        longer = written(
-            f"--llm-option max_tokens={_MOST_TOKENS}", f"options={{'max_tokens': {_MOST_TOKENS}}}"
-        )
-        text += f"; allow longer replies ({longer}), or less effort (NAME@low)"
-    raise NoValidReplyError(text)
+
+
+def _advice(problem: str) -> str:
+    if not problem.startswith(_CUT_OFF):
+        return ""
+    longer = written(f"--llm-option max_tokens={_MOST_TOKENS}", f"options={{'max_tokens': {_MOST_TOKENS}}}")
+    lower = written("NAME@low", "effort='low'")
+    return f"; allow longer replies ({longer}), or less effort ({lower})"
 
 
 def _usable_text(reply: ChatReply) -> str:
