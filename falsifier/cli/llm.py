@@ -130,14 +130,14 @@ def _sent(directory: Path, sample: int, *, as_json: bool) -> str:
         raise JournalError(f"{directory}: no language model was asked before sample {sample}")
     if as_json:
         return exchange.model_dump_json(indent=2)
-    parts = [f"--- {message.role} ---\n{message.content}" for message in exchange.messages]
+    parts = [_headed(message.role, message.content) for message in exchange.messages]
     answer = "(none)" if exchange.reply is None else exchange.reply.text
-    parts.append(f"--- reply of {exchange.llm} ---\n{answer}")
+    parts.append(_headed(f"reply of {exchange.llm}", answer))
     if exchange.problem:
-        parts.append(f"--- rejected ---\n{exchange.problem}")
+        parts.append(_headed("rejected", exchange.problem))
     # Not every sample is the answer to the question before it: engines and random changes fill in.
     if rationale := recorded_candidates(records)[sample - 1].rationale:
-        parts.append(f"--- rationale of sample {sample} ---\n{rationale}")
+        parts.append(_headed(f"rationale of sample {sample}", rationale))
     return "\n\n".join(parts)
 
 
@@ -145,15 +145,17 @@ def _as_text(messages: Sequence["Message"]) -> str:
     """The messages, and how many tokens they have."""
     from falsifier.llm.usage import count_tokens
 
-    parts = [f"--- {message.role} ---\n{message.content}" for message in messages]
-    # What a provider can keep from question to question.
-    constant, changing = (sum(count_tokens(m.content) for m in part) for part in (messages[:1], messages[1:]))
-    total = constant + changing
-    parts.append(
-        f"--- size ---\n{counted(total, 'token')}; the first {constant} of them ({constant / total:.0%}) are "
-        "the same in every question of a run"
+    tokens = [count_tokens(message.content) for message in messages]
+    constant, total = tokens[0], sum(tokens)  # the constant part can be kept by a provider
+    size = (
+        f"{counted(total, 'token')}; the first {constant} of them ({constant / total:.0%}) are the same in "
+        "every question of a run"
     )
-    return "\n\n".join(parts)
+    return "\n\n".join([*(_headed(m.role, m.content) for m in messages), _headed("size", size)])
+
+
+def _headed(heading: str, text: str) -> str:
+    return f"--- {heading} ---\n{text}"
 
 
 @command()

@@ -104,3 +104,12 @@ def aligned(
         padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
         lines.append("  ".join(padded).rstrip())
     return lines
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text; of one with more characters than this the beginning, marked as such.
+
+    >>> shortened("a short text", 20), shortened("a long text", 6)
+    ('a short text', 'a long ...')
+    """
+    return text if len(text) <= most else f"{text[:most]} ..."

@@ -106,13 +106,9 @@ class Briefing:
 
     def form(self, count: int) -> ReplyForm:
         """Return the form of replies with up to ``count`` candidates."""
-        return ReplyForm(
-            self.view.space,
-            named=self.variant.has("names"),
-            free=self.variant.has("freedom"),
-            count=count,
-            lessons=self.variant.has("lessons"),
-        )
+        space, has = self.view.space, self.variant.has
+        offered = space if has("freedom") else space.fixed
+        return ReplyForm(offered, named=has("names"), count=count, lessons=has("lessons"))
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
@@ -201,7 +197,8 @@ def preview(
         lessons: what the LLM wrote down in its last reply.
     """
     briefing = Briefing(problem, variant=variant, anonymous=anonymous)
-    briefing.simulations, briefing.lessons = simulations, lessons
+    briefing.simulations = simulations
+    briefing.lessons = briefing.reason(lessons)  # those of a run with real names have these
     doubts = {c.candidate.key: c for c in doubtful}
     for evaluation in evaluations:
         candidate = evaluation.candidate

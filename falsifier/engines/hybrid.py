@@ -13,14 +13,13 @@ answers, the LLM is told why the surrogate chose its samples and what it would d
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from textwrap import shorten
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.engines.layout import Array
-from falsifier.engines.llm import LLMEngine
+from falsifier.engines.llm import LLMEngine, reason_in_remark
 from falsifier.engines.surrogate import Settings as SurrogateSettings
 from falsifier.engines.surrogate import Surrogate
 from falsifier.engines.surrogate.planning import is_seen
@@ -52,8 +51,6 @@ _COUNT = 5
 _MOST_MISSES = 3
 # Maximum number of the surrogate's latest samples of which the LLM is told the reason.
 _MOST_REASONS = 4
-# Characters of a reason in a remark.
-_LONGEST_REASON = 240
 # What the surrogate says in its reasons.
 _SCALED = "scaled robustness"
 
@@ -163,7 +160,7 @@ class Hybrid:
         if not self._unanswered:
             return ()
         questions = counted(self.turns.answers, "question")
-        why = shorten(self._unanswered[-1], _LONGEST_REASON, placeholder=" ...")
+        why = reason_in_remark(self._unanswered[-1])
         return (
             f"{len(self._unanswered)} of {questions} had no valid answer, and the surrogate continued: {why}",
         )

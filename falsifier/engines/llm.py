@@ -136,10 +136,8 @@ class LLMEngine:
 
         try:
             found = converse(self._chat, request, read, self._on_exchange)
-        except NoValidReplyError:
-            raise
         except ChatError as error:
-            if dispensable:  # recorded, so that a resumed run continues without an answer at the same point
+            if dispensable and not isinstance(error, NoValidReplyError):  # whose replies are recorded
                 lost = Exchange(
                     llm=self._chat.llm, messages=messages, reply=None, lost=error.lost, problem=str(error)
                 )
@@ -164,7 +162,7 @@ class LLMEngine:
         briefing.pending.append(changed)
         real = briefing.revealed(changed)
         _LOG.warning("%s. Continuing with %s.", error, what)
-        self._reason = self._reason or shorten(str(error), _LONGEST_REASON, placeholder=" ...")
+        self._reason = self._reason or reason_in_remark(str(error))
         self._changes.add(real.key)
         return real
 
@@ -183,6 +181,11 @@ class LLMEngine:
             which = "an earlier sample" if briefing.variant.is_published else seen[proposed[0].key]
             raise RejectedReplyError(f"it repeats {which}")
         return list(new.values())
+
+
+def reason_in_remark(reason: str) -> str:
+    """Return why an answer was missing, in one line and not too long."""
+    return shorten(reason, _LONGEST_REASON, placeholder=" ...")
 
 
 def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int, ...]) -> Candidate:

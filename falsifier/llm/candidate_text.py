@@ -27,8 +27,8 @@ _MOST_CANDIDATES = 1000
 _SHOWN_BEFORE, _SHOWN_KEYS = 24, 10
 # Keys of a candidate, and of what stands beside it and in its parts.
 _PARTS = frozenset({"signals", "parameters", "point"})
-_KEYS = _PARTS | frozenset(("lessons", "candidates", "rationale", "name", "values", "value", "times"))
-_KEYS |= {"points", "interpolation"}
+_KEYS = _PARTS | {"candidates", "lessons", "rationale"}
+_KEYS |= {"name", "value", "values", "points", "times", "interpolation"}
 
 
 def _unrolled(found: Any) -> Any:

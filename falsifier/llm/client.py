@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
-from itertools import count
 from pathlib import Path
 from random import uniform
 from time import perf_counter, sleep
@@ -110,18 +109,19 @@ class LiteLLMChat:
                 free = {"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"}
                 return kept.model_copy(update=free)
         lost: list[Usage] = []
+        attempt = 1
         try:
-            for attempt in count(1):
+            while True:
                 try:
                     reply = self._asked(request)
                     return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
                 except TransientChatError as error:
                     lost += [error.lost] if error.lost else []
                     self._wait(error, attempt, request)
+                    attempt += 1
         except ChatError as error:
             error.lost = sum(lost[1:], lost[0]) if lost else error.lost
             raise
-        raise AssertionError("the loop has no end of its own")
 
     def _wait(self, error: TransientChatError, attempt: int, request: ChatRequest) -> None:
         """Wait before the next request: as the server asks, else twice as long as before, with jitter.
@@ -144,15 +144,18 @@ class LiteLLMChat:
         sleep(delay)
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
-        """Keep a valid reply."""
+        """Keep a valid reply, if the directory can be written: it is paid for, so that the run goes on."""
         if self.cache is None or reply.source == "cache":
             return
         path = self._place(self.cache, request)
-        path.parent.mkdir(parents=True, exist_ok=True)
         # Under a unique name first: several runs may store the same reply at the same time.
         partial = path.with_name(f"{path.name}.{uuid4().hex}")
-        partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
-        partial.replace(path)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
+            partial.replace(path)
+        except OSError as error:
+            _LOG.warning("The reply is not kept for later runs: cannot write to %s (%s).", self.cache, error)
 
     def _place(self, cache: Path, request: ChatRequest) -> Path:
         asked = {
@@ -241,7 +244,7 @@ class LiteLLMChat:
         arguments = self._options()
         if self.effort is not None:
             arguments["reasoning_effort"] = self.effort
-            if known(self.llm).effort == "allowed":
+            if known(self.llm).names_effort:
                 arguments["allowed_openai_params"] = ["reasoning_effort"]
         schema = request.reply_schema
         if schema is not None and self.mode in ("bounded_schema", "json_schema"):

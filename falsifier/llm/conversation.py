@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from falsifier.core.literals import printable
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shortened
 from falsifier.errors import ChatError, ContextExceededError, FalsifierError, written
 from falsifier.llm.messages import (
     LONGEST_REPLY,
@@ -34,8 +34,7 @@ class RejectedReplyError(FalsifierError):
     """A reply cannot be used; the message is sent to the LLM."""
 
     def __init__(self, message: str) -> None:
-        shown = printable(message[: 2 * _LONGEST_PROBLEM])
-        super().__init__(shown if len(shown) <= _LONGEST_PROBLEM else f"{shown[:_LONGEST_PROBLEM]} ...")
+        super().__init__(shortened(printable(message[: 2 * _LONGEST_PROBLEM]), _LONGEST_PROBLEM))
 
 
 class NoValidReplyError(ChatError):
@@ -87,17 +86,18 @@ def converse(
             on_exchange(exchange)
             chat.accepted(request, reply)
             return value
-    text = (
+    raise NoValidReplyError(
         f"{chat.llm} gave no valid reply in {counted(len(problems), 'attempt')}; rejected because: "
-        f"{' | '.join(dict.fromkeys(problems))}"
+        f"{' | '.join(dict.fromkeys(problems))}{_advice(problems[-1])}"
     )
-    if problems[-1].startswith(_CUT_OFF):
-        longer = written(
-            f"--llm-option max_tokens={_MOST_TOKENS}", f"options={{'max_tokens': {_MOST_TOKENS}}}"
-        )
-        text += f"; allow longer replies ({longer}), or less "
-        text += "effort (NAME@low)"
-    raise NoValidReplyError(text)
+
+
+def _advice(problem: str) -> str:
+    if not problem.startswith(_CUT_OFF):
+        return ""
+    longer = written(f"--llm-option max_tokens={_MOST_TOKENS}", f"options={{'max_tokens': {_MOST_TOKENS}}}")
+    lower = written("NAME@low", "effort='low'")
+    return f"; allow longer replies ({longer}), or less effort ({lower})"
 
 
 def _usable_text(reply: ChatReply) -> str:
@@ -118,9 +118,7 @@ def _usable_text(reply: ChatReply) -> str:
 
 
 def _asked_again(request: ChatRequest, reply: ChatReply, problem: str) -> ChatRequest:
-    quoted = reply.text.strip() or "(empty)"
-    if len(quoted) > _LONGEST_QUOTE:
-        quoted = f"{quoted[:_LONGEST_QUOTE]} ..."
+    quoted = shortened(reply.text.strip() or "(empty)", _LONGEST_QUOTE)
     again = f"That reply cannot be used: {problem}.\nReply again in the required form."
     messages = (Message(role="assistant", content=quoted), Message(role="user", content=again))
     changed: dict[str, Any] = {"messages": (*request.messages, *messages)}

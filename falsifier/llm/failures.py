@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
+from falsifier.core.words import shortened
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address
@@ -147,7 +148,7 @@ def classify(
     if isinstance(error, BrokenReplyError):
         return TransientChatError(where + said)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
-    lowered = _shortened(text).lower()
+    lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     filled = {
         "keys": " or ".join(provider.keys) or "the API key",
@@ -179,14 +180,10 @@ def _detail(text: str, status: int | None) -> str:
     if title := _TITLE.search(said):
         told = title[1]
     told = told if isinstance(told, str) and told.strip() else text
-    detail = _FULL_STOP.sub("", _shortened(" ".join(told.split())))
+    detail = _FULL_STOP.sub("", shortened(" ".join(told.split()), _LONGEST_DETAIL))
     if status is not None and not _LETTERS.search(detail):
         return f"the server answers with the HTTP status {status} and without a reason"
     return detail
-
-
-def _shortened(text: str) -> str:
-    return text if len(text) <= _LONGEST_DETAIL else f"{text[:_LONGEST_DETAIL]} ..."
 
 
 def _status(error: Exception) -> int | None:

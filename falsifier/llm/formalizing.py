@@ -183,13 +183,13 @@ def read_readings(text: str) -> list[ReadingReply]:
         reply = ReadingsReply.model_validate(found)
     except ValidationError as error:
         raise RejectedReplyError(defect(error)) from None
-    if not reply.readings and reply.cannot.strip():
+    if not reply.readings:
         said = one_line(reply.cannot.strip()[:_LONGEST_MEANING])
+        if not said:
+            raise RejectedReplyError('it has neither "readings" nor a reason in "cannot"')
         raise SpecError(
             f"no formula was written, because the language model says: {said}\n{_WHAT_CANNOT_BE_SAID}"
         )
-    if not reply.readings:
-        raise RejectedReplyError('it has neither "readings" nor a reason in "cannot"')
     return [r.model_copy(update={"meaning": r.meaning[:_LONGEST_MEANING]}) for r in reply.readings]
 
 

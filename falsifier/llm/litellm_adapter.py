@@ -11,7 +11,7 @@ github.com/BerriAI/litellm that tells of it:
   make one.
 - Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124): ``completed``.
 - Of some providers it drops an effort that they take, unless the parameter is named (1.106.2, #14039):
-  ``Provider.effort``.
+  ``Provider.names_effort``.
 - It lists prices that nobody knows as zero (huggingface, 1.106.2, no issue): ``listed_price``.
 - It puts the classes of its errors before a server's words, several times over, and a stack trace after them
   (1.106.2, #9682): ``own_words``, ``without_trace``.

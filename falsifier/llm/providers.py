@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any
 from urllib.parse import urlsplit
 
 from falsifier.core.secrets import holds_credentials
@@ -23,7 +23,7 @@ class Provider:
     start: str = ""  # command that starts its server, for messages
     openai_client: bool = False  # served through the OpenAI client, which silently retries by default
     defaults: Mapping[str, Any] = field(default_factory=dict)  # sent unless the user states them
-    effort: Literal["native", "allowed"] = "native"  # allowed: litellm passes it only on an explicit list
+    names_effort: bool = False  # whether litellm passes an effort only if the parameter is named
     marks: bool = False  # whether it keeps only what is marked of a prompt
     limits: bool = False  # whether schemas may state numbers of items and ranges of numbers
 
@@ -44,7 +44,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
         "anthropic": Provider(("ANTHROPIC_API_KEY",), marks=True),
         "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY")),
-        "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), effort="allowed"),
+        "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), names_effort=True),
         "mistral": Provider(("MISTRAL_API_KEY",)),
         "groq": Provider(("GROQ_API_KEY",)),
         "deepseek": Provider(("DEEPSEEK_API_KEY",)),
@@ -58,7 +58,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
             address="http://localhost:1234/v1",
             start="lms server start",
             openai_client=True,
-            effort="allowed",
+            names_effort=True,
             limits=True,
         ),
         "hosted_vllm": Provider(start="vllm serve MODEL", limits=True),

@@ -5,7 +5,7 @@ too.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from falsifier.core.candidate import Candidate
@@ -36,10 +36,10 @@ _NUMBERS = schema_of_list({"type": "number"})
 class ReplyForm:
     """What a reply must contain."""
 
-    space: SearchSpace  # search space that candidates must fit
+    # What candidates must fit; without freedom if free parameterizations are not offered.
+    space: SearchSpace
     # Signals and parameters by name; else one list of numbers in the order of the dimensions.
     named: bool = True
-    free: bool = False  # whether a free parameterization may be used if the space allows it
     count: int = 1  # number of candidates
     lessons: bool = False  # whether the LLM may write down what it is to be told again
 
@@ -67,7 +67,7 @@ class ReplyForm:
         if inputs:
             signal: dict[str, Any] = {"name": {"type": "string", "enum": [r.name for r in inputs]}}
             value = {"type": "number", **_range(inputs)}
-            if self.free and any(r.free for r in inputs):
+            if any(r.free for r in inputs):
                 possible = dict.fromkeys(i for r in inputs for i in _interpolations(r))
                 signal["interpolation"] = {"type": "string", "enum": list(possible)}
                 signal |= {"times": _NUMBERS, "values": schema_of_list(value)}
@@ -113,11 +113,8 @@ class ReplyForm:
             if p.name in parameters:
                 raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
             parameters[p.name] = _clamped(p.value, ranges[p.name]) if p.name in ranges else p.value
-        space = self.space
-        if not self.free:  # free parameterization was not offered
-            space = replace(space, inputs=tuple(replace(r, free=None) for r in space.inputs))
         try:
-            return space.admit(Candidate(signals, parameters, origin, written.rationale))
+            return self.space.admit(Candidate(signals, parameters, origin, written.rationale))
         except CandidateError as error:
             raise RejectedReplyError(str(error)) from None
 

@@ -151,9 +151,7 @@ class _Call:
         with self._lock:
             self.has_ended = True
             for connection in self._connections:
-                with suppress(OSError):
-                    connection.shutdown(socket.SHUT_RDWR)
-                connection.close()
+                _cut(connection)
             self._connections.clear()
 
     def refuse(self, reason: str) -> None:
@@ -176,8 +174,7 @@ class _Call:
             if not self.has_ended:
                 self._connections.append(connection)
                 return
-        connection.shutdown(socket.SHUT_RDWR)
-        connection.close()
+        _cut(connection)
 
     @contextmanager
     def noting_faults(self) -> Iterator[None]:
@@ -188,6 +185,12 @@ class _Call:
         except httpx.TransportError as error:
             self.fault = self.refusal or _fault_of(error)
             raise
+
+
+def _cut(connection: socket.socket) -> None:
+    with suppress(OSError):  # it may have ended already
+        connection.shutdown(socket.SHUT_RDWR)
+    connection.close()
 
 
 _CALL: ContextVar[_Call | None] = ContextVar("_CALL", default=None)

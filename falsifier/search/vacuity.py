@@ -195,9 +195,7 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     """Return what the sides of a part's predicates were; empty if the part looks at other times too."""
     if any(isinstance(part, Temporal | Next) for part in formula.walk()):
         return ""
-    sides = dict.fromkeys(
-        side for p in formula.predicates for side in (p.left, p.right) if not isinstance(side, Number)
-    )
+    sides = dict.fromkeys(s for p in formula.predicates for s in p.sides if not isinstance(s, Number))
     if not all(name in values for side in sides for name in side.signals):
         return ""
     return listed([f"{side} reached {float(side.evaluate(values)):.6g}" for side in sides]) if sides else ""

@@ -246,7 +246,7 @@ def _comparison(predicate: Predicate, value: float, values: dict[str, float]) ->
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
     if isinstance(predicate, Flag) and abs(value) == _OF_TRUTH:
         return f"{predicate} is {'true' if value > 0 else 'false'}"
-    left, right = (valued(side, values, value) for side in (predicate.left, predicate.right))
+    left, right = (valued(side, values, value) for side in predicate.sides)
     if is_on_limit(value):
         return f"{left} equals {right}"
     if predicate.operator in ("==", "!="):

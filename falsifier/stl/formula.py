@@ -80,8 +80,7 @@ class Formula:
     @property
     def signals(self) -> tuple[str, ...]:
         """Names of the signals in order of first appearance."""
-        sides = (side for p in self.predicates for side in (p.left, p.right))
-        return tuple(dict.fromkeys(name for side in sides for name in side.signals))
+        return tuple(dict.fromkeys(n for p in self.predicates for side in p.sides for n in side.signals))
 
     @property
     def expressions(self) -> tuple[Expression, ...]:
@@ -89,7 +88,7 @@ class Formula:
 
         ``expression.evaluate(trajectory.columns)`` returns the values on a trajectory.
         """
-        sides = dict.fromkeys(side for p in self.predicates for side in (p.left, p.right))
+        sides = dict.fromkeys(side for p in self.predicates for side in p.sides)
         return tuple(side for side in sides if side.signals and not isinstance(side, Name))
 
     @property
@@ -118,6 +117,11 @@ class Predicate(Formula):
     left: Expression
     right: Expression
     binding: ClassVar[int] = COMPARISON
+
+    @property
+    def sides(self) -> tuple[Expression, Expression]:
+        """The compared expressions."""
+        return self.left, self.right
 
     def margin(self, columns: Mapping[str, Any]) -> NDArray[np.float64]:
         """Return the signed margin, in the shape of the given columns; 0 where both sides are equal."""
@@ -269,7 +273,7 @@ def parts_of(node: Node) -> tuple[Node, ...]:
     """Return what is directly below a formula or expression: of a comparison, the expressions compared."""
     if isinstance(node, Expression):
         return node.operands
-    return (node.left, node.right) if isinstance(node, Predicate) else node.children
+    return node.sides if isinstance(node, Predicate) else node.children
 
 
 def negated(formula: Formula) -> Formula:

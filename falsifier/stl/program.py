@@ -251,7 +251,7 @@ def _problem(program: Program, buffer: Floats, predicate: Predicate, location: L
     margins = buffer[location.at(location.first) : location.at(location.last + 1)]
     sample = location.first + int(np.flatnonzero(~np.isfinite(margins))[0])
     here = {name: buffer[i * program.samples + sample] for i, name in enumerate(program.signals)}
-    sides = [side for side in (predicate.left, predicate.right) if side.signals]
+    sides = [side for side in predicate.sides if side.signals]
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)
     return (
         f"{predicate} has no finite value at {sample * program.step:g} s, where {values}; "

@@ -108,7 +108,7 @@ def _robustness(monitor: Monitor, columns: Mapping[str, Floats]) -> Floats:
 
 def _levels(formulas: tuple[Formula, ...], allowed: Interval) -> Floats:
     """Return values on both sides of each number in the formulas, within the range of the signal."""
-    sides = (side for f in formulas for p in f.predicates for side in (p.left, p.right))
+    sides = (side for f in formulas for p in f.predicates for side in p.sides)
     numbers = [e.value for side in sides for e in side.walk() if isinstance(e, Number)]
     ends = [e for e in (allowed.low, allowed.high) if np.isfinite(e)]
     known = np.array(sorted({0.0, *numbers, *ends}))

@@ -18,7 +18,7 @@ SPACE = SearchSpace(
     (ParameterRange("k", 0.0, 2.0),),
     10.0,
 )
-FORM = ReplyForm(SPACE, free=True)
+FORM = ReplyForm(SPACE)
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),), reply_schema=FORM.schema())
 # Reading a megabyte takes well under a second; with a time that grows with the square of the length, hours.
 CPU_SECONDS = 60.0

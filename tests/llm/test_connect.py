@@ -6,6 +6,7 @@ import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm.client import connect, preflight
+from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
@@ -136,6 +137,14 @@ class TestCache:
         (file,) = tmp_path.rglob("*.json")
         file.write_text("{")
         assert chat.complete(QUESTION).text == "anew"
+
+    def test_where_nothing_can_be_written_the_reply_counts_all_the_same(
+        self, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        (tmp_path / "file").write_text("")
+        chat = Served(server=ScriptedChat([PAID]), cache=tmp_path / "file" / "replies")
+        assert converse(chat, QUESTION, str, lambda _: None) == "answer"
+        assert f"cannot write to {tmp_path / 'file' / 'replies'}" in caplog.text
 
     def test_everything_that_is_sent_is_part_of_the_question(self, tmp_path: Path) -> None:
         kept = Served("a", server=ScriptedChat(["one"]), cache=tmp_path)

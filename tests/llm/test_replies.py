@@ -32,9 +32,13 @@ GOOD = {
 }
 
 
+def form_of(*, free: bool = False, **form: Any) -> ReplyForm:
+    return ReplyForm(SPACE if free else SPACE.fixed, **form)
+
+
 def read(reply: Any, **form: Any) -> Any:
     text = reply if isinstance(reply, str) else json.dumps(reply)
-    (candidate,) = ReplyForm(SPACE, **form).read(text, origin="me")
+    (candidate,) = form_of(**form).read(text, origin="me")
     return candidate
 
 
@@ -143,7 +147,7 @@ def strict_subset(schema: dict[str, Any]) -> None:
 @pytest.mark.parametrize("free", [True, False])
 @pytest.mark.parametrize("count", [1, 3])
 def test_schema_is_in_the_strict_subset(named: bool, free: bool, count: int) -> None:
-    schema = ReplyForm(SPACE, named=named, free=free, count=count).schema()
+    schema = form_of(named=named, free=free, count=count).schema()
     assert schema["type"] == "object"
     strict_subset(schema)
 
@@ -153,7 +157,7 @@ def test_interpolations_are_those_that_are_possible() -> None:
     smooth, gear = InputRange("u", 0.0, 1.0, free=free), InputRange("g", 1.0, 4.0, free=free, kind="integer")
 
     def form(*inputs: InputRange) -> ReplyForm:
-        return ReplyForm(SearchSpace(inputs, (), 10.0), free=True)
+        return ReplyForm(SearchSpace(inputs, (), 10.0))
 
     def offered(form: ReplyForm) -> list[str]:
         schema = form.schema()
@@ -173,13 +177,13 @@ def test_interpolations_are_those_that_are_possible() -> None:
 
 def test_several_candidates() -> None:
     other = changed(parameters=[{"name": "mass", "value": 901}])
-    found = ReplyForm(SPACE, count=2).read(json.dumps({"candidates": [GOOD, other]}))
+    found = form_of(count=2).read(json.dumps({"candidates": [GOOD, other]}))
     assert [c.parameters["mass"] for c in found] == [1000, 901]
 
 
 def test_one_bad_candidate_among_several_costs_nothing_but_itself() -> None:
     bad = [changed(parameters=[{"name": "mass", "value": v}]) for v in (1, 2)]
-    form = ReplyForm(SPACE, count=2)
+    form = form_of(count=2)
     assert len(form.read(json.dumps({"candidates": [bad[0], GOOD]}))) == 1
     with pytest.raises(
         RejectedReplyError, match=r"candidate 1: .*: 1 is outside.*; candidate 2: .*: 2 is outside"
@@ -217,13 +221,13 @@ def reads_or_tells(form: ReplyForm, text: str) -> None:
 @given(st.dictionaries(keys, anything, max_size=4), st.booleans())
 @example({"point": ["0\x1f"]}, False)
 def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
-    reads_or_tells(ReplyForm(SPACE, free=free), json.dumps(reply))
+    reads_or_tells(form_of(free=free), json.dumps(reply))
 
 
 @settings(max_examples=100)
 @given(st.text(alphabet='{}[]":,0123456789.-+eEx <>/pointsignalk`\n\\', max_size=60))
 def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
-    reads_or_tells(ReplyForm(SPACE), f'{text}{{"point": [{text}]}}')
+    reads_or_tells(form_of(), f'{text}{{"point": [{text}]}}')
 
 
 def test_a_value_beyond_its_range_by_a_rounding_is_clamped() -> None:

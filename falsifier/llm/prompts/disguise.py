@@ -113,7 +113,7 @@ class Disguise:
 
     def _kind(self, name: str) -> Kind:
         """Whether a signal is discrete, which is told by its changes; no type is told but that."""
-        return "real" if self.real.kind(name) == "real" else "enumeration"
+        return "real" if self.real.variable(name).kind == "real" else "enumeration"
 
     @cached_property
     def _signals(self) -> dict[Name, Name]:

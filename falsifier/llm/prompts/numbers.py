@@ -6,6 +6,7 @@ There are no more digits than needed, and what is typed back is valid.
 from collections.abc import Sequence
 from dataclasses import replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from itertools import groupby
 from math import floor, isfinite, log10
 
 import numpy as np
@@ -103,16 +104,10 @@ def runs(values: Sequence[float]) -> str:
     """
     shortest_run = 4
     parts: list[str] = []
-    start = 0
-    while start < len(values):
-        end = start
-        while end < len(values) and values[end] == values[start]:
-            end += 1
-        text = number(values[start], _CHOSEN_DIGITS)
-        length = end - start
+    for value, equal in groupby(values):
+        text, length = number(value, _CHOSEN_DIGITS), len(list(equal))
         is_long = length >= shortest_run and len(values) > 3 * shortest_run
         parts += [f'"{text} x {length}"'] if is_long else [text] * length
-        start = end
     return f"[{', '.join(parts)}]"
 
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.trajectory import Trajectory, is_discrete
+from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts.courses import (
     MOST_BREAKPOINTS,
@@ -112,8 +112,8 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis) -> Iterator[str]:
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
     """Changes of all discrete signals, and stays of those in the formula."""
-    for name in dict.fromkeys((*view.formula_outputs, *view.experiment.outputs)):
-        if name not in inside.columns or not is_discrete(inside[name], kind=view.kind(name)):
+    for name in view.recorded:
+        if name not in inside.columns or not view.is_discrete(name, inside[name]):
             continue
         clock, label = _clock(view), partial(view.labelled, name)
         yield f"{name}: {change_list(inside.times, inside[name], clock=clock, label=label)}"
@@ -130,7 +130,7 @@ def _continuous(
     columns = _shown_columns(view, inside, compared) if of is None else compared
     steps = _input_steps(evaluation) if of is None else ()
     for name, column in columns.items():
-        if (of is not None and name not in of) or is_discrete(column, kind=view.kind(name)):
+        if (of is not None and name not in of) or view.is_discrete(name, column):
             continue
         most = MOST_BREAKPOINTS if of is None and name in compared else _FEWER_BREAKPOINTS
         yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
@@ -140,7 +140,8 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
     there = []
     for name, value in trajectory.at(diagnosis.critical_time).items():
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
-        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{_unit(view, name)}")
+        unit = f" {unit}" if (unit := view.variable(name).unit) else ""
+        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{unit}")
     return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
 
 
@@ -164,7 +165,7 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
 
 def _scale(view: View, part: Formula) -> str:
     """Unit of a part's robustness; empty unless all its signals have the same unit."""
-    units = {view.unit(name) for name in part.signals}
+    units = {view.variable(name).unit for name in part.signals}
     return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
 
 
@@ -201,8 +202,7 @@ def _predicates(
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
-    formula = view.requirement.formula
-    sides = {str(side): side for p in formula.predicates for side in (p.left, p.right)}
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns = {
         text: np.broadcast_to(side.evaluate(trajectory.columns), trajectory.times.shape)
         for text, side in sides.items()
@@ -216,18 +216,16 @@ def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array
 
     Its parameters act at the start alone, so that the course of everything else decides nothing.
     """
-    recorded = (*view.formula_outputs, *(n for n in view.experiment.outputs if n not in view.formula_outputs))
-    others = [n for n in recorded if n in trajectory.columns and n not in compared]
+    others = [n for n in view.recorded if n in trajectory.columns and n not in compared]
     if not view.space.inputs:
-        others = [n for n in others if is_discrete(trajectory[n], kind=view.kind(n))]
+        others = [n for n in others if view.is_discrete(n, trajectory[n])]
     columns = compared | {n: trajectory[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 
 def told_accuracy(view: View, name: str, column: Array) -> float:
     """Distance from a signal, in its unit, up to which its course says nothing of being less exact."""
-    in_formula = name in view.requirement.formula.signals or name not in view.info
-    return (TOLERANCE if in_formula else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
+    return (TOLERANCE if _is_judged(view, name) else TOLERANCE_OF_OTHERS) * float(np.ptp(column))
 
 
 def _drawn(
@@ -239,9 +237,8 @@ def _drawn(
     claimed = told_accuracy(view, name, column)
     wanted = np.full_like(inside.times, claimed)
     for predicate in view.requirement.formula.predicates:
-        if name in (str(predicate.left), str(predicate.right)):
-            left, right = (side.evaluate(inside.columns) for side in (predicate.left, predicate.right))
-            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(np.asarray(left) - np.asarray(right)))
+        if name in map(str, predicate.sides):
+            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
     return course(
         inside.times,
         column,
@@ -259,7 +256,7 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
     verdict = evaluation.verdict
     assert verdict is not None
     for name, column in compared_columns(view, inside).items():
-        if name not in _deciding(view, verdict) or is_discrete(column, kind=view.kind(name)):
+        if name not in _deciding(view, verdict) or view.is_discrete(name, column):
             continue
         near = close_up_times(view, inside.times, column, evaluation)
         part = column[near]
@@ -310,13 +307,17 @@ def _deciding(view: View, verdict: Verdict) -> set[str]:
     """What the deciding predicate compares."""
     formula = view.requirement.formula
     deciding = [p for p in formula.predicates if str(p) == verdict.predicate] or list(formula.predicates)
-    return {str(side) for p in deciding for side in (p.left, p.right)}
+    return {str(side) for p in deciding for side in p.sides}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
     """Decimals of a signal: more for signals of the formula, whose margin must be visible."""
-    in_formula = name in view.requirement.formula.signals or name not in view.info
-    return column_decimals(column, margin=abs(robustness) if in_formula else None)
+    return column_decimals(column, margin=abs(robustness) if _is_judged(view, name) else None)
+
+
+def _is_judged(view: View, name: str) -> bool:
+    """Whether the formula names a signal; what is compared and is no signal is a term of the formula."""
+    return name in view.requirement.formula.signals or name not in view.info
 
 
 def _clock(view: View) -> int:
@@ -324,8 +325,3 @@ def _clock(view: View) -> int:
     return min(
         6, max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
     )
-
-
-def _unit(view: View, name: str) -> str:
-    unit = view.unit(name)
-    return f" {unit}" if unit else ""

@@ -16,7 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
-from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, formula_text, reply_form
+from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, reply_form, requirement_text
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Formula
@@ -35,7 +35,6 @@ _TASK = (
     "Your task is to find {what} with which a system violates its specification. Each sample is judged by a "
     "number, its robustness: lower is better, and below 0 the specification is violated."
 )
-_REQUIREMENT = "Requirement, in Signal Temporal Logic with times in seconds:\n{formula}"
 _GUIDANCE = "Consider which combinations of values had the lower robustness."
 _GUIDANCE_ON_NUMBERS = "Consider what each number may stand for and how it may act on the system."
 _GUIDANCE_ON_MEANING = (
@@ -53,7 +52,7 @@ def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
     named, what = variant.has("names"), view.chosen
     sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
     if variant.has("requirement"):
-        sections.append(_REQUIREMENT.format(formula=formula_text(view.requirement.formula)))
+        sections.append(requirement_text(view.requirement.formula))
     if variant.has("outputs"):
         sections.append(_outputs(view))
     sections.append("\n".join(_numbers(view, named=named)))
@@ -67,7 +66,8 @@ def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
 
 def _outputs(view: View) -> str:
     names = ", ".join(
-        f"{n} (0 is false, 1 is true)" if view.kind(n) == "boolean" else n for n in view.formula_outputs
+        f"{name} (0 is false, 1 is true)" if view.variable(name).kind == "boolean" else name
+        for name in view.formula_outputs
     )
     return f"Output signals: {names or 'none; the requirement refers to inputs only.'}"
 
@@ -155,7 +155,7 @@ def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 
     The published models have outputs for such terms.
     """
-    sides = {str(side): side for p in view.requirement.formula.predicates for side in (p.left, p.right)}
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns: dict[str, Array] = {}
     for text, column in compared_columns(view, trajectory).items():
         names = sides[text].signals
@@ -169,9 +169,8 @@ def _clock(view: View, time: float) -> str:
 
 
 def _clock_decimals(formula: Formula) -> int:
-    windows = [f.window for f in formula.walk() if f.window]
-    bounds = (number_text(bound) for window in windows for bound in (window.start, window.end))
-    found = max((len(bound.partition(".")[2]) for bound in bounds), default=0)
+    limits = (number_text(limit) for window in formula.windows for limit in (window.start, window.end))
+    found = max((len(limit.partition(".")[2]) for limit in limits), default=0)
     return min(found, _MOST_CLOCK_DECIMALS) or 1
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
@@ -93,7 +93,7 @@ class Questions:
     """Makes the questions of one run from what it is told.
 
     Args:
-        view: the problem; may be replaced by one that tells the same with other scales.
+        view: the problem.
         variant: which parts a question contains.
         start: smallest and largest value of each output at time 0, by name, as far as known.
         llm: name of the LLM whose tokens are counted.
@@ -107,7 +107,7 @@ class Questions:
         start: Mapping[str, tuple[float, float]] | None = None,
         llm: str = "",
     ) -> None:
-        self.view = view
+        self._view = view
         self._variant = variant
         self._start = dict(start or {}) if variant.has("circumstances") else {}
         self._count: Callable[[str], int] = lambda text: count_tokens(text, llm)
@@ -179,8 +179,8 @@ class Questions:
 
     def _standing(self, count: int) -> str:
         if self._variant.is_published:
-            return published_standing(self.view, self._variant, count=count)
-        return standing(self.view, self._variant, count=count, start=self._start)
+            return published_standing(self._view, self._variant, count=count)
+        return standing(self._view, self._variant, count=count, start=self._start)
 
     def _lasting(self) -> str:
         if not self._samples:
@@ -214,8 +214,8 @@ class Questions:
         is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            kind = "parameters" if not self.view.space.inputs else "jumping" if self._only_jumps else "inputs"
-            first = f"{_FIRST[kind]} " if is_own else ""
+            kind = "jumping" if self._only_jumps else "inputs"
+            first = f"{_FIRST[kind if self._view.space.inputs else 'parameters']} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
@@ -223,12 +223,12 @@ class Questions:
         if is_own and self._samples:
             yield from self._standings()
         yield from notes
-        if lessons:
+        if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._samples:
-            what = self.view.chosen
+            what = self._view.chosen
             on_time = [] if self._is_flat() else [_ON_TIME.format(what=what)]
             on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
             yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
@@ -270,7 +270,7 @@ class Questions:
         return f"{self._told} of {counted(budget, 'simulation')} spent, {budget - self._told} left. "
 
     def _published(self, evaluation: Evaluation, doubt: str) -> _Sample:
-        robustness, *facts = published_facts(self.view, self._variant, evaluation)
+        robustness, *facts = published_facts(self._view, self._variant, evaluation)
         text = _text(self._chosen(evaluation.candidate), robustness, doubt, *facts)
         return _Sample(self._told, (text,) * 3, (0, 0, 0), _FULL, evaluation.robustness)
 
@@ -278,23 +278,22 @@ class Questions:
         """A sample of a variant of our own: how much of it is told depends on those before it only."""
         candidate, verdict = evaluation.candidate, evaluation.verdict
         inputs = self._chosen(candidate)
-        notes = [self._alike("; ".join(inputs)), f"chosen because: {_shortened(why)}" if why else ""]
+        reason = shortened(" ".join(why.split()), _LONGEST_WHY)
+        notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
             failure = f"no verdict, the simulation {evaluation.outcome}".rstrip(": ")
             text = _text(inputs, failure, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
-        progress = (
-            SampleProgress.of(self.view, evaluation.trajectory) if evaluation.trajectory else SampleProgress()
-        )
+        trajectory = evaluation.trajectory
+        progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
         news = self._reached.news(progress)
-        predicates = self.view.requirement.formula.predicates
-        self._climb.add(self._told, verdict, evaluation.trajectory, predicates)
-        found = observed(self.view, evaluation)
+        self._climb.add(self._told, verdict, trajectory, self._view.requirement.formula.predicates)
+        found = observed(self._view, evaluation)
         robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
         head = (robustness, doubt, *notes, f"the first to reach: {', '.join(news)}" if news else "")
-        brief = inputs if why else as_signals(self.view, candidate, in_brief=True)
+        brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, *found.full),
             _text(inputs, *head, *found.short),
@@ -340,10 +339,10 @@ class Questions:
 
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
         if not self._variant.is_published:
-            return as_signals(self.view, candidate)
+            return as_signals(self._view, candidate)
         if not self._variant.has("names"):
-            return as_point(self.view, candidate)
-        return as_values(self.view, candidate)
+            return as_point(self._view, candidate)
+        return as_values(self._view, candidate)
 
 
 def _text(inputs: Sequence[str], *lines: str) -> str:
@@ -353,12 +352,7 @@ def _text(inputs: Sequence[str], *lines: str) -> str:
 def _counting(view: View) -> dict[str, dict[int, str]]:
     """Recorded signals that may count up, with the names of their values; none where no types are told."""
     return {
-        name: {number: item for item, number in view.info[name].literals.items()}
+        name: {number: item for item, number in view.variable(name).literals.items()}
         for name in view.experiment.outputs
-        if view.kind(name) in ("integer", "enumeration") and name in view.info
+        if view.variable(name).kind in ("integer", "enumeration")
     }
-
-
-def _shortened(why: str) -> str:
-    why = " ".join(why.split())
-    return why if len(why) <= _LONGEST_WHY else f"{why[:_LONGEST_WHY]} ..."

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from falsifier.core.trajectory import Trajectory, is_discrete
+from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.numbers import number, plain
 from falsifier.llm.prompts.view import View
 
@@ -36,7 +36,7 @@ class SampleProgress:
             if name not in columns:
                 continue
             column = columns[name]
-            if is_discrete(column, kind=view.kind(name)):
+            if view.is_discrete(name, column):
                 kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))].tolist()
                 stages |= {(name, None, value) for value in kept}
                 stages |= {(name, before, value) for before, value in pairwise(kept)}

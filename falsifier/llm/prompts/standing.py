@@ -22,8 +22,6 @@ _FEW_TIMES = 5
 # Digits of the limits of what is chosen: a value that exceeds one by a rounding is clamped.
 _DIGITS_OF_BOUNDS = 7
 
-# What is left empty leaves no trace.
-_STANDING = "{task}\n\n{system}\n\n{requirement}\n\n{outputs}\n\n{choice}\n\n{context}\n\n{advice}\n\n{reply}"
 _TASK = (
     "You search for a counterexample: a system is simulated with {what} that you choose, and a monitor "
     "returns the robustness, the margin by which the requirement is met. Find {what} for which the "
@@ -93,19 +91,22 @@ def standing(
     """
     if not variant.has("context"):
         view = replace(view, context=Context())
-    info = view.info
-    described = f"System: {info.name}. {info.description}".rstrip(" .") + "."
-    text = _STANDING.format(
-        task=_TASK.format(what=view.chosen),
-        system=described if info.name or info.description else "",
-        requirement="\n".join(_requirement(view)),
-        outputs="\n".join(_outputs(view, start or {})),
-        choice="\n".join(_choice(view)),
-        context="\n".join(_context(view)),
-        advice="\n".join(_advice(view)),
-        reply="\n".join(_reply(view, count)),
+    sections = (
+        (_TASK.format(what=view.chosen),),
+        _system(view),
+        _requirement(view),
+        _outputs(view, start or {}),
+        _choice(view),
+        _context(view),
+        _advice(view),
+        _reply(view, count),
     )
-    return "\n\n".join(section for section in text.split("\n\n") if section)
+    return "\n\n".join(text for lines in sections if (text := "\n".join(lines)))
+
+
+def requirement_text(formula: Formula) -> str:
+    """Return a formula, with how to read it."""
+    return f"Requirement, in Signal Temporal Logic with times in seconds:\n{formula_text(formula)}"
 
 
 def formula_text(formula: Formula) -> str:
@@ -135,9 +136,15 @@ def _operand(formula: Formula, above: Formula) -> str:
     return text if isinstance(formula, Predicate) or is_link else f"({text})"
 
 
+def _system(view: View) -> Iterator[str]:
+    info = view.info
+    if info.name or info.description:
+        yield f"System: {info.name}. {info.description}".rstrip(" .") + "."
+
+
 def _requirement(view: View) -> Iterator[str]:
     formula = view.requirement.formula
-    yield f"Requirement, in Signal Temporal Logic with times in seconds:\n{formula_text(formula)}"
+    yield requirement_text(formula)
     yield f"In words: {in_words(formula)}"
     if view.requirement.description:
         yield f"Author's description: {view.requirement.description}"
@@ -146,16 +153,15 @@ def _requirement(view: View) -> Iterator[str]:
 
 
 def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[str]:
-    recorded = dict.fromkeys((*view.formula_outputs, *view.experiment.outputs))
-    if not recorded:
+    if not view.recorded:
         yield "Output signals: none; the requirement refers to inputs only."
         return
     yield "Recorded signals:"
-    for name in recorded:
-        kind = view.kind(name)
-        values = ", ".join(view.items(name)) or (kind if kind in ("integer", "boolean") else "")
-        text = f"- {name}{_bracketed(view.unit(name))}{values and f', {values}'}"
-        text += _described(view.description(name))
+    for name in view.recorded:
+        known = view.variable(name)
+        items = ", ".join(f"{n} = {item}" for item, n in known.literals.items())
+        values = items or (known.kind if known.kind in ("integer", "boolean") else "")
+        text = f"- {name}{_bracketed(known.unit)}{values and f', {values}'}{_described(known.description)}"
         if name in start:
             low, high = start[name]
             # Some points of the search space show that it depends on these, but not how far it goes.
@@ -274,7 +280,7 @@ def _advice(view: View) -> Iterator[str]:
         inner = inner.operand
     if isinstance(inner, And):
         yield _CONJUNCTION
-    if len(formula.predicates) > 1 and len({view.unit(name) for name in formula.signals}) > 1:
+    if len(formula.predicates) > 1 and len({view.variable(name).unit for name in formula.signals}) > 1:
         yield _UNITS
     if any(isinstance(part, Implies) for part in formula.walk()):
         yield _IMPLICATION

@@ -9,11 +9,12 @@ from types import MappingProxyType
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.context.values import Context
-from falsifier.core.model import Experiment, Kind, ModelInfo
+from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.space import SearchSpace
-from falsifier.core.trajectory import Trajectory
+from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
@@ -36,26 +37,17 @@ class View:
         """Make the view of a problem."""
         return cls(problem.info, problem.requirement, problem.space, problem.experiment, problem.context)
 
-    def unit(self, name: str) -> str:
-        """Unit of a signal; empty if unknown or dimensionless."""
-        return self.info[name].unit if name in self.info else ""
+    def variable(self, name: str) -> Variable:
+        """What the model says of a signal; of an unknown one, that it is real and no more."""
+        return self.info[name] if name in self.info else Variable(name)
 
-    def description(self, name: str) -> str:
-        """Description of a signal; empty if it has none."""
-        return self.info[name].description if name in self.info else ""
-
-    def kind(self, name: str) -> Kind:
-        """Type of a signal's values; real if unknown."""
-        return self.info.kind(name)
-
-    def items(self, name: str) -> tuple[str, ...]:
-        """Numbers of an enumeration with the names of its items; empty if it has none."""
-        literals = self.info[name].literals if name in self.info else {}
-        return tuple(f"{number} = {item}" for item, number in literals.items())
+    def is_discrete(self, name: str, column: NDArray[np.float64]) -> bool:
+        """Whether a signal is told by its changes; the column, shape (n,), decides if it is of type real."""
+        return is_discrete(column, kind=self.variable(name).kind)
 
     def labelled(self, name: str, value: float, text: str) -> str:
         """A value's text, with the name of its item if it has one."""
-        literals = self.info[name].literals if name in self.info else {}
+        literals = self.variable(name).literals
         item = next((item for item, number in literals.items() if number == value), "")
         return f"{text} ({item})" if item else text
 
@@ -82,6 +74,11 @@ class View:
     def formula_outputs(self) -> tuple[str, ...]:
         """Signals of the formula that are not searched inputs, in order of appearance."""
         return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Signals that are told over time, those of the formula first."""
+        return tuple(dict.fromkeys((*self.formula_outputs, *self.experiment.outputs)))
 
 
 Part = Literal[

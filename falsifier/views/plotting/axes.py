@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from falsifier.core.literals import one_line
+from falsifier.core.words import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +30,7 @@ _MOST_TICKS = 12
 def caption(text: str) -> str:
     """Return a text for a picture: one line, not too long, and without matplotlib's mathematical notation."""
     line = one_line(text)
-    shown = line if len(line) <= _LONGEST_CAPTION else f"{line[:_LONGEST_CAPTION]} ..."
+    shown = shortened(line, _LONGEST_CAPTION)
     return shown.replace("$", r"\$")
 
 

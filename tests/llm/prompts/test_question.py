@@ -150,7 +150,7 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     mode = Variable("x", kind="enumeration", literals={"Idle": 0, "Run": 1})
     view = View.of(problem)
     view = replace(view, info=ModelInfo("m", variables=(mode,)))
-    assert view.items("x") == ("0 = Idle", "1 = Run") and view.items("other") == ()
+    assert view.labelled("other", 1.0, "1") == "1"
     assert view.labelled("x", 1.0, "1") == "1 (Run)" and view.labelled("x", 7.0, "7") == "7"
     evaluation = evaluate(problem, problem.space.decode([0] * 4))
     assert evaluation.trajectory is not None

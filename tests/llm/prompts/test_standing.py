@@ -139,8 +139,8 @@ class TestReply:
     @pytest.mark.parametrize(("variant", "free"), [("MP1", False), ("MP2", False), ("MP5", True)])
     def test_with_numbers_in_its_blanks_it_can_be_read(self, variant: str, *, free: bool) -> None:
         for count in (1, 3):
-            named = variant != "MP1"
-            form = ReplyForm(self.problem.space, named=named, free=free, count=count, lessons=free)
+            space = self.problem.space if free else self.problem.space.fixed
+            form = ReplyForm(space, named=variant != "MP1", count=count, lessons=free)
             told = self.form(variant, count=count).replace("5 numbers", "0, 0, 0, 0, 0")
             filled = re.sub(r"\[(\d )?numbers\]", "[0]", told).replace(": number", ": 0")
             (found,) = form.read(filled)
