@@ -31,9 +31,9 @@ _DIRECTIONS = 60
 def plan(
     predict: Callable[[Array], Array],
     layout: Layout,
-    *,
     elites: Array,
     critical: Array,
+    *,
     seen: Array,
     outputs: int,
     settings: Settings,

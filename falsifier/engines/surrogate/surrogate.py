@@ -1,6 +1,6 @@
 """The surrogate engine: arms that search in different ways on one history, rated by what they bring."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -9,7 +9,7 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.engines.box import BoxEngine
 from falsifier.engines.coverage import Explorer, Ladder
-from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
+from falsifier.engines.layout import Array, TimeGrid, planning_layout
 from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecasts, LinearDynamics
@@ -293,7 +293,7 @@ class Surrogate:
     def _switch(self, rng: np.random.Generator) -> Pending:
         self._switched += 1
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
-        why = f"inputs take a random bound{_pace(self.layout, dwell)}"
+        why = f"inputs take a random bound every {dwell:.3g} s, or as often as their control points allow"
         return self._made("switching", switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
@@ -307,16 +307,7 @@ class Surrogate:
         points = [*self._suggested, *(e.point for e in elites)]
         critical = [*(1.0 for _ in self._suggested), *(e.critical for e in elites)]
         self._suggested = []
-        point = plan(
-            predict,
-            self.layout,
-            elites=np.array(points),
-            critical=np.array(critical),
-            seen=self._tried,
-            outputs=len(self.history.outputs),
-            settings=self.settings,
-            rng=rng,
-        )
+        point = self._planned(predict, np.array(points), np.array(critical), rng)
         predicted = self._margins(dynamics, point[None])
         lowest = float(cost.cost(predicted)[0])
         why = f"the learnt dynamics predict a scaled robustness of {lowest:.3g}"
@@ -333,17 +324,23 @@ class Surrogate:
             states = dynamics.predict(self.layout.inputs(points, self.grid))
             return np.asarray(-push.heights(states).max(axis=1))
 
-        point = plan(
+        highest = np.argmax(heights[elites], axis=1) / cells
+        point = self._planned(predict, self.history.points[elites], highest, rng)
+        return replace(self._made("push", point, str(push)), push=push)
+
+    def _planned(
+        self, predict: Callable[[Array], Array], elites: Array, critical: Array, rng: np.random.Generator
+    ) -> Array:
+        return plan(
             predict,
             self.layout,
-            elites=self.history.points[elites],
-            critical=np.argmax(heights[elites], axis=1) / cells,
+            elites,
+            critical,
             seen=self._tried,
             outputs=len(self.history.outputs),
             settings=self.settings,
             rng=rng,
         )
-        return replace(self._made("push", point, str(push)), push=push)
 
     def _fitted(self, order: Sequence[int], rng: np.random.Generator) -> LinearDynamics:
         """Return dynamics fitted to the best and the latest simulations."""
@@ -360,14 +357,11 @@ class Surrogate:
 
     def _is_near_extreme(self, point: Array) -> bool:
         """Whether each input is constant near a bound."""
-        own = (point[group] for group in self.layout.groups)
-        return all(np.abs(v - np.rint(v[0])).max() <= _NEAR_EXTREME for v in own)
+        return all(np.abs(point[g] - np.rint(point[g][0])).max() <= _NEAR_EXTREME for g in self.layout.groups)
 
     def _change(self, rng: np.random.Generator) -> Pending:
         samples, horizon = self.history.samples, self.grid.step * self.grid.cells
-        # What a predicate does in the rest of an inner window counts, too; and where levels lead, the next
-        # one may be decided later.
-        rest = horizon if self._levels.is_staircase else min(self._windows, default=0.0)
+        rest = min(self._windows, default=0.0)  # what happens in the rest of an inner window counts, too
         decided = np.array([s.critical * horizon + rest for s in samples])
         robustness = np.array([s.robustness for s in samples])
         draws = max(self.settings.retries, 1) if self.feasibility.has_failures else 1
@@ -376,18 +370,3 @@ class Surrogate:
             self.layout, self.history.points, robustness, decided, rng, risk=risk, draws=draws
         )
         return self._made("changes", point, why)
-
-
-def _pace(layout: Layout, dwell: float) -> str:
-    """Say how often switching inputs can change: control points may be further apart than the dwell time."""
-    paces: dict[str, list[str]] = {}
-    for r, coding in zip(layout.space.inputs, layout.codings, strict=True):
-        pace = f"every {dwell:.3g} s, a fraction of an inner window"
-        if len(coding.times) < 2:
-            pace = "for the whole simulation"
-        elif (gap := coding.times[1] - coding.times[0]) > dwell:
-            pace = f"at each control point, {gap:.3g} s apart"
-        paces.setdefault(pace, []).append(r.name)
-    if len(paces) == 1:
-        return f" {next(iter(paces))}"
-    return ": " + "; ".join(f"{' and '.join(names)} {pace}" for pace, names in paces.items())

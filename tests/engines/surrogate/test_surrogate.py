@@ -189,18 +189,12 @@ def test_nothing_is_simulated_twice_where_many_points_are_the_same_candidate(
     assert len({c.key for c in asked}) == 60
 
 
-@pytest.mark.parametrize(
-    ("points", "free", "why"),
-    [
-        (3, None, "inputs take a random bound at each control point, 5 s apart"),
-        (4, FREE, "inputs take a random bound every "),
-        (1, None, "inputs take a random bound for the whole simulation"),
-    ],
-)
-def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | None, why: str) -> None:
+@pytest.mark.parametrize(("points", "free"), [(3, None), (4, FREE), (1, None)])
+def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | None) -> None:
     problem = lag_problem("G[0,6] (F[0,2] (x <= 0.9))", points=points, free=free)
-    engine = Surrogate(problem, seed=0, settings=HASTY)
-    assert any(candidate.rationale.startswith(why) for candidate in engine.ask(4))
+    reasons = [candidate.rationale for candidate in Surrogate(problem, seed=0, settings=HASTY).ask(4)]
+    often = ("every 0.5 s, or", "every 1 s, or")
+    assert any(f"inputs take a random bound {each} as often as" in why for each in often for why in reasons)
 
 
 def narrow_problem(levels: tuple[Crossing, ...] = ()) -> Problem:
