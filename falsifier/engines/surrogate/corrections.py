@@ -34,7 +34,7 @@ class Corrections:
         self._known = _by_block(inputs)
         count, cells, outputs = errors.shape
         filled = np.pad(errors, ((0, 0), (0, -cells % _BLOCK), (0, 0)))
-        by_block = filled.reshape(count, -1, _BLOCK * outputs).swapaxes(0, 1).astype(np.float32)
+        by_block = filled.reshape(count, len(self._known), _BLOCK * outputs).swapaxes(0, 1).astype(np.float32)
         # One more column, so that a product with weights also returns their sum.
         self._errors = np.pad(by_block, ((0, 0), (0, 0), (0, 1)), constant_values=1.0)
         self._outputs = outputs
@@ -53,7 +53,7 @@ class Corrections:
         distances /= np.arange(1, len(new) + 1, dtype=np.float32)[:, None, None] * (-2.0 * width * _WIDTH**2)
         errors, total = np.split(np.exp(distances, out=distances) @ self._errors, [-1], axis=2)
         errors = (errors / (_NO_ERROR + total)).swapaxes(0, 1)
-        return np.asarray(errors.reshape(count, -1, self._outputs)[:, :cells])
+        return np.asarray(errors.reshape(count, _BLOCK * len(new), self._outputs)[:, :cells])
 
 
 def _by_block(inputs: Array) -> Array:
