@@ -293,7 +293,7 @@ class Surrogate:
     def _switch(self, rng: np.random.Generator) -> Pending:
         self._switched += 1
         dwell = float(rng.choice(self._windows)) * float(rng.choice([0.25, 0.5]))
-        why = f"inputs take a random bound every {dwell:.3g} s, or as often as their control points allow"
+        why = f"inputs take a random bound every {dwell:.3g} s, or at control points that are further apart"
         return self._made("switching", switching(self.layout, rng, dwell), why)
 
     def _plan(self, rng: np.random.Generator) -> Pending:
