@@ -11,7 +11,7 @@ import numpy as np
 
 from falsifier.core.arguments import instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING, Experiment
+from falsifier.core.model import GRID_ROUNDING
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
@@ -189,13 +189,14 @@ def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
 
 def monitor_for(problem: Problem) -> Monitor:
     """Return the monitor of the problem's requirement on its output grid, compiled once per process."""
-    return compiled(problem.requirement.formula, problem.experiment)
+    experiment = problem.experiment
+    return compiled(problem.requirement.formula, experiment.output_interval, experiment.samples)
 
 
 @lru_cache(maxsize=256)
-def compiled(formula: Formula, experiment: Experiment) -> Monitor:
-    """Return the monitor of a formula on an experiment's output grid, compiled once per process."""
-    return Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
+def compiled(formula: Formula, step: float, samples: int) -> Monitor:
+    """Return the monitor of a formula on samples that are a step in s apart, compiled once per process."""
+    return Monitor(formula, step=step, samples=samples)
 
 
 def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:

@@ -9,11 +9,12 @@ from falsifier.errors import MonitorError, SpecError
 from falsifier.evaluation.confirm import (
     Movement,
     confirm,
+    half_step,
     other_interface,
     step_convergence,
     sufficient_step,
 )
-from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.fmu import Frame
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -30,6 +31,11 @@ COARSE, FINE = 1 - 0.9**10, 1 - 0.95**20
 
 def highest(problem: Problem) -> Evaluation:
     return evaluate(problem, problem.space.decode([1.0] * 4))
+
+
+def test_half_the_step_needs_no_monitor_of_its_own() -> None:
+    problem = euler_problem("G[1,1] (x <= 0.6)")
+    assert monitor_for(half_step(problem)) is monitor_for(problem)
 
 
 def test_a_violation_that_stays_at_half_the_step_is_confirmed() -> None:

@@ -74,7 +74,8 @@ class Disguise:
         if trajectory is not None:
             trajectory = Trajectory(trajectory.times, self.hidden_values(trajectory.columns))
         if verdict is not None:
-            monitor = compiled(self.view.requirement.formula, self.view.experiment)
+            grid = self.view.experiment
+            monitor = compiled(self.view.requirement.formula, grid.output_interval, grid.samples)
             told = monitor.evaluate(trajectory) if trajectory else self.hidden_verdict(verdict)
             verdict = replace(told, robustness=verdict.robustness)
         candidate = self.hidden_candidate(evaluation.candidate)

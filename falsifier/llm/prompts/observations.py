@@ -78,7 +78,8 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
     if trajectory is None:
         return Observed((line,), (line,), line)
-    monitor = compiled(view.requirement.formula, view.experiment)
+    grid = view.experiment
+    monitor = compiled(view.requirement.formula, grid.output_interval, grid.samples)
     diagnosis = monitor.diagnose(trajectory)
     reasons = tuple(_reasons(verdict, diagnosis))
     over_time = monitor.courses(trajectory)
