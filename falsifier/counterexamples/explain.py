@@ -179,7 +179,7 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
 
     It is to rest, or to the middle of the range if rest is unknown or all values are at rest already.
     """
-    rest = rest_value(problem, ranged.name)
+    rest = rest_value(problem, ranged)
     if rest is not None and any(v != rest for v in values):
         return Effect(ranged.name, None, rest, is_rest=True)
     return Effect(ranged.name, None, (ranged.low + ranged.high) / 2, is_rest=False)

@@ -171,11 +171,12 @@ class _Hunt:
 
 def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:
     """All inputs at rest and parameters nominal together, then each of them alone."""
-    rests = {name: rest for name in problem.space.names if (rest := rest_value(problem, name)) is not None}
     constants = {
-        r.name: constant_signal(problem, r, rests[r.name]) for r in problem.space.inputs if r.name in rests
+        r.name: constant_signal(problem, r, rest)
+        for r in problem.space.inputs
+        if (rest := rest_value(problem, r)) is not None
     }
-    nominal = {p.name: rests[p.name] for p in problem.space.parameters if p.name in rests}
+    nominal = {p.name: rest for p in problem.space.parameters if (rest := rest_value(problem, p)) is not None}
     yield replace(
         candidate, signals={**candidate.signals, **constants}, parameters={**candidate.parameters, **nominal}
     )
@@ -329,6 +330,6 @@ def _with_points(signal: Signal, kept: list[int]) -> Signal:
 
 
 def _simple_values(problem: Problem, r: InputRange, signal: Signal) -> list[float]:
-    rest = rest_value(problem, r.name)
+    rest = rest_value(problem, r)
     known = (r.low, r.high, *sorted(set(signal.values)))
     return list(dict.fromkeys(known if rest is None else (rest, *known)))

@@ -17,7 +17,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import digits
 from falsifier.core.signals import Interpolation
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.space import InputRange, ParameterRange, Range
 from falsifier.problem.problem import Problem
 
 Key = tuple[object, ...]
@@ -25,16 +25,16 @@ Key = tuple[object, ...]
 _SIMPLEST_FIRST: tuple[Interpolation, ...] = ("constant", "linear", "pchip")
 
 
-def rest_value(problem: Problem, name: str) -> float | None:
+def rest_value(problem: Problem, ranged: Range) -> float | None:
     """Rest value of an input, or nominal value of a parameter; None if unknown.
 
     The rest value of an input is the model's start value, or 0 if that is unknown or outside the range. The
     nominal value of a parameter is the model's own value.
     """
-    ranged = _range(problem, name)
-    known = problem.info[name].start_number if name in problem.info else None
     if isinstance(ranged, ParameterRange):
         known = ranged.nominal
+    else:
+        known = problem.info[ranged.name].start_number if ranged.name in problem.info else None
     if known is not None and ranged.low <= known <= ranged.high:
         return known
     if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high:
@@ -47,7 +47,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
     signals = [(r, candidate.signals[r.name]) for r in problem.space.inputs]
     parameters = [(p, candidate.parameters[p.name]) for p in problem.space.parameters]
     numbers = [(r, v) for r, s in signals for v in sorted(set(s.values))] + parameters
-    rests = {name: rest_value(problem, name) for name in problem.space.names}
+    rests = {ranged.name: rest_value(problem, ranged) for ranged, _ in (*signals, *parameters)}
     return (
         sum(len(set(s.values)) for _, s in signals),
         sum(s.switches for _, s in signals),
@@ -84,8 +84,3 @@ def _roughness(ranged: InputRange | ParameterRange, value: float, rest: float | 
     if value == rest:
         return 0
     return 1 if value in (ranged.low, ranged.high) else 1 + digits(value)
-
-
-def _range(problem: Problem, name: str) -> InputRange | ParameterRange:
-    ranges: list[InputRange | ParameterRange] = [*problem.space.inputs, *problem.space.parameters]
-    return next(r for r in ranges if r.name == name)

@@ -33,8 +33,7 @@ def test_the_order_of_simplicity() -> None:
 
 def test_rest_is_the_start_value_within_the_range() -> None:
     problem = lag_problem(parameters=(ParameterRange("x0", 0.5, 1.0, nominal=0.0),))
-    assert rest_value(problem, "u") == 0.0
-    assert rest_value(problem, "x0") is None
-    moved = replace(problem.space.inputs[0], low=0.2)
-    space = replace(problem.space, inputs=(moved,))
-    assert rest_value(replace(problem, space=space), "u") is None
+    (u,), (x0,) = problem.space.inputs, problem.space.parameters
+    assert rest_value(problem, u) == 0.0
+    assert rest_value(problem, x0) is None
+    assert rest_value(problem, replace(u, low=0.2)) is None
