@@ -138,10 +138,8 @@ def result_json(result: Result) -> dict[str, Any]:
 
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
     """Return what broke, the inputs, and what decided an evaluation."""
-    candidate, verdict = evaluation.candidate, evaluation.verdict
-    facts = [*broken_facts(verdict), *candidate_facts(candidate, problem.space)]
-    facts += margin_facts(verdict, units_of(problem))
-    return [*facts, *([("rationale", candidate.rationale)] if candidate.rationale else [])]
+    verdict, inputs = evaluation.verdict, candidate_facts(evaluation.candidate, problem.space)
+    return [*broken_facts(verdict), *inputs, *margin_facts(verdict, units_of(problem))]
 
 
 def units_of(problem: Problem) -> dict[str, str]:
