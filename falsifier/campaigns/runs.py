@@ -53,7 +53,7 @@ class Run(Summary):
     @property
     def counterexample_file(self) -> Path:
         """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
-        return self.directory / file_of(self.manifest.requirement.name if self.method.together else "")
+        return self.directory / file_of(self.manifest.requirement.name, shared=self.method.together)
 
     @property
     def seed(self) -> int:

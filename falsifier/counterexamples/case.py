@@ -144,7 +144,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     keep_recorded(place)
     described = manifest.read(place)
     name = _chosen(place, described, requirement)
-    file = place / file_of(name if described.shared else "")
+    file = place / file_of(name, shared=described.shared)
     if not file.exists():
         return nearest_miss(place, name)
     simpler = shrunk_file(file)
@@ -170,7 +170,7 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     robustness, candidate = min(misses, key=lambda pair: pair[0])
     manifest.check_in_sight(directory, described.request.problems)
     return Case(
-        directory / file_of(name if described.shared else ""),
+        directory / file_of(name, shared=described.shared),
         candidate,
         described.of(name).request.source,
         described.allow,
@@ -182,7 +182,7 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
 
 def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     """Return the requirement that was named, the only one, or the only one with a counterexample."""
-    found = [name for name in described.names if (place / file_of(name)).exists()]
+    found = [name for name in described.names if (place / file_of(name, shared=True)).exists()]
     if requirement is None and len(found) == 1:
         return found[0]
     return described.of(requirement).requirement.name

@@ -208,13 +208,13 @@ def counterexample_file(path: Path) -> Path:
     )
 
 
-def file_of(requirement: str = "") -> str:
-    """Name of the counterexample's file in a run directory; with the requirement if several share a search.
+def file_of(requirement: str, *, shared: bool) -> str:
+    """Name of a counterexample's file in a run directory; shared: several requirements share the search.
 
-    >>> file_of(), file_of("AT1")
+    >>> file_of("AT1", shared=False), file_of("AT1", shared=True)
     ('counterexample.json', 'counterexample-AT1.json')
     """
-    return f"counterexample-{file_name(requirement)}.json" if requirement else FILE_NAME
+    return f"counterexample-{file_name(requirement)}.json" if shared else FILE_NAME
 
 
 def shrunk_file(counterexample: Path) -> Path:
@@ -248,7 +248,7 @@ def keep_recorded(directory: Path) -> None:
     for record in records:
         if not isinstance(record, ConfirmedRecord) or record.outcome != "confirmed":
             continue
-        file = directory / file_of(record.requirement if described.shared else "")
+        file = directory / file_of(record.requirement, shared=described.shared)
         if file.exists():
             continue
         alone = described.of(record.requirement)

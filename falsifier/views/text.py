@@ -112,7 +112,7 @@ def results_text(results: Sequence[Result]) -> str:
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; results that share a directory have one each."""
     shared = result.directory is not None and manifest.read(result.directory).shared
-    return file_of(result.problem.name if shared else "")
+    return file_of(result.problem.name, shared=shared)
 
 
 def result_json(result: Result) -> dict[str, Any]:

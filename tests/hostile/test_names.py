@@ -113,7 +113,7 @@ def test_runs_stay_in_their_directory(name: str, tmp_path: Path) -> None:
     assert found is not None
     stored = Database(place / "store").save(named(name), to_store(found))
     assert stored.parent.parent == place / "store"
-    assert Path(file_of(name)).name == file_of(name)
+    assert Path(file_of(name, shared=True)).name == file_of(name, shared=True)
     source = ProblemSource(target=f"specs/AT.toml:{name}")
     assert Path(run_name(RunRequest(problems=(source,)))).name == run_name(RunRequest(problems=(source,)))
 
