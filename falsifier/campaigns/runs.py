@@ -23,11 +23,6 @@ if TYPE_CHECKING:
     import pandas
 
 
-# Columns that are attributes of a run's method, and of what it has spent.
-_OF_METHOD = ("engine", "llm", "effort", "variant", "parameterization", "profile")
-_OF_SPENT = ("simulation_seconds", "engine_seconds", "seconds", "tokens", "cost")
-
-
 @dataclass(eq=False, kw_only=True)
 class Run(Summary):
     """One requirement in one run, read from its directory: its numbers (see Summary) and what was requested.
@@ -150,16 +145,26 @@ def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
 
 
 def _row(run: Run) -> dict[str, Any]:
+    method, spent, verdict = run.method, run.spent, run.verdict
     return {
         "requirement": run.requirement,
-        "method": run.method.label,
-        **{name: getattr(run.method, name) for name in _OF_METHOD},
+        "method": method.label,
+        "engine": method.engine,
+        "llm": method.llm,
+        "effort": method.effort,
+        "variant": method.variant,
+        "parameterization": method.parameterization,
+        "profile": method.profile,
         "seed": run.seed,
         "status": run.status,
         "falsified": run.falsified,
         "simulations": run.simulations,
-        "robustness": run.verdict.robustness if run.verdict else None,
-        "critical_time": run.verdict.critical_time if run.verdict else None,
-        **{name: getattr(run.spent, name) for name in _OF_SPENT},
+        "robustness": verdict.robustness if verdict else None,
+        "critical_time": verdict.critical_time if verdict else None,
+        "simulation_seconds": spent.simulation_seconds,
+        "engine_seconds": spent.engine_seconds,
+        "seconds": spent.seconds,
+        "tokens": spent.tokens,
+        "cost": spent.cost,
         "directory": str(run.directory),
     }
