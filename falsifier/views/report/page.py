@@ -125,7 +125,7 @@ def facts_html(facts: Iterable[Fact]) -> Html:
     return el("dl", *(join(el("dt", name), el("dd", text)) for name, text in facts))
 
 
-def card_html(section: Section, *, title: str = "", more: Sequence[str] = ()) -> Html:
+def card_html(section: Section, *, title: str = "", more: Sequence[str]) -> Html:
     """Show the verdict on a requirement: what was found, or what was tried, and below it what is more."""
     status = section.status
     found = _found(section.shown[0]) if section.shown else []
