@@ -4,7 +4,7 @@ A search shared by several requirements appears as one run per requirement.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -145,16 +145,11 @@ def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
 
 
 def _row(run: Run) -> dict[str, Any]:
-    method, spent, verdict = run.method, run.spent, run.verdict
+    spent, verdict = run.spent, run.verdict
     return {
         "requirement": run.requirement,
-        "method": method.label,
-        "engine": method.engine,
-        "llm": method.llm,
-        "effort": method.effort,
-        "variant": method.variant,
-        "parameterization": method.parameterization,
-        "profile": method.profile,
+        "method": run.method.label,
+        **asdict(run.method),  # all in which methods can differ
         "seed": run.seed,
         "status": run.status,
         "falsified": run.falsified,

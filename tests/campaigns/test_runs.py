@@ -1,7 +1,9 @@
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 
+from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import columns, frame, load, load_run
 from falsifier.record.journal import read_journal, recorded_evaluations
 from tests.campaigns.support import record_ad_hoc
@@ -26,6 +28,7 @@ def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:
     assert {len(column) for column in table.values()} == {8}
     assert table["requirement"] == ["HARD"] * 4 + ["NEVER"] * 4
     assert sum(table["falsified"]) == 4
+    assert {field.name for field in fields(Method)} <= table.keys(), "what tells methods apart is a column"
     assert frame(runs).groupby("requirement").falsified.mean().to_dict() == {"HARD": 1.0, "NEVER": 0.0}
 
 
