@@ -153,7 +153,6 @@ class Dimension:
     time: float | None  # time of the control point in s; None for a parameter
     low: float  # lower bound
     high: float  # upper bound
-    unit: str = ""  # unit of the value
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -221,10 +220,8 @@ class SearchSpace:
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""
-        points = (
-            Dimension(r.name, t, r.low, r.high, r.unit) for r in self.inputs for t in self.fixed_times(r)
-        )
-        return (*points, *(Dimension(p.name, None, p.low, p.high, p.unit) for p in self.parameters))
+        points = (Dimension(r.name, t, r.low, r.high) for r in self.inputs for t in self.fixed_times(r))
+        return (*points, *(Dimension(p.name, None, p.low, p.high) for p in self.parameters))
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -47,9 +47,9 @@ class Waypoint(NamedTuple):
     window: tuple[int, int] | None  # first and last sample of its operator's window; None if it has no window
 
 
-def path_to_decider(part: CompiledPart, buffer: Floats, sample: int = 0) -> list[Waypoint]:
-    """Return the path from a compiled formula at this sample to the predicate that decided its value."""
-    path: list[Waypoint] = []
+def path_to_decider(part: CompiledPart, buffer: Floats) -> list[Waypoint]:
+    """Return the path from a compiled formula at time 0 to the predicate that decided its value."""
+    path, sample = list[Waypoint](), 0
     while True:
         path.append(Waypoint(part, sample, part.at(buffer, sample), part.window_at(sample)))
         if not part.children:

@@ -52,11 +52,6 @@ class Plan:
         """How many numbers a simulation is given; see ``given_values``."""
         return len(self.parameters) + len(self.inputs) * 5 * self.pieces
 
-    @property
-    def steps(self) -> int:
-        """Number of communication steps."""
-        return (self.samples - 1) * self.every
-
 
 def make_plan(
     description: Description,
