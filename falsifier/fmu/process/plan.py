@@ -65,7 +65,6 @@ def make_plan(
 
     Raises:
         ModelError: naming a variable that the model does not have or that cannot be set or recorded.
-        SpecError: if the steps and the stop time are not multiples of each other.
     """
     model = description.info.name
     variables = {v.name: v for v in description.info.variables}
