@@ -189,14 +189,18 @@ class SearchSpace:
                 raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
-        ranges: tuple[Range, ...] = (*self.inputs, *self.parameters)
-        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in ranges)
+        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in self.ranges)
         return f"<SearchSpace: {searched}; {self.stop_time:g} s>"
+
+    @property
+    def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
+        """The inputs, then the parameters."""
+        return (*self.inputs, *self.parameters)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the inputs, then of the parameters."""
-        return (*(r.name for r in self.inputs), *(p.name for p in self.parameters))
+        return tuple(r.name for r in self.ranges)
 
     @property
     def fixed(self) -> "SearchSpace":
