@@ -69,7 +69,7 @@ def test_times_of_formulas_are_the_bounds_of_their_windows() -> None:
     assert formula_times(["G[0,1] (F[0.5,2] (x > 0))", "not a formula ("]) == [0.0, 1.0, 0.5, 2.0]
 
 
-def test_a_stated_interval_that_does_not_fit_names_one_that_does(tmp_path: Path) -> None:
+def test_a_stated_interval_that_does_not_fit_names_one_that_does() -> None:
     with pytest.raises(SpecError, match=r"output_interval=0\.25 fits all times"):
         Problem.from_fmu(
             fmu_path("Lag_2"), "G[0,0.75] (y <= 10)", inputs={"u": (-1.0, 1.0)}, output_interval=0.5
