@@ -82,11 +82,6 @@ def impossible() -> Problem:
     return lag_problem("G[0,10] (x <= 2)", name="NEVER")
 
 
-def fast_only() -> Problem:
-    """Falsified only by an input that changes faster than its three control points allow."""
-    return lag_problem("G[0,10] (u - x <= 1.2)", points=3, name="FAST")
-
-
 def easy_again() -> Problem:
     """Another problem with a requirement of the same name."""
     return lag_problem("G[0,10] (x <= 0.8)", name="EASY")

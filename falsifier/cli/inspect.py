@@ -21,7 +21,7 @@ from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import default_interface, is_system, make_system, rights_of
+from falsifier.problem.models import default_interface, make_system, rights_of
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
 from falsifier.views.model_text import info_text, model_json, simulink_text
@@ -189,7 +189,7 @@ def _named(given: Path) -> "Path | System":
     if path is None:
         return _existing_fmu(given)
     spec = read_spec(path)
-    return make_system(spec, path) if is_system(spec) else _existing_fmu(path.parent / (spec.model.fmu or ""))
+    return make_system(spec, path) if spec.is_system else _existing_fmu(path.parent / (spec.model.fmu or ""))
 
 
 def _spec_of(given: Path) -> Path | None:

@@ -68,9 +68,8 @@ def write_whole(path: Path, content: str | bytes) -> Path:
         with suppress(OSError):  # the first error says what is wrong
             partial.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.errno is not None:
-            error.filename = str(
-                path
-            )  # writing does not know which file it was, and nobody knows the partial one
+            # Writing does not know which file it was, and nobody knows the partial one.
+            error.filename = str(path)
         raise
     return path
 

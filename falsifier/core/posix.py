@@ -249,7 +249,7 @@ def exit_text(code: int) -> str:
 
 
 def machine_memory() -> int:
-    """Return the memory of this machine in bytes; 0 if it is unknown."""
+    """Return the memory of this machine in bytes."""
     return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
 
 

@@ -97,13 +97,12 @@ class Signal:
             values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
             return _constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
-        if self.interpolation == "constant" or len(knots) == 1:
-            return _constant_pieces(knots, values)
+        if self.interpolation == "pchip" and len(knots) > 1:
+            return _pchip(self.times, self.values).copy()
+        table = _constant_pieces(knots, values)
         if self.interpolation == "linear":
-            table = _constant_pieces(knots, values)
             table[:-1, 2] = np.diff(values) / np.diff(knots)
-            return table
-        return _pchip(self.times, self.values).copy()
+        return table
 
     def held(self, hold: float | None) -> "Signal":
         """Return the same signal, sampled and held with this period in s; None: not held."""

@@ -153,7 +153,6 @@ class Dimension:
     time: float | None  # time of the control point in s; None for a parameter
     low: float  # lower bound
     high: float  # upper bound
-    unit: str = ""  # unit of the value
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -190,14 +189,18 @@ class SearchSpace:
                 raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
-        ranges: tuple[Range, ...] = (*self.inputs, *self.parameters)
-        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in ranges)
+        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in self.ranges)
         return f"<SearchSpace: {searched}; {self.stop_time:g} s>"
+
+    @property
+    def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
+        """The inputs, then the parameters."""
+        return (*self.inputs, *self.parameters)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the inputs, then of the parameters."""
-        return (*(r.name for r in self.inputs), *(p.name for p in self.parameters))
+        return tuple(r.name for r in self.ranges)
 
     @property
     def fixed(self) -> "SearchSpace":
@@ -221,10 +224,8 @@ class SearchSpace:
     @property
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""
-        points = (
-            Dimension(r.name, t, r.low, r.high, r.unit) for r in self.inputs for t in self.fixed_times(r)
-        )
-        return (*points, *(Dimension(p.name, None, p.low, p.high, p.unit) for p in self.parameters))
+        points = (Dimension(r.name, t, r.low, r.high) for r in self.inputs for t in self.fixed_times(r))
+        return (*points, *(Dimension(p.name, None, p.low, p.high) for p in self.parameters))
 
     @property
     def bounds(self) -> NDArray[np.float64]:

@@ -20,7 +20,7 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
 
     Units are told if the search space is given, which has them.
     """
-    units = {r.name: r.unit for r in (*space.inputs, *space.parameters)} if space is not None else {}
+    units = {r.name: r.unit for r in space.ranges} if space is not None else {}
     labels = {name: with_unit(name, unit) for name, unit in units.items()}
     return [
         *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in candidate.signals.items()),

@@ -2,7 +2,6 @@
 
 import importlib.util
 import re
-import sysconfig
 import tempfile
 import zipfile
 from pathlib import Path
@@ -96,9 +95,8 @@ def _included(root: Path) -> set[Path]:
 def _headers() -> Path:
     """Return the folder of fmpy's FMI header files, for FMUs that do not contain them."""
     spec = importlib.util.find_spec("fmpy")
-    if spec is None or not spec.submodule_search_locations:
-        return Path(sysconfig.get_path("include"))
-    return Path(spec.submodule_search_locations[0]) / "c-code"
+    assert spec is not None and spec.origin is not None, "fmpy is installed with this package"
+    return Path(spec.origin).parent / "c-code"
 
 
 def _write(path: Path, folder: Path, out: Path) -> None:

@@ -7,7 +7,6 @@ from os.path import relpath
 from pathlib import Path
 
 from falsifier.context.values import NOTHING, Context, Named
-from falsifier.core.space import InputRange, ParameterRange
 from falsifier.fmu import fmu_files
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -47,7 +46,6 @@ def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
     named = problem.named_context
     if not named or problem.context != Context():
         return problem
-    searched: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
     seeds = problem.requirement.formula.signals
     found = gather(
         named.files,
@@ -55,7 +53,7 @@ def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
         seeds=tuple(seeds),
         signals=tuple(dict.fromkeys((*seeds, *problem.experiment.outputs, *problem.space.names))),
         checked=named.checked,
-        ranges={r.name: (r.low, r.high) for r in searched},
+        ranges={r.name: (r.low, r.high) for r in problem.space.ranges},
         is_told=is_told,
     )
     for note in found.notes:

@@ -38,7 +38,7 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     logging = next((each.logging for each in layers[::-1] if each.logging is not None), spec.model.logging)
     interface = next((each.interface for each in layers[::-1] if each.interface), spec.model.interface)
     allow, deny = rights_of(path, layers, spec.model)
-    if is_system(spec):
+    if spec.is_system:
         if interface == "model-exchange":
             raise SpecError(
                 "components of a system have interfaces of their own; set components.NAME.interface and "
@@ -75,13 +75,8 @@ def rights_of(
     return allow, deny
 
 
-def is_system(spec: Spec) -> bool:
-    """Whether a spec has components, or an SSP package in place of an FMU."""
-    return spec.model.fmu is None or is_package(spec.model.fmu)
-
-
 def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
-    """Return the system of a spec for which ``is_system`` is true.
+    """Return the system of a spec that has one.
 
     Raises:
         SpecError: naming the file, both ends of a connection that does not fit, and the remedy.

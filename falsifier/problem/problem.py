@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite, instance, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
@@ -257,8 +257,7 @@ def check_limits(problem: Problem) -> None:
     Raises:
         SpecError: naming the range that exceeds them.
     """
-    ranges: tuple[InputRange | ParameterRange, ...] = (*problem.space.inputs, *problem.space.parameters)
-    for each in ranges:
+    for each in problem.space.ranges:
         if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
             raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
 

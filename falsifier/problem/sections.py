@@ -217,9 +217,7 @@ class ContextSection(Strict):
     files: tuple[str, ...] = Field(
         (), description="Simulink files, sources and documents, relative to the spec file."
     )
-    fmu: bool = Field(
-        default=False, description="Also documentation, sources, texts and annotations inside the FMU."
-    )
+    fmu: bool = Field(default=False, description="Also documentation, sources and texts inside the FMU.")
     checked: tuple[str, ...] = Field(
         (), description="Of these files, those with a line that looks like a key or password but is not."
     )

@@ -18,7 +18,7 @@ from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, fiel
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
-from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
+from falsifier.fmu import is_package
 from falsifier.problem.sections import (
     Components,
     Connections,
@@ -86,6 +86,11 @@ class Spec(Strict):
         min_length=1, description="What to falsify, as [requirements.NAME]."
     )
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
+
+    @property
+    def is_system(self) -> bool:
+        """Whether it has components, or an SSP package in place of an FMU."""
+        return self.model.fmu is None or is_package(self.model.fmu)
 
     @field_validator("requirements")
     @classmethod
@@ -170,8 +175,8 @@ def _check_model(spec: Spec) -> None:
         raise SpecError(
             "a spec has either one FMU here or [components.NAME]; remove one of them", key="model.fmu"
         )
-    is_system = bool(spec.components) or str(spec.model.fmu).endswith(PACKAGES)
-    if (spec.connections and not spec.components) or (spec.coupling != CouplingSection() and not is_system):
+    is_coupled = spec.coupling != CouplingSection()
+    if (spec.connections and not spec.components) or (is_coupled and not spec.is_system):
         key = "connections" if spec.connections else "coupling"
         raise SpecError("only a system has this section: add [components.NAME]", key=key)
 

@@ -4,9 +4,8 @@ import platform
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
-from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -214,7 +213,7 @@ def environment() -> dict[str, Any]:
         "falsifier": __version__,
         "python": sys.version.split()[0],
         "platform": platform.platform(),
-        "packages": {name: found for name in _RECORDED_PACKAGES if (found := _version(name))},
+        "packages": {name: version(name) for name in _RECORDED_PACKAGES},
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
@@ -243,11 +242,3 @@ def _modes(problem: Problem) -> Iterator[ModeRecord]:
         variable = problem.info[name] if name in problem.info else Variable(name)
         if variable.kind in ("integer", "boolean", "enumeration"):
             yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
-
-
-@cache
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

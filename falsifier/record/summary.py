@@ -114,8 +114,6 @@ class Summary:
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent
                 own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
                 self.findings = tuple(each for found in own for each in found)
-            case _:
-                pass
 
     def _evaluated(self, record: EvaluatedRecord) -> None:
         judged = record.verdicts

@@ -33,10 +33,8 @@ from falsifier.stl.formula import (
     negated,
 )
 from falsifier.stl.lexer import name_text
-from falsifier.stl.program import CompiledPart
+from falsifier.stl.program import CompiledPart, Floats
 
-Floats = NDArray[np.float64]
-Truths = NDArray[np.bool_]
 Span = tuple[int, int]
 
 # Maximum number of signals whose values are told of a condition.
@@ -169,7 +167,7 @@ class _Demand(NamedTuple):
         values = self.part.over(buffer, *span)
         return values if self.wanted else -values
 
-    def met(self, buffer: Floats, span: Span) -> Truths:
+    def met(self, buffer: Floats, span: Span) -> NDArray[np.bool_]:
         """At which samples of a span it is met; on a limit, too, the sign says so."""
         return self.margins(buffer, span) > 0
 

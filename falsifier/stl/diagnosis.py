@@ -11,7 +11,6 @@ from math import inf, log10
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.stl.expression import Expression, Number
@@ -29,9 +28,8 @@ from falsifier.stl.formula import (
     Until,
 )
 from falsifier.stl.margins import is_on_limit
-from falsifier.stl.program import CompiledPart
+from falsifier.stl.program import CompiledPart, Floats
 
-Floats = NDArray[np.float64]
 # Digits of numbers; of values that are compared more if their difference is small.
 _DIGITS, _MOST_DIGITS = 6, 12
 # Margin of a Boolean signal that is true.
@@ -47,9 +45,9 @@ class Waypoint(NamedTuple):
     window: tuple[int, int] | None  # first and last sample of its operator's window; None if it has no window
 
 
-def path_to_decider(part: CompiledPart, buffer: Floats, sample: int = 0) -> list[Waypoint]:
-    """Return the path from a compiled formula at this sample to the predicate that decided its value."""
-    path: list[Waypoint] = []
+def path_to_decider(part: CompiledPart, buffer: Floats) -> list[Waypoint]:
+    """Return the path from a compiled formula at time 0 to the predicate that decided its value."""
+    path, sample = list[Waypoint](), 0
     while True:
         path.append(Waypoint(part, sample, part.at(buffer, sample), part.window_at(sample)))
         if not part.children:
@@ -169,7 +167,7 @@ class Diagnosis:
         return " ".join((f"{decided}.", *(v.text for v in self.vacuities)))
 
 
-def diagnose(root: CompiledPart, buffer: NDArray[np.float64], trajectory: Trajectory) -> Diagnosis:
+def diagnose(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Diagnosis:
     """Return the diagnosis of an evaluated formula."""
     times = trajectory.times
     path = path_to_decider(root, buffer)
@@ -196,9 +194,7 @@ def diagnose(root: CompiledPart, buffer: NDArray[np.float64], trajectory: Trajec
     return Diagnosis(path[0].value, critical, tuple(steps), tuple(vacuities.values()))
 
 
-def _vacuity(
-    part: CompiledPart, buffer: NDArray[np.float64], times: NDArray[np.float64]
-) -> VacuousImplication | None:
+def _vacuity(part: CompiledPart, buffer: Floats, times: Floats) -> VacuousImplication | None:
     if not isinstance(part.formula, Implies):
         return None
     first, last = part.location.first, part.location.last

@@ -44,15 +44,14 @@ _HINTS = {
 UNITS = {
     "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
 }  # fmt: skip
-_INSTEAD = {  # what was meant by a name
-
+# What was meant by a name.
+_INSTEAD = {
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
     "u": "operators are capital letters: write U", "alw": "write G or always", "ev": "write F or eventually",
     "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
-
 _BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
 JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /"
 # Maximum number of characters of a line that errors show.

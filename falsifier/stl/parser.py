@@ -165,22 +165,18 @@ class _Parser:
         left = self._operand(level)
         while self._next.kind == "symbol" and _LEVELS.get(self._next.text, -1) >= level:
             token = self._take()
+            here = _LEVELS[token.text]
+            after = here if token.text in _RIGHT_ASSOCIATIVE else here + 1
             if token.text == "U":
-                window = self._window()
-                right = self._formula_at(UNTIL)
+                window, right = self._window(), self._formula_at(after)
                 left = Until(self._as_formula(left, start), right, window)
             elif token.text in _CONNECTIVES:
-                here = _LEVELS[token.text]
-                condition = self._as_formula(left, start)
-                right = self._formula_at(here if token.text in _RIGHT_ASSOCIATIVE else here + 1)
-                left = _CONNECTIVES[token.text](condition, right)
-            elif _LEVELS[token.text] == COMPARISON:
+                left = _CONNECTIVES[token.text](self._as_formula(left, start), self._formula_at(after))
+            elif here == COMPARISON:
                 left = self._chain(self._as_expression(left, start), token)
             else:
-                here = _LEVELS[token.text]
                 term = self._as_expression(left, start)
-                other = self._expression_at(here if token.text in _RIGHT_ASSOCIATIVE else here + 1)
-                left = Arithmetic(cast(Operator, token.text), term, other)
+                left = Arithmetic(cast(Operator, token.text), term, self._expression_at(after))
         self.depth -= 1
         return left
 

@@ -24,13 +24,7 @@ _BESIDE = 0.1
 
 
 def tell_apart(
-    satisfied: Formula,
-    violated: Formula,
-    *,
-    step: float,
-    samples: int,
-    ranges: Mapping[str, Interval],
-    seed: int = 0,
+    satisfied: Formula, violated: Formula, *, step: float, samples: int, ranges: Mapping[str, Interval]
 ) -> Trajectory | None:
     """Return a trajectory of few steps that satisfies one formula and violates the other; None: none found.
 
@@ -40,14 +34,13 @@ def tell_apart(
         step: step of the time grid in s.
         samples: number of samples.
         ranges: range of each signal; signals without one may have any value.
-        seed: seed of the random trajectories.
 
     Raises:
         FormulaError: if a formula does not fit the time grid.
     """
     formulas = (satisfied, violated)
     wanted, unwanted = (Monitor(f, step, samples) for f in formulas)
-    for cuts, columns in _random(formulas, step, samples, ranges, seed):
+    for cuts, columns in _random(formulas, step, samples, ranges):
         kept, broken = _robustness(wanted, columns), -_robustness(unwanted, columns)
         valid = np.flatnonzero((kept >= 0) & (broken > 0))
         if len(valid):
@@ -69,20 +62,20 @@ def differences(
     """
     one, other = (Monitor(f, step, samples) for f in (first, second))
     found: set[int] = set()
-    for _, columns in _random((first, second), step, samples, ranges, 0):
+    for _, columns in _random((first, second), step, samples, ranges):
         signs = np.sign(_robustness(one, columns) - _robustness(other, columns))
         found |= {int(sign) for sign in signs[np.isfinite(signs) & (signs != 0)]}
     return found
 
 
 def _random(
-    formulas: tuple[Formula, ...], step: float, samples: int, ranges: Mapping[str, Interval], seed: int
+    formulas: tuple[Formula, ...], step: float, samples: int, ranges: Mapping[str, Interval]
 ) -> Iterator[tuple[dict[str, NDArray[np.int64]], dict[str, Floats]]]:
     """Yield random trajectories, each signal of shape (m, samples), and the samples where they change."""
     names = list(dict.fromkeys(name for f in formulas for name in f.signals))
     levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
     moments = _moments(formulas, step, samples)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     for switches, count in ((s, c) for s in range(_ROUNDS) for c in _batches(samples)):
         cuts = {n: rng.choice(moments, size=(count, switches)) for n in names}
         yield cuts, {n: _steps(rng, levels[n], cuts[n], samples) for n in names}

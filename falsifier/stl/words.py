@@ -3,7 +3,6 @@
 from falsifier.stl.expression import Arithmetic, Call, Number
 from falsifier.stl.formula import (
     MIRRORED,
-    OPPOSITE,
     Always,
     And,
     Comparison,
@@ -18,6 +17,7 @@ from falsifier.stl.formula import (
     Predicate,
     Until,
     Window,
+    negated,
 )
 
 _IS: dict[Comparison, str] = {
@@ -47,8 +47,10 @@ def _read(formula: Formula, *, later: bool) -> str:
     match formula:
         case Predicate():
             return _predicate(formula)
-        case Not(Predicate() as predicate):
-            return _negated(predicate)
+        case Not(Flag(left=signal)):
+            return f"{signal} is false"
+        case Not(Predicate()):
+            return _read(negated(formula.operand), later=later)
         case Not(operand):
             return f"it is not the case that {_part(operand, later=later)}"
         case And(Predicate() as low, Predicate() as high) if _is_range(formula):
@@ -108,12 +110,6 @@ def _predicate(predicate: Predicate) -> str:
             least = "more than" if operator == ">" else "at least"
             return f"{a} differs from {b} by {least} {right}"
     return f"{left} {_IS[operator]} {right}"
-
-
-def _negated(predicate: Predicate) -> str:
-    if isinstance(predicate, Flag):
-        return f"{predicate.left} is false"
-    return _predicate(Predicate(OPPOSITE[predicate.operator], predicate.left, predicate.right))
 
 
 def _when(window: Window | None, *, later: bool, always: bool = False) -> str:

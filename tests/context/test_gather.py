@@ -32,7 +32,7 @@ def test_thresholds_stand_with_their_signals(tmp_path: Path) -> None:
     assert second.form == "structure, as far as the requirement depends on it"
 
 
-def test_a_source_of_one_component_is_found_by_the_names_of_a_system(tmp_path: Path) -> None:
+def test_a_source_of_one_component_is_found_by_the_names_of_a_system() -> None:
     signals = ["bath.trips", "bath.disagreement", "other.disagreement"]
     context = gather([str(LIMP)], [], seeds=["bath.trips"], signals=signals)
     assert context.of("bath.disagreement") == context.of("other.disagreement") != ()

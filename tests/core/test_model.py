@@ -83,6 +83,8 @@ def test_what_goes_wrong_is_a_failed_simulation(
         ({"output_interval": 0.3}, "not an integer multiple of output_interval = 0.3 s; try .* = 0.2$"),
         ({"output_interval": 2.0}, "not an integer multiple of output_interval = 2 s; try .* 1$"),
         ({"step_size": 0.0}, "step_size: expected a positive number"),
+        ({"step_size": 0.03}, "^step_size: .* try step_size = 0.02"),
+        ({"step_size": 0.2}, "^step_size: .* try step_size = 0.1"),
         ({"time_limit": math.inf}, "time_limit: expected a finite number"),
         ({"outputs": "x"}, "outputs: expected a tuple of names, got 'x'"),
     ],

@@ -44,14 +44,15 @@ def structure(root: str, *, after: str = "", version: str = "1.0") -> str:
     )
 
 
-def values(*parameters: str, tag: str = "ssv:ParameterSet") -> str:
+def values(*parameters: str) -> str:
     """A parameter set, each parameter as ``name type value [unit]``."""
     entries = ""
     for parameter in parameters:
         name, kind, value, *unit = parameter.split(" ")
         stated = f' unit="{unit[0]}"' if unit else ""
         entries += f'<ssv:Parameter name="{name}"><ssv:{kind} value="{value}"{stated}/></ssv:Parameter>'
-    return f'<{tag} {NAMESPACES} version="1.0" name="p"><ssv:Parameters>{entries}</ssv:Parameters></{tag}>'
+    parameters_of = f"<ssv:Parameters>{entries}</ssv:Parameters>"
+    return f'<ssv:ParameterSet {NAMESPACES} version="1.0" name="p">{parameters_of}</ssv:ParameterSet>'
 
 
 def write(file: Path, ssd: str, *fmus: str, more: dict[str, str | bytes] | None = None) -> Path:

@@ -39,11 +39,11 @@ def run(model: System, *outputs: str, **given: Any) -> Trajectory:
     return fixtures.run(model, outputs, **given)
 
 
-def sampled_loop(late: int, *, steps: int = 10, step: float = STEP, gain: float = 2.0) -> NDArray[np.float64]:
-    """The plant's exact states at the communication points, if its input is some steps late; r = 1, T = 2."""
+def sampled_loop(late: int, *, steps: int = 10, step: float = STEP) -> NDArray[np.float64]:
+    """The plant's exact states at communication points, if its input is some steps late; r = 1, T = k = 2."""
     x, decay = [0.0], float(np.exp(-step / 2.0))
     for k in range(steps):
-        u = gain * (1.0 - x[max(k - late, 0)])
+        u = 2.0 * (1.0 - x[max(k - late, 0)])
         x.append(u + (x[-1] - u) * decay)
     return np.array(x)
 

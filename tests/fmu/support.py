@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.errors import SimulationError
+from falsifier.fmu import FmuModel
 from falsifier.fmu.process.workplace import sweep
 from tests import patience
 from tests.command import listen_to_interrupts
@@ -25,6 +27,14 @@ def go(misdeed=0):
     return model.simulate({}, {"misdeed": misdeed}, experiment)["y"][-1]
 go(); go()
 """
+
+
+def commit(model: FmuModel, misdeed: int, *, time_limit: float = patience.HANG) -> SimulationError:
+    """The error of a simulation in which an FMU misbehaves, and after which the next one runs."""
+    with pytest.raises(SimulationError) as caught:
+        fixtures.run(model, ("y",), parameters={"misdeed": misdeed}, time_limit=time_limit)
+    assert fixtures.run(model, ("y",))["y"].tolist() == list(range(11))
+    return caught.value
 
 
 def script(body: str, **environment: str) -> subprocess.Popen[str]:

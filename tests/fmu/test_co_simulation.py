@@ -13,9 +13,9 @@ LAGS = ["Lag_1cs", "Lag_2", "Lag_3"]
 Floats = NDArray[np.float64]
 
 
-def held_lag(values: Floats, step: float, *, period: float = 2.0) -> Floats:
-    """x' = (u - x) / period with u held over each step: the exact solution at the step ends."""
-    x, decay, found = 0.0, float(np.exp(-step / period)), [0.0]
+def held_lag(values: Floats, step: float) -> Floats:
+    """x' = (u - x) / 2 with u held over each step: the exact solution at the step ends."""
+    x, decay, found = 0.0, float(np.exp(-step / 2.0)), [0.0]
     for u in values:
         x = u + (x - u) * decay
         found.append(x)

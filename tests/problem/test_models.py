@@ -91,10 +91,6 @@ WRONG = [
     (COMPONENTS.replace("Gain_2.fmu", "inner.ssp") + REST, "an SSP package cannot be a component"),
     (COMPONENTS.replace("[components.pi]", "[components.'']") + REST, "the name of a component is empty"),
     (COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST, "coupling.metod: unknown key; did you mean 'm"),
-    (
-        COMPONENTS + "[connections]\n'plant.u' = { form = 'pi.y' }\n" + REST,
-        "plant.u.form: unknown key; did you mean",
-    ),
 ]
 
 

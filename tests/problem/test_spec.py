@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.sections import InputSection, ParameterSection
+from falsifier.problem.sections import ContextSection, InputSection, ParameterSection
 from falsifier.problem.spec import overlay, parse_spec, read_spec
 
 GOOD: dict[str, Any] = {
@@ -96,6 +96,12 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
     bad.write_bytes("# Größe\n".encode("latin-1"))
     with pytest.raises(SpecError, match=r"bad\.toml: cannot be read: .*save the file"):
         read_spec(bad)
+
+
+def test_what_is_told_of_an_fmu_is_said_by_its_folders() -> None:
+    """Those of ``context.files.inside``; its description, with annotations, is not among them."""
+    said = ContextSection.model_fields["fmu"].description or ""
+    assert "documentation, sources and texts" in said and "annotations" not in said
 
 
 def test_a_bare_number_fixes_a_parameter() -> None:

@@ -3,18 +3,16 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from falsifier.core.trajectory import Trajectory
 from falsifier.stl import Diagnosis, Monitor, parse
 from falsifier.stl.diagnosis import valued
 from falsifier.stl.expression import Name
 from tests.stl.randoms import STEP, random_case
+from tests.stl.test_monitor import trajectory
 
 
 def diagnose(text: str, step: float = 1.0, **columns: list[float]) -> Diagnosis:
-    n = len(next(iter(columns.values())))
-    times = np.arange(n, dtype=np.float64) * step
-    t = Trajectory(times, {name: np.array(c, dtype=np.float64) for name, c in columns.items()})
-    return Monitor(parse(text), step, n).diagnose(t)
+    t = trajectory(step, **columns)
+    return Monitor(parse(text), step, len(t)).diagnose(t)
 
 
 def test_the_path_of_a_nested_formula_in_words() -> None:

@@ -9,7 +9,6 @@ from tests.stl.randoms import random_formula
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("G[0,20] (speed <= 120)", "At all times from 0 to 20 s, speed is at most 120."),
         ("F[3,5] (x > 1)", "At some time from 3 to 5 s, x is above 1."),
         ("G (x < 1)", "At all times, x is below 1."),
         ("G F (x >= 1)", "At all times, at some later time, x is at least 1."),

@@ -164,10 +164,8 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
             role = _role(element, major, has_start=typed.get("start") is not None)
             start, is_state = _start(kind, typed.attrib), position in states
             variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
-            reference, negated = (
-                whole(element.attrib, "valueReference"),
-                element.get("alias") == "negatedAlias",
-            )
+            reference = whole(element.attrib, "valueReference")
+            negated = element.get("alias") == "negatedAlias"
             yield variable, Slot(reference, code, negated=negated, refusal=role[2])
 
 

@@ -52,11 +52,6 @@ class Plan:
         """How many numbers a simulation is given; see ``given_values``."""
         return len(self.parameters) + len(self.inputs) * 5 * self.pieces
 
-    @property
-    def steps(self) -> int:
-        """Number of communication steps."""
-        return (self.samples - 1) * self.every
-
 
 def make_plan(
     description: Description,
@@ -70,7 +65,6 @@ def make_plan(
 
     Raises:
         ModelError: naming a variable that the model does not have or that cannot be set or recorded.
-        SpecError: if the steps and the stop time are not multiples of each other.
     """
     model = description.info.name
     variables = {v.name: v for v in description.info.variables}

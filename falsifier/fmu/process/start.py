@@ -184,10 +184,6 @@ def _wine_environment(environment: Mapping[str, str], scratch: Path) -> dict[str
         "WINEDLLOVERRIDES": _OVERRIDES,
         # Without an installation, Wine finds its own libraries only in this mode.
         "WINEBOOTSTRAPMODE": "1",
-        "WINETEMP": windows_path(scratch),
-        "WINETMP": windows_path(scratch),
-        "TEMP": windows_path(scratch),
-        "TMP": windows_path(scratch),
-        "SystemRoot": "C:\\windows",
-        "windir": "C:\\windows",
+        **dict.fromkeys(("WINETEMP", "WINETMP", "TEMP", "TMP"), windows_path(scratch)),
+        **dict.fromkeys(("SystemRoot", "windir"), "C:\\windows"),
     }

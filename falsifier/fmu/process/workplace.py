@@ -11,7 +11,6 @@ import threading
 import time
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from hashlib import sha256
 from pathlib import Path
 from uuid import uuid4
 
@@ -120,8 +119,7 @@ class Workplace(WorkFolder):
         Raises:
             ModelError: if a file has changed since the model was loaded, or cannot be unpacked.
         """
-        key = sha256("".join(sha for _, sha in archives).encode()).hexdigest()[:16]
-        folder = self.path / key
+        folder = self.path / checksum("".join(sha for _, sha in archives).encode())
         with self._making:
             if not folder.is_dir():
                 partial = folder.with_suffix(".partial")

@@ -25,10 +25,10 @@ class Clock:
         monkeypatch.setattr("time.monotonic", lambda: self.now)
 
 
-def lasts(clock: Clock, waiting: Patience, pace: float, until: float) -> float:
+def lasts(clock: Clock, waiting: Patience, pace: float) -> float:
     """Seconds after which a simulation at this pace, in simulated seconds per second, is given up or ends."""
     reached = 0.0
-    while reached < until:
+    while reached < PLAN.stop_time:
         clock.now += waiting.seconds
         reached = pace * clock.now
         try:
@@ -42,17 +42,17 @@ def test_without_a_limit_slow_simulations_go_on_and_hanging_ones_do_not(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = Clock(monkeypatch)
-    assert lasts(clock, Patience(PLAN), pace=0.5, until=50.0) == pytest.approx(100.0, abs=2.0)
+    assert lasts(clock, Patience(PLAN), pace=0.5) == pytest.approx(100.0, abs=2.0)
     clock.now = 0.0
-    assert lasts(clock, Patience(PLAN), pace=0.0, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(PLAN), pace=0.0) == pytest.approx(60.1)
     clock.now = 0.0
-    assert lasts(clock, Patience(PLAN), pace=0.01, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(PLAN), pace=0.01) == pytest.approx(60.1)
 
 
 def test_a_limit_of_the_user_is_for_the_whole_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = Clock(monkeypatch)
     limited = make_plan(DESCRIPTION, Experiment(50.0, 1.0, ("y",), time_limit=60.0), (), ())
-    assert lasts(clock, Patience(limited), pace=0.5, until=50.0) == pytest.approx(60.1)
+    assert lasts(clock, Patience(limited), pace=0.5) == pytest.approx(60.1)
 
 
 @pytest.mark.parametrize("told", [math.nan, math.inf, 1e300])

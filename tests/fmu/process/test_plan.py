@@ -3,7 +3,7 @@
 import pytest
 
 from falsifier.core.model import Experiment
-from falsifier.errors import ModelError, SpecError
+from falsifier.errors import ModelError
 from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
@@ -26,10 +26,3 @@ def test_wrong_names_are_refused_with_the_reason(
 ) -> None:
     with pytest.raises(ModelError, match=message):
         make_plan(LAG, Experiment(1.0, 0.1, tuple(outputs)), inputs, parameters)
-
-
-@pytest.mark.parametrize(("step", "instead"), [(0.03, "0.02"), (0.2, "0.1")])
-def test_steps_must_fit(step: float, instead: str) -> None:
-    with pytest.raises(SpecError, match=f"try step_size = {instead}") as caught:
-        make_plan(LAG, Experiment(1.0, 0.1, ("y",), step_size=step), [], [])
-    assert caught.value.key == "step_size"

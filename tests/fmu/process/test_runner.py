@@ -11,7 +11,6 @@ from threading import Thread
 
 import pytest
 
-from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.registry import _MOST_OF_A_THREAD, Registry
@@ -32,6 +31,7 @@ from tests.fmu.support import (
     PRINT,
     TALK,
     assert_nothing_is_left,
+    commit,
     script,
 )
 
@@ -44,13 +44,6 @@ def misdeeds() -> Iterator[FmuModel]:
     model = isolated("Misdeeds_2")
     yield model
     model.close()
-
-
-def commit(model: FmuModel, misdeed: int, *, time_limit: float = patience.HANG) -> SimulationError:
-    with pytest.raises(SimulationError) as caught:
-        run(model, ("y",), parameters={"misdeed": misdeed}, time_limit=time_limit)
-    assert run(model, ("y",))["y"].tolist() == list(range(11)), "the next simulation runs"
-    return caught.value
 
 
 @pytest.mark.parametrize(

@@ -13,11 +13,9 @@ def bindings(*each: str) -> str:
     return f"<ssd:ParameterBindings>{''.join(each)}</ssd:ParameterBindings>"
 
 
-def inline(*parameters: str, prefix: str = "", mapping: str = "") -> str:
-    return (
-        f'<ssd:ParameterBinding prefix="{prefix}"><ssd:ParameterValues>{values(*parameters)}'
-        f"</ssd:ParameterValues>{mapping}</ssd:ParameterBinding>"
-    )
+def inline(*parameters: str, prefix: str = "") -> str:
+    stated = f"<ssd:ParameterValues>{values(*parameters)}</ssd:ParameterValues>"
+    return f'<ssd:ParameterBinding prefix="{prefix}">{stated}</ssd:ParameterBinding>'
 
 
 def starts(file: Path) -> dict[str, float | str]:
