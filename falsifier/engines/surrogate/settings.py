@@ -10,9 +10,10 @@ class Settings:
     # Number of grid cells over the formula's horizon, on which outputs are predicted and free inputs are
     # held; enough for pieces of 1 % of the horizon, few enough for a roll-out in milliseconds.
     cells: int = 100
-    # Number of constant extremes among the first simulations of a formula that a single extreme can violate;
-    # each reaches one steady state.
-    constants: int = 2
+    # Number of constant extremes and of random programs among the first simulations of a formula that a
+    # single extreme can violate: an extreme often does, and a program shows more of the dynamics.
+    constants: int = 1
+    programs: int = 1
     bangs: int = 2  # number of switching inputs among the first simulations of a formula with nested windows
     pauses: int = 2  # number of constant extremes between these
     # Number of stepping inputs, instead of constant extremes, if a violation requires several conditions at

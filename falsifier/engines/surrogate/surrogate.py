@@ -175,9 +175,9 @@ class Surrogate:
         """Return the kinds of the first inputs, in order.
 
         Formulas with nested windows are violated by inputs that change a few times per inner window, so
-        switching inputs come first. Requirements that a single extreme can violate start with constant
-        extremes. If a violation requires several conditions at once, stepping inputs show how the outputs
-        depend on the inputs.
+        switching inputs come first. Requirements that a single extreme can violate start with one, and with a
+        program, which shows more of the dynamics than another extreme. If a violation requires several
+        conditions at once, stepping inputs show how the outputs depend on the inputs.
         """
         settings = self.settings
         if not self.problem.space.inputs:
@@ -187,7 +187,7 @@ class Surrogate:
             return [kind for turn in turns for kind in turn if kind is not None]
         if needs_several(self.problem.requirement.formula):
             return ["stepping"] * settings.probes
-        return ["corners"] * settings.constants
+        return ["corners"] * settings.constants + ["program"] * settings.programs
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
@@ -233,6 +233,8 @@ class Surrogate:
             case "stepping":
                 point = stepping(self.layout, rng, _LEVELS_OF_STEPS)
                 return self._made(arm, point, "steps through many levels of each input")
+            case "program":
+                return self._made(arm, self._explorer.programs.fresh(rng), "a random program of the inputs")
             case "dynamics":
                 return self._plan(rng)
             case "changes":
