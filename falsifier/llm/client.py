@@ -18,6 +18,7 @@ from uuid import uuid4
 
 from pydantic import ValidationError
 
+from falsifier.core.arguments import instance
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
@@ -313,6 +314,7 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
     Raises:
         ChatError: saying what to set or change.
     """
+    instance("llm", llm, str, "a name such as openai/gpt-5-mini, or the path of a model file")
     if is_model_file(llm):
         check_model_file(llm)
         if api_base is not None:
