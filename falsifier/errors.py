@@ -162,8 +162,8 @@ class ChatError(FalsifierError):
     """The language model could not be reached or did not give a usable reply.
 
     Attributes:
-        lost: tokens and cost of requests that timed out, a ``falsifier.llm.messages.Usage``; None: there
-            were none.
+        lost: tokens and cost of requests that timed out or were answered in an unreadable form, a
+            ``falsifier.llm.messages.Usage``; None: there were none.
     """
 
     exit_code = 3

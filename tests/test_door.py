@@ -135,8 +135,25 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.make_engine("uniform", easy(), seed="x"),
         "seed: expected",
     ),
+    "an argument that an engine does not have": (
+        lambda: untyped.make_engine("uniform", easy(), seed=0, sead=1),
+        "engine 'uniform': got an unexpected keyword argument 'sead'; it takes problem, seed",
+    ),
+    "a number as engine": (lambda: untyped.make_engine(3, easy(), seed=0), "engine: expected a name, got 3"),
+    "a number to connect to": (lambda: untyped.connect(3), "llm: expected a name such as openai/gpt"),
+    "a number as a component's name": (
+        lambda: untyped.System({3: "a.fmu"}),
+        "components: expected names of FMUs that are texts, got 3",
+    ),
+    "a number as a system's name": (
+        lambda: untyped.System({"a": "a.fmu"}, name=3),
+        "name: expected a text, got 3",
+    ),
     "lists as trajectory": (lambda: untyped.Trajectory([0, 1], {"x": [1, 2]}), "times: expected an array of"),
-    "NaN in a signal": (lambda: untyped.Signal((0.0, 1.0), (0.0, float("nan"))), "must be finite numbers"),
+    "NaN in a signal": (
+        lambda: untyped.Signal((0.0, 1.0), (0.0, float("nan"))),
+        "must be finite numbers, got nan",
+    ),
     "a text in a signal": (lambda: untyped.Signal((0.0,), ("a",)), "expected sequences of numbers"),
     "numbers as signal": (lambda: untyped.Signal(0.0, 1.0), "expected sequences of numbers"),
     "an unknown interpolation": (

@@ -10,7 +10,7 @@ its robustness is below the requirement's tolerance.
 import csv
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import StringIO
 from pathlib import Path
 from shlex import quote
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from falsifier.campaigns.runs import Run, load
+from falsifier.campaigns.runs import Run
 from falsifier.campaigns.tables import read_published
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
@@ -154,17 +154,25 @@ class Revalidated:
     reason: str
 
 
-def export(directory: Path) -> str:
-    """Export all runs of a campaign, or a single run, in the validation format.
+def export(runs: Iterable[Run]) -> dict[str, str]:
+    """Runs in the validation format, by the label of their method: the format itself tells only instances.
 
     Raises:
-        JournalError: if the directory is neither, or is damaged.
+        JournalError: if a run is damaged.
     """
-    buffer = StringIO()
-    writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_exported(run) for run in load(directory) if run.finished)
-    return buffer.getvalue()
+    methods: dict[str, list[Run]] = {}
+    for run in runs:
+        is_instance = run.method.profile in _PROFILES.values()
+        method = replace(run.method, profile="") if is_instance else run.method
+        methods.setdefault(method.label, []).append(run)
+    files = {}
+    for label, of_method in methods.items():
+        buffer = StringIO()
+        writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(map(_exported, of_method))
+        files[label] = buffer.getvalue()
+    return files
 
 
 def read_rows(path: Path) -> list[Row]:

@@ -11,6 +11,7 @@ import signal
 import sys
 import textwrap
 from contextlib import suppress
+from time import monotonic
 from types import FrameType
 from typing import NoReturn
 
@@ -21,6 +22,10 @@ from falsifier.views.terminal import warn
 
 INTERRUPTED = 130
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# In s; a signal that follows the first one this soon is the same one, as ``timeout`` sends it to the command
+# and to its group. Ctrl-C is different: who presses it twice is impatient.
+_SAME = 1.0
+_INTERRUPTED_AT: list[float] = []
 # Moving displays hide the cursor of the terminal.
 _SHOW_CURSOR = b"\x1b[?25h\n"
 
@@ -101,12 +106,17 @@ def end_at_interrupts(code: int) -> None:
             signal.signal(number, lambda _signal, _frame: os._exit(code))
 
 
-def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
-    signal.signal(number, _end)
+def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
+    _INTERRUPTED_AT.append(monotonic())
+    for each in _STOPPING:
+        if signal.getsignal(each) is _interrupt:
+            signal.signal(each, _end)
     raise KeyboardInterrupt
 
 
-def _end(_signal: int, _frame: FrameType | None) -> NoReturn:
+def _end(number: int, _frame: FrameType | None) -> None:
+    if number != signal.SIGINT and monotonic() - _INTERRUPTED_AT[-1] < _SAME:
+        return
     with suppress(OSError):
         if os.isatty(2):
             os.write(2, _SHOW_CURSOR)

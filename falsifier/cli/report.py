@@ -12,12 +12,17 @@ from falsifier.cli.command import command, refuse
 from falsifier.cli.files import check_ending, check_out, checked_picture, draw, in_existing_folder
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, say
+from falsifier.core.files import file_name
 from falsifier.core.literals import csv_text
+from falsifier.core.words import counted
 from falsifier.record import manifest
 from falsifier.search.result import Columns
 from falsifier.views.analyses_text import coverage_json, coverage_text
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.terminal import warn
+
+# How a file in the ARCH-COMP validation format begins.
+_ARCH_COMP = b"system,"
 
 
 @command()
@@ -51,7 +56,7 @@ def report(
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
     path = out or (None if markdown else first / "report.html")
     page, kind = (b"# Falsification report: ", ".md") if markdown else (b"<!DOCTYPE html>", ".html")
-    outputs = ((arch_comp, b"system,", ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
+    outputs = ((arch_comp, _ARCH_COMP, ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
     named = [(file, begins, ending) for file, begins, ending in outputs if file is not None]
     if len({file.resolve() for file, _, _ in named}) < len(named):
         raise click.UsageError(
@@ -65,8 +70,7 @@ def report(
         if file.suffix not in ("", ".txt", ".htm", ".markdown"):
             check_ending(file, (ending,))
     if arch_comp is not None:
-        arch_comp.write_text(export(first), encoding="utf-8")
-        warn(f"{arch_comp} written")
+        _write_arch_comp(first, arch_comp)
     if csv_file is not None:
         csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
         warn(f"{csv_file} written")
@@ -96,6 +100,21 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
     content = {"requirements": name, **coverage_json(found), "picture": next(map(str, drawn), None)}
     say(as_shown(text, content, as_json=as_json))
+
+
+def _write_arch_comp(directory: Path, path: Path) -> None:
+    """Write the runs that have finished; those of several methods to a file each, named after its method."""
+    runs = load(directory)
+    finished = [run for run in runs if run.finished]
+    if left_out := len(runs) - len(finished):
+        warn(f"{path}: {counted(left_out, 'run')} not finished and left out")
+    exported = export(finished)
+    for label, text in exported.items():
+        own = path if len(exported) == 1 else path.with_stem(f"{path.stem}-{file_name(label)}")
+        if own.exists():
+            check_out(own, begins=_ARCH_COMP)
+        own.write_text(text, encoding="utf-8")
+        warn(f"{own} written")
 
 
 def _evaluations_csv(directories: Iterable[Path]) -> str:

@@ -58,7 +58,8 @@ class Signal:
         if self.times[0] != 0.0 or any(b <= a for a, b in pairwise(self.times)):
             raise SpecError(f"control-point times must increase strictly from 0, got {list(self.times)}")
         if not is_finite:
-            raise SpecError("control-point times and values must be finite numbers")
+            wrong = next(v for v in (*self.times, *self.values) if not isfinite(v))
+            raise SpecError(f"control-point times and values must be finite numbers, got {wrong}")
         one_of("interpolation", self.interpolation, INTERPOLATIONS)
         if self.hold is not None:
             positive("hold", self.hold)

@@ -71,9 +71,11 @@ def parameterization_text(r: InputRange) -> str:
 def counted(count: int, noun: str) -> str:
     """Return a count and its noun, in the singular or plural.
 
-    >>> counted(1, "switch"), counted(2, "switch"), counted(0, "simulation")
-    ('1 switch', '2 switches', '0 simulations')
+    >>> counted(1, "switch"), counted(2, "switch"), counted(0, "simulation"), counted(2, "reply")
+    ('1 switch', '2 switches', '0 simulations', '2 replies')
     """
+    if noun.endswith("ly"):  # reply
+        return f"{count} {noun if count == 1 else noun[:-1] + 'ies'}"
     plural = f"{noun}es" if noun.endswith(("ch", "sh", "s", "x")) else f"{noun}s"
     return f"{count} {noun if count == 1 else plural}"
 

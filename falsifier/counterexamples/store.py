@@ -194,10 +194,7 @@ def counterexample_file(path: Path) -> Path:
         raise SpecError(
             f"this run has several counterexamples; choose one of these files: {names}", file=str(path)
         )
-    expected = (
-        "expected a counterexample file or the directory of a run that found one (of a campaign: a directory "
-        "in its runs/)"
-    )
+    expected = "expected a counterexample file or the directory of a run that found one"
     if not holds_run(path):
         manifest.check_no_folder(path)
         raise SpecError(f"not a run directory; {expected}", file=str(path))

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import signature
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from falsifier.core.arguments import whole
+from falsifier.core.arguments import instance, whole
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError, did_you_mean, setting
 
@@ -85,6 +86,7 @@ def check_engine(name: str) -> None:
     Raises:
         SpecError: if there is none; lists the known names.
     """
+    instance(setting("engine"), name, str, "a name")
     if name not in ENGINES:
         raise SpecError(f"{setting('engine')}: unknown engine {name!r}; {did_you_mean(name, ENGINES)}")
 
@@ -111,5 +113,11 @@ def make_engine(name: str, problem: "Problem", *, seed: int, **options: Any) -> 
         raise SpecError("nothing to search; give at least one input or parameter a range")
     if name == "hybrid" and "adviser" not in options:
         raise SpecError("the hybrid takes an LLMEngine as adviser; falsify(..., llm=NAME) makes both")
-    engine: Engine = ENGINES[name].load()(problem, seed=seed, **options)
+    make = ENGINES[name].load()
+    taken = signature(make)
+    try:
+        taken.bind(problem, seed=seed, **options)
+    except TypeError as error:
+        raise SpecError(f"engine {name!r}: {error}; it takes {', '.join(taken.parameters)}") from None
+    engine: Engine = make(problem, seed=seed, **options)
     return engine

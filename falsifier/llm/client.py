@@ -18,6 +18,7 @@ from uuid import uuid4
 
 from pydantic import ValidationError
 
+from falsifier.core.arguments import instance
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
@@ -33,6 +34,7 @@ from falsifier.llm.litellm_adapter import (
 )
 from falsifier.llm.messages import (
     MODES,
+    TOOL_CALL,
     UNREADABLE,
     Chat,
     ChatReply,
@@ -44,7 +46,7 @@ from falsifier.llm.messages import (
 )
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode, known
-from falsifier.llm.transport import within
+from falsifier.llm.transport import UnusableReplyError, within
 from falsifier.llm.usage import Price, lost_usage, usage_of
 
 _LOG = logging.getLogger(__name__)
@@ -58,6 +60,8 @@ DEFAULT_TIMEOUT = 600.0
 # Replies in a row that the server could not parse, before they are asked for in a plainer way: one is the
 # LLM's mistake, several are the server's.
 _MOST_UNREADABLE = 2
+# Characters of the name of a tool that are told.
+_LONGEST_NAME = 60
 # In s; the longest that a socket can wait is 2**31 ms.
 _LONGEST_TIMEOUT = 2e6
 
@@ -106,7 +110,7 @@ class LiteLLMChat:
         if self.cache is not None:
             with suppress(OSError, ValidationError):  # missing or damaged: ask again and overwrite it
                 kept = ChatReply.model_validate_json(self._place(self.cache, request).read_bytes())
-                free = {"usage": Usage(cost=0.0), "seconds": 0.0, "source": "cache"}
+                free = {"usage": Usage(cost=0.0, kept=1), "seconds": 0.0, "source": "cache"}
                 return kept.model_copy(update=free)
         lost: list[Usage] = []
         attempt = 1
@@ -119,8 +123,9 @@ class LiteLLMChat:
                     lost += [error.lost] if error.lost else []
                     self._wait(error, attempt, request)
                     attempt += 1
-        except ChatError as error:
-            error.lost = sum(lost[1:], lost[0]) if lost else error.lost
+        except BaseException as error:  # Ctrl-C, too
+            if lost:
+                error.lost = sum(lost[1:], lost[0])  # type: ignore[attr-defined]
             raise
 
     def _wait(self, error: TransientChatError, attempt: int, request: ChatRequest) -> None:
@@ -225,17 +230,18 @@ class LiteLLMChat:
                 return ChatReply(
                     text="",
                     finish_reason=UNREADABLE,
-                    usage=self._lost(request, timed_out=0),
+                    usage=self._lost(request, without_reply=0),
                     seconds=perf_counter() - started,
                     parameters=self._effective(arguments),
                 )
-            if isinstance(error, TimeoutError) or type(error).__name__ == "Timeout":
-                failure.lost = self._lost(request, timed_out=1)
+            is_paid = isinstance(error, TimeoutError | UnusableReplyError)
+            if is_paid or type(error).__name__ == "Timeout":
+                failure.lost = self._lost(request, without_reply=1)
             raise failure from None
 
-    def _lost(self, request: ChatRequest, *, timed_out: int) -> Usage:
+    def _lost(self, request: ChatRequest, *, without_reply: int) -> Usage:
         price = self.price or listed_price(self.llm, api_base=self.api_base)
-        return lost_usage(request, llm=self.llm, price=price, timed_out=timed_out)
+        return lost_usage(request, llm=self.llm, price=price, without_reply=without_reply)
 
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}
@@ -266,16 +272,19 @@ class LiteLLMChat:
         refusal = _refusal(choice.message)
         refused = bool(refusal) and not choice.message.content
         # Some servers put the whole answer into a call of a tool that nobody offered.
-        calls = (call.function.arguments for call in getattr(choice.message, "tool_calls", None) or ())
-        places = (choice.message.content or refusal, *calls)
+        calls = [call.function for call in getattr(choice.message, "tool_calls", None) or ()]
+        places = (choice.message.content or refusal, *(call.arguments for call in calls))
         text = next((place for place in places if (place or "").strip()), "")
+        finish = "refusal" if refused else choice.finish_reason or ""
+        if calls and not places[0] and finish != "length":
+            finish = f"{TOOL_CALL}{str(calls[0].name)[:_LONGEST_NAME]!r}"
         cost = (getattr(response, "_hidden_params", None) or {}).get("response_cost")
         # Another server under a listed name has its own prices, and zero is true of local ones only.
         is_true = known(self.llm).local or (cost and self.api_base is None)
         return ChatReply(
             text=text,
             reasoning=getattr(choice.message, "reasoning_content", None) or "",
-            finish_reason="refusal" if refused else choice.finish_reason or "",
+            finish_reason=finish,
             usage=usage_of(
                 getattr(response, "usage", None),
                 llm=self.llm,
@@ -305,6 +314,7 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
     Raises:
         ChatError: saying what to set or change.
     """
+    instance("llm", llm, str, "a name such as openai/gpt-5-mini, or the path of a model file")
     if is_model_file(llm):
         check_model_file(llm)
         if api_base is not None:

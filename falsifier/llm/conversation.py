@@ -8,6 +8,7 @@ from falsifier.core.words import counted, shortened
 from falsifier.errors import ChatError, ContextExceededError, FalsifierError, written
 from falsifier.llm.messages import (
     LONGEST_REPLY,
+    TOOL_CALL,
     UNREADABLE,
     Chat,
     ChatReply,
@@ -75,6 +76,8 @@ def converse(
             problem = str(rejection)
             if reply.finish_reason == "length":
                 problem = f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
+            elif reply.finish_reason.startswith(TOOL_CALL):
+                problem = f"it is a {reply.finish_reason} in place of an answer ({problem})"
             on_exchange(exchange.model_copy(update={"problem": problem}))
             problems.append(problem)
             request = _asked_again(request, reply, problem)

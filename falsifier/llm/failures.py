@@ -145,7 +145,7 @@ def classify(
     said = redact(printable(str(error)), secrets)
     if isinstance(error, RefusedReplyError):
         return ChatError(where + said)
-    if isinstance(error, BrokenReplyError):
+    if isinstance(error, BrokenReplyError) and error.status_code is None:
         return TransientChatError(where + said)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
     lowered = shortened(text, _LONGEST_DETAIL).lower()

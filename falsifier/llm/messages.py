@@ -14,6 +14,8 @@ Source = Literal["llm", "script", "recording", "cache"]
 # Ways to ask for JSON, from the strictest to the plainest.
 Mode = Literal["bounded_schema", "json_schema", "json_object", "prompt"]
 MODES: tuple[Mode, ...] = get_args(Mode)
+# How the finish reason of a reply begins that calls a tool; the tool's name follows.
+TOOL_CALL = "call of the tool "
 # Finish reason of a reply that the server could not parse in the form that was asked for.
 UNREADABLE = "unreadable"
 # Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
@@ -54,11 +56,12 @@ class Usage(_Value):
     estimated: bool = Field(
         default=False, description="The provider sent no counts; counted with a usual tokenizer."
     )
-    timed_out: int = Field(
+    without_reply: int = Field(
         default=0,
-        description="Requests among them that had no reply in time; providers charge for them, so the tokens "
-        "that were sent are counted.",
+        description="Requests among them that had no reply in time, or none that can be read; providers "
+        "charge for them, so the tokens that were sent are counted.",
     )
+    kept: int = Field(default=0, description="Replies that were taken from the cache, without a request.")
 
     @property
     def tokens(self) -> int:
@@ -127,7 +130,7 @@ class Exchange(_Value):
     messages: tuple[Message, ...]
     reply: ChatReply | None = Field(description="None if there was no reply.")
     lost: Usage | None = Field(
-        default=None, description="Requests that timed out, if there was no reply in the end."
+        default=None, description="Requests without a usable reply, if there was none in the end."
     )
     problem: str | None = Field(
         default=None, description="Why the reply was rejected, or why there was none."
@@ -135,13 +138,14 @@ class Exchange(_Value):
 
     @property
     def usage(self) -> Usage:
-        """Tokens and cost of this exchange; without a reply, those of requests that timed out."""
+        """Tokens and cost of this exchange; without a reply, those of requests in vain."""
         return self.lost or Usage(cost=0.0) if self.reply is None else self.reply.usage
 
     @property
     def requests(self) -> int:
-        """Number of requests that were answered or timed out; at least 1."""
-        return max(1, self.usage.timed_out + (self.reply is not None))
+        """Number of requests that were answered or timed out; at least 1, unless the reply is a kept one."""
+        usage = self.usage
+        return max(1, usage.without_reply + (self.reply is not None)) - usage.kept
 
     @property
     def seconds(self) -> float:

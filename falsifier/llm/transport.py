@@ -11,6 +11,7 @@ made within ``within`` are sent as httpx would.
 import atexit
 import json
 import os
+import re
 import socket
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -25,6 +26,7 @@ from weakref import WeakSet
 import httpx
 
 from falsifier.errors import setting
+from falsifier.llm.usage import possible_count
 
 T = TypeVar("T")
 
@@ -74,6 +76,12 @@ class RefusedReplyError(Exception):
 class BrokenReplyError(Exception):
     """No reply came, or not one of an LLM's server; the message says what is wrong, and what to do."""
 
+    status_code: int | None = None  # as the server reports it within a reply that has none
+
+
+class UnusableReplyError(BrokenReplyError):
+    """An LLM's server answered, so that the request is paid for, but with nothing that can be used."""
+
 
 def within(seconds: float, action: Callable[[], T]) -> T:
     """Return what an action returns, or give it up after so many seconds and cut its connections.
@@ -109,7 +117,7 @@ def within(seconds: float, action: Callable[[], T]) -> T:
     if call.refusal:
         raise RefusedReplyError(call.refusal)
     if error is not None and call.fault:
-        raise BrokenReplyError(call.fault) from error
+        raise call.fault from error
     if error is not None:
         raise error
     return result  # type: ignore[return-value]
@@ -141,7 +149,7 @@ class _Call:
 
     def __init__(self) -> None:
         self.refusal = ""
-        self.fault = ""
+        self.fault: BrokenReplyError | None = None
         self._lock = Lock()
         self._connections: list[socket.socket] = []
         self.has_ended = False
@@ -183,7 +191,7 @@ class _Call:
         except httpx.TimeoutException:
             raise
         except httpx.TransportError as error:
-            self.fault = self.refusal or _fault_of(error)
+            self.fault = BrokenReplyError(self.refusal or _fault_of(error))
             raise
 
 
@@ -213,7 +221,7 @@ class _Guarded(httpx.BaseTransport):
         # Compressed, a small reply could fill the memory.
         request.headers["Accept-Encoding"] = "identity"
         request.extensions = {**request.extensions, "trace": call.note}
-        call.fault = ""
+        call.fault = None
         with call.noting_faults():
             response = self._plain.send(request, stream=True)
         encoding = response.headers.get("content-encoding", "identity").lower()
@@ -245,9 +253,11 @@ class _Limited(httpx.SyncByteStream):
                 received += part
                 if len(received) > _MOST_BYTES:
                     self._call.refuse(_TOO_LONG)
-                yield part
+        body = bytes(received)
         if self._is_success:
-            self._call.fault = _unreadable(bytes(received))
+            self._call.fault = _unreadable(body)
+        is_answer = isinstance(self._call.fault, UnusableReplyError)
+        yield _with_possible_counts(body) if is_answer else body
 
     def close(self) -> None:
         self._inner.close()
@@ -279,7 +289,7 @@ def _fault_of(error: Exception) -> str:
     return f"no connection to the server ({text}): check the server's address and the network"
 
 
-def _unreadable(body: bytes) -> str:
+def _unreadable(body: bytes) -> BrokenReplyError:
     """What is wrong with the body of a reply; said only if the client library cannot read it either."""
     text = body.decode(errors="replace")
     begins = text[:_LONGEST_BEGINNING].strip()
@@ -287,25 +297,53 @@ def _unreadable(body: bytes) -> str:
     try:
         sent = json.loads(body.decode())
     except UnicodeDecodeError:
-        return f"the reply is not text in UTF-8: {_NO_LLM}"
+        return BrokenReplyError(f"the reply is not text in UTF-8: {_NO_LLM}")
     except RecursionError:
-        return f"the reply is nested too deeply to be read: {_NO_LLM}"
+        return BrokenReplyError(f"the reply is nested too deeply to be read: {_NO_LLM}")
     except ValueError:
-        return (
+        return BrokenReplyError(
             f"the reply is not JSON ({found}): check the server's address, which for most servers ends with "
             "/v1, and its log; a proxy or a page for signing in may answer in its place"
         )
     if isinstance(sent, dict) and (error := sent.get("error")):
-        return f"the server reports: {error}" if isinstance(error, str) else ""
+        return _reported(error)
     if isinstance(sent, dict) and sent.get("choices") == []:
-        return (
+        return UnusableReplyError(
             "the server answers without any choice; its log, or the provider's page on the state of the "
             "service, says why"
         )
-    return (
+    kind = UnusableReplyError if isinstance(sent, dict) else BrokenReplyError
+    return kind(
         f"the reply does not have the form of an LLM's ({found}): check the server's address, and that the "
         "LLM's name begins with the provider whose interface the server has"
     )
+
+
+def _reported(error: Any) -> BrokenReplyError:
+    """What a server reports in place of an answer; without a status it is taken for a temporary failure."""
+    stated = error if isinstance(error, dict) else {"message": error}
+    told, code = stated.get("message") or error, str(stated.get("code"))
+    fault = BrokenReplyError(f"the server reports: {told if isinstance(told, str) else json.dumps(told)}")
+    fault.status_code = int(code) if re.fullmatch("[45][0-9][0-9]", code) else 503
+    return fault
+
+
+def _with_possible_counts(body: bytes) -> bytes:
+    """The body without counts of tokens that cannot be true: the client library would reject all of it."""
+    sent = json.loads(body)
+    usage = sent.get("usage")
+    possible = _possible(usage) if isinstance(usage, dict) else None
+    return body if possible == usage else json.dumps({**sent, "usage": possible}).encode()
+
+
+def _possible(usage: dict[str, Any]) -> dict[str, Any]:
+    found = dict(usage)
+    for name, count in usage.items():
+        if isinstance(count, dict):
+            found[name] = _possible(count)
+        elif name.endswith("_tokens") and count is not None:
+            found[name] = possible_count(count)
+    return found
 
 
 def guarded_client(*, verify: Any = True) -> httpx.Client:

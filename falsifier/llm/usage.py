@@ -67,8 +67,8 @@ def usage_of(
 ) -> Usage:
     """Usage of one answered request.
 
-    What a server reports may be wrong. A count that cannot be true (negative, not an integer) is estimated,
-    and a cost that cannot be true is unknown: otherwise the limits of a run would not hold.
+    What a server reports may be wrong. A count that cannot be true (negative, not an integer, 0 for a text)
+    is estimated, and a cost that cannot be true is unknown: otherwise the limits of a run would not hold.
 
     Args:
         response_usage: as the provider sent it, with OpenAI's field names; None or zeros: no counts, and
@@ -79,17 +79,15 @@ def usage_of(
         price: price stated by the user; overrides any reported cost.
         reported_cost: US dollars as computed by the client library; None if the price is unknown.
     """
-    prompt = _count(getattr(response_usage, "prompt_tokens", None))
-    completion = _count(getattr(response_usage, "completion_tokens", None))
+    prompt = possible_count(getattr(response_usage, "prompt_tokens", None))
+    completion = possible_count(getattr(response_usage, "completion_tokens", None))
     details = getattr(response_usage, "completion_tokens_details", None)
-    reasoning = _count(getattr(details, "reasoning_tokens", None)) or 0
+    reasoning = possible_count(getattr(details, "reasoning_tokens", None))
     kept = getattr(response_usage, "prompt_tokens_details", None)
-    cached = _count(getattr(kept, "cached_tokens", None)) or 0
-    estimated = not prompt and not completion
-    if prompt is None or estimated:
-        prompt, estimated = _sent(request, llm), True
-    if completion is None or estimated:
-        completion, estimated = count_tokens(text, llm), True
+    cached = possible_count(getattr(kept, "cached_tokens", None))
+    estimated = not prompt or (not completion and bool(text))
+    prompt = prompt or _sent(request, llm)
+    completion = completion or count_tokens(text, llm)
     if price is not None:
         cost: float | None = price.cost(prompt, completion)
     else:
@@ -104,21 +102,18 @@ def usage_of(
     )
 
 
-def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, timed_out: int) -> Usage:
+def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, without_reply: int) -> Usage:
     """Usage of a request that brought nothing: the provider charges at least for what was sent."""
     sent = _sent(request, llm)
     cost = None if price is None else price.cost(sent, 0)
-    return Usage(prompt_tokens=sent, cost=cost, estimated=True, timed_out=timed_out)
+    return Usage(prompt_tokens=sent, cost=cost, estimated=True, without_reply=without_reply)
 
 
-def _count(reported: Any) -> int | None:
-    """A reported number of tokens; 0 if none was reported, None if it cannot be true."""
-    if reported is None:
-        return 0
+def possible_count(reported: Any) -> int:
+    """A reported number of tokens; 0 if none was reported, or one that cannot be true."""
     is_number = isinstance(reported, int | float) and not isinstance(reported, bool)
-    if not is_number or not 0 <= reported <= _MOST_TOKENS or reported != int(reported):
-        return None
-    return int(reported)
+    is_possible = is_number and 0 <= reported <= _MOST_TOKENS and reported == int(reported)
+    return int(reported) if is_possible else 0
 
 
 def _believable(cost: Any) -> float | None:

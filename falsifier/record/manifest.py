@@ -26,6 +26,8 @@ from falsifier.search.parameterization import parameterization_of, searched_spac
 from falsifier.search.request import RunRequest, Strict
 
 MANIFEST = "manifest.json"
+# Runs of a folder that are named where one of them is expected.
+_NAMED = 3
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
 
 
@@ -152,10 +154,13 @@ def read(directory: Path) -> Manifest:
 
 
 def check_no_folder(directory: Path) -> None:
-    """Refuse a folder of runs where one run is expected; JournalError naming the runs."""
-    below = sorted(str(path.parent) for path in directory.glob(f"*/{MANIFEST}"))
+    """Refuse a folder of runs, or a campaign's, where a run is expected; JournalError naming some of them."""
+    found = (path for pattern in ("*", "runs/*") for path in directory.glob(f"{pattern}/{MANIFEST}"))
+    below = sorted(str(path.parent) for path in found)
     if below and not (directory / MANIFEST).exists():
-        raise JournalError(f"{directory} is a folder of runs; give one of them: {', '.join(below)}")
+        more = f" and {len(below) - _NAMED} more" if len(below) > _NAMED else ""
+        some = ", ".join(below[:_NAMED])
+        raise JournalError(f"{directory} is a folder of runs; give one of them: {some}{more}")
 
 
 def check_in_sight(directory: Path, sources: Iterable[ProblemSource]) -> None:

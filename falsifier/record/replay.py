@@ -128,7 +128,8 @@ def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
         again = again.plus_requests(exchange.requests, exchange.usage)
     return Spent(
         calls=spent.calls - again.calls,
-        timed_out=spent.timed_out - again.timed_out,
+        kept=spent.kept - again.kept,
+        without_reply=spent.without_reply - again.without_reply,
         prompt_tokens=spent.prompt_tokens - again.prompt_tokens,
         completion_tokens=spent.completion_tokens - again.completion_tokens,
         reasoning_tokens=spent.reasoning_tokens - again.reasoning_tokens,

@@ -36,7 +36,8 @@ class Spent:
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
         calls: requests to a language model that were answered or timed out.
-        timed_out: number of them that timed out.
+        without_reply: number of them that timed out, or whose answer cannot be read.
+        kept: replies of a language model that were taken from the cache, without a request.
         prompt_tokens: tokens sent.
         completion_tokens: tokens received, including reasoning.
         reasoning_tokens: part of them used for reasoning, if the provider reports it.
@@ -53,7 +54,8 @@ class Spent:
     reasoning_tokens: int = 0
     cost: float | None = 0.0
     failures: int = 0
-    timed_out: int = 0
+    without_reply: int = 0
+    kept: int = 0
 
     @property
     def has_mostly_failed(self) -> bool:
@@ -67,6 +69,11 @@ class Spent:
         return counted(self.simulations, "simulation") + failed
 
     @property
+    def questions(self) -> int:
+        """Questions to a language model: requests, and what was answered from the cache."""
+        return self.calls + self.kept
+
+    @property
     def tokens(self) -> int:
         """Tokens sent and received."""
         return self.prompt_tokens + self.completion_tokens
@@ -76,7 +83,8 @@ class Spent:
         return replace(
             self,
             calls=self.calls + count,
-            timed_out=self.timed_out + usage.timed_out,
+            without_reply=self.without_reply + usage.without_reply,
+            kept=self.kept + usage.kept,
             prompt_tokens=self.prompt_tokens + usage.prompt_tokens,
             completion_tokens=self.completion_tokens + usage.completion_tokens,
             reasoning_tokens=self.reasoning_tokens + usage.reasoning_tokens,

@@ -90,12 +90,12 @@ def search(
         loop.attach()
         reason = loop.run(jobs)
         status, reason = loop.concluded(reason)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         status, reason = "interrupted", "stopped by the user"
+        loop.count_lost(stop)
     except ChatError as error:
         status, reason = "failed", str(error)
-        if error.lost is not None:
-            loop.count_requests(error.lost.timed_out, error.lost)
+        loop.count_lost(error)
     except BaseException as error:
         with suppress(Exception):  # an error in a listener must not hide the first one
             loop.end("failed", f"{type(error).__name__}: {error}")
@@ -179,6 +179,7 @@ class _Loop:
             try:
                 self.ask(standing[self.turns % len(standing)], wanted)
             except LimitReached as reached:
+                self.count_lost(reached.__cause__)
                 self.last_defect = str(reached.__cause__ or self.last_defect)
                 return self.failure_text() if self.all_failed() else str(reached)
         return "all requirements are falsified"
@@ -335,6 +336,11 @@ class _Loop:
     def count_requests(self, count: int, usage: Usage) -> None:
         """Count what was asked of a language model."""
         self.spent = self.spent.plus_requests(count, usage)
+
+    def count_lost(self, error: BaseException | None) -> None:
+        """Count the requests that an error tells were in vain."""
+        if (lost := getattr(error, "lost", None)) is not None:
+            self.count_requests(lost.without_reply, lost)
 
     def clock(self) -> Spent:
         """Update and return what has been spent; while a record is repeated, time stands still."""

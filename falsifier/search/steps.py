@@ -59,7 +59,10 @@ def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate
         CandidateError: naming the engine and the input or parameter that is unknown, missing or outside its
             range.
     """
-    candidates = engine.ask(wanted)
+    try:
+        candidates = engine.ask(wanted)
+    except SpecError as error:  # such as a signal with NaN
+        raise SpecError(f"engine {engine.name!r}: {error}") from error
     if not isinstance(candidates, Sequence) or not all(isinstance(c, Candidate) for c in candidates):
         raise SpecError(
             f"engine {engine.name!r}: ask(n) must return a list of Candidate, got {repr(candidates)[:100]}"

@@ -1,6 +1,6 @@
 """Formulas in words, for prompts and reports."""
 
-from falsifier.stl.expression import Arithmetic, Call, Number
+from falsifier.stl.expression import Arithmetic, Call, Number, number_text
 from falsifier.stl.formula import (
     MIRRORED,
     Always,
@@ -121,8 +121,9 @@ def _when(window: Window | None, *, later: bool, always: bool = False) -> str:
     )
     if window is None:
         return open_ended if later else absolute
-    if window.start == window.end:
-        return f"{window.start:g} s later" if later else f"at {window.start:g} s"
+    start, end = number_text(window.start), number_text(window.end)
+    if start == end:
+        return f"{start} s later" if later else f"at {start} s"
     if later and window.start == 0:
-        return f"{soon} the next {window.end:g} s"
-    return f"{absolute} from {window.start:g} to {window.end:g} s{' later' if later else ''}"
+        return f"{soon} the next {end} s"
+    return f"{absolute} from {start} to {end} s{' later' if later else ''}"

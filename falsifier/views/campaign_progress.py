@@ -74,7 +74,7 @@ def overall_line(progress: Progress, *, stopped: bool = False) -> str:
         *([] if stopped else [f"{counts['running']} running"]),
         spent.simulations_text,
     ]
-    if spent.calls:
+    if spent.questions:
         cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
         parts.append(f"{spent.tokens} tokens, {cost}")
     return ", ".join(parts)

@@ -100,7 +100,7 @@ def result_html(result: Result) -> str:
     if shown is not None and shown.trajectory is not None:
         drawn = png(plot_evaluation(result.problem, shown), dpi=_DPI)
         parts.insert(1, picture(drawn, "png", "counterexample" if found else "best evaluation"))
-    if result.directory is not None and spent.calls:
+    if result.directory is not None and spent.questions:
         parts.append(exchanges_html(result.directory, result.problem.name, most=_SHOWN_QUESTIONS))
     return join(*parts)
 

@@ -71,7 +71,7 @@ def result_facts(result: Result) -> list[Fact]:
         facts += margin_facts(shown.verdict, units_of(problem))
         facts += [("rationale", shown.candidate.rationale)] if shown.candidate.rationale else []
     facts += [("note", remark) for remark in result.remarks]
-    facts += [("language model", llm_use(result.spent))] if result.spent.calls else []
+    facts += [("language model", llm_use(result.spent))] if result.spent.questions else []
     return facts
 
 
@@ -226,8 +226,10 @@ def llm_use(spent: Spent) -> str:
     """Calls, tokens and cost of the language model."""
     cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
-    lost = f" ({spent.timed_out} of them timed out)" if spent.timed_out else ""
-    return f"{counted(spent.calls, 'request')}{lost}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
+    lost = f" ({spent.without_reply} of them without a usable reply)" if spent.without_reply else ""
+    kept = f", {counted(spent.kept, 'reply')} from the cache" if spent.kept else ""
+    requests = f"{counted(spent.calls, 'request')}{lost}{kept}"
+    return f"{requests}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
 
 
 def seconds_text(spent: Spent) -> str:

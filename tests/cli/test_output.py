@@ -3,6 +3,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -96,11 +97,23 @@ def started(code: str) -> "subprocess.Popen[str]":
 def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int, number: int) -> None:
     process = started(code)
     assert process.stdout is not None
-    for _ in range(interrupts):
+    for place in range(interrupts):
         process.stdout.readline()
+        if place and number != signal.SIGINT:
+            time.sleep(1.1)
         process.send_signal(number)
     _, err = process.communicate(timeout=50)
     assert (process.returncode, err) == (ends_with, "")
+
+
+def test_a_signal_that_comes_twice_at_once_counts_once() -> None:
+    process = started(STUBBORN.replace("    time.sleep(60)\n", "    time.sleep(2)\n    print('summary')\n"))
+    assert process.stdout is not None
+    for _ in range(2):
+        process.stdout.readline()
+        process.send_signal(signal.SIGTERM)
+    out, err = process.communicate(timeout=50)
+    assert (process.returncode, out, err) == (0, "summary\n", "")
 
 
 def test_files_do_not_take_the_place_of_closed_streams(tmp_path: Path) -> None:

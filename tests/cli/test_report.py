@@ -19,6 +19,23 @@ def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> N
     assert "1 of 1 requirement violated, 1 run," in (tmp_path / "one.html").read_text()
 
 
+def test_files_of_the_competition_have_one_method_and_what_is_left_out_is_told(
+    command: Any, tmp_path: Path
+) -> None:
+    bench(command, "--engine", "corners", "--out", "c", "--quiet")
+    journal = next((tmp_path / "c" / "runs").glob("impossible-corners-*")) / "journal.jsonl"
+    lines = journal.read_text().splitlines(keepends=True)
+    journal.write_text("".join(lines[:-1]))
+    for _ in range(2):  # what it wrote is replaced
+        written = command("report", "c", "--arch-comp", "v.csv")
+        assert "v.csv: 1 run not finished and left out" in written.output
+    rows = {path.name: len(path.read_text().splitlines()) - 1 for path in tmp_path.glob("*.csv")}
+    assert rows == {"v-uniform.csv": 4, "v-corners.csv": 3}
+    (tmp_path / "v-uniform.csv").write_text("mine")
+    kept = command("report", "c", "--arch-comp", "v.csv")
+    assert "v-uniform.csv exists and is kept" in str(kept.exception)
+
+
 def test_every_evaluation_is_written_as_a_table(command: Any, tmp_path: Path) -> None:
     bench(command, "--out", "c", "--quiet")
     assert command("report", "c", "--csv", "e.csv").exit_code == 0

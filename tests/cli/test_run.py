@@ -165,6 +165,14 @@ def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
         refused = falsifier(command, "runs", cwd=work)
         assert refused.code == 2
         assert "runs is a folder of runs; give one of them: runs/A, runs/B" in refused.err
+    shutil.copytree(work / "runs", work / "campaign" / "runs")
+    shutil.copytree(work / "runs" / "A", work / "campaign" / "runs" / "C")
+    shutil.copytree(work / "runs" / "A", work / "campaign" / "runs" / "D")
+    for command in ("explain", "replay", "coverage", "assess"):
+        refused = falsifier(command, "campaign", cwd=work)
+        assert refused.code == 2
+        assert "campaign is a folder of runs; give one of them: campaign/runs/A, camp" in refused.err
+        assert refused.err.strip().endswith("campaign/runs/C and 1 more")
     assert falsifier("resume", "runs", "--budget", "2", "--quiet", cwd=work).code == 0
     falsify("AT1", "corners", budget=1, directory=work / "other")
     shutil.copytree(work / "runs" / "A", work / "A")

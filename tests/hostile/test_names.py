@@ -152,7 +152,8 @@ def test_reports_show_names_as_text(name: str, tmp_path: Path, plain_form: list[
         table = make(load(directory), read_published())
         cells = [cell for row in csv.reader(table.csv().splitlines()) for cell in row]
         assert not [cell for cell in cells if re.match(r"[=+@]|-[^\d.]", cell)]
-    rows = list(csv.reader(arch_comp(directory).splitlines()))
+    (exported,) = arch_comp(load(directory)).values()
+    rows = list(csv.reader(exported.splitlines()))
     assert len(rows) == 2 and not re.match("[=+@]", rows[1][1])
     for text in (result_text(result), results_text([result, result])):
         assert not re.search("[\0-\x08\x0b-\x1f\x7f]", text)

@@ -13,9 +13,9 @@ import falsifier
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
-from falsifier.llm.messages import ChatRequest, Message
+from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
-from falsifier.llm.usage import Price
+from falsifier.llm.usage import Price, count_tokens
 from tests.llm.server import Received, Server, Step, serving
 
 SCHEMA = {
@@ -205,7 +205,44 @@ def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> No
     call = {"id": "1", "type": "function", "function": {"name": "json", "arguments": '{"rationale": ""}'}}
     with serving(Step(None, extra={"tool_calls": [call]}, finish="tool_calls")) as server:
         reply = LiteLLMChat("openai/mine", api_base=server.url).send(REQUEST)
-    assert reply.text == '{"rationale": ""}'
+    assert reply.text == '{"rationale": ""}' and reply.finish_reason == "call of the tool 'json'"
+
+
+_TEXTS = [message.content for message in REQUEST.messages]
+
+
+@pytest.mark.parametrize(
+    ("counts", "sent", "received"),
+    [
+        ({"prompt_tokens": "many", "completion_tokens": None}, None, None),
+        ({"prompt_tokens": 100.0, "completion_tokens": 20.5, "total_tokens": True}, 100, None),
+        ({"prompt_tokens": 100, "completion_tokens": None}, 100, None),
+        ({"prompt_tokens": 7, "completion_tokens": 8, "prompt_tokens_details": {"cached_tokens": "x"}}, 7, 8),
+        ({"prompt_tokens": 7, "completion_tokens": 8, "cost": 0.5, "total_tokens": 15}, 7, 8),
+        (["many"], None, None),
+    ],
+    ids=str,
+)
+def test_counts_of_the_wrong_form_are_counted_here(
+    counts: dict[str, Any], sent: int | None, received: int | None
+) -> None:
+    with serving(Step("some words", usage=counts)) as server:
+        reply = LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)
+    own = [sum(count_tokens(text, "openai/mine") for text in texts) for texts in (_TEXTS, ["some words"])]
+    usage = reply.usage
+    assert reply.text == "some words" and usage.estimated == (None in (sent, received))
+    assert (usage.prompt_tokens, usage.completion_tokens) == (sent or own[0], received or own[1])
+    assert usage.cost == pytest.approx(usage.tokens / 1e6)
+
+
+@pytest.mark.parametrize(
+    ("raw", "count"), [('{"choices": []}', 1), ('{"id": "1"}', 1), ('{"error": "x"}', 0), ("<p>x</p>", 0)]
+)
+def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:
+    with serving(Step(raw=raw)) as server, pytest.raises(TransientChatError) as caught:
+        LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)
+    lost = caught.value.lost or Usage()
+    assert lost.without_reply == count and bool(lost.prompt_tokens) == bool(lost.cost) == bool(count)
 
 
 @pytest.mark.usefixtures("keys")
@@ -249,7 +286,7 @@ def test_a_request_without_an_answer_in_time_is_counted(model: str) -> None:
     with serving(Step(silent=True)) as server, pytest.raises(TransientChatError) as caught:
         LiteLLMChat(model, api_base=server.url, timeout=0.2).send(REQUEST)
     assert caught.value.lost is not None
-    assert caught.value.lost.timed_out == 1 and caught.value.lost.prompt_tokens > 0
+    assert caught.value.lost.without_reply == 1 and caught.value.lost.prompt_tokens > 0
     assert len(server.received) == 1
 
 
@@ -272,7 +309,7 @@ def watched_resolve(host, *args, **kwargs):
 
 socket.socket.connect, socket.getaddrinfo = watched_connect, watched_resolve
 from falsifier.llm.client import LiteLLMChat
-from falsifier.llm.messages import ChatRequest, Message
+from falsifier.llm.messages import ChatRequest, Message, Usage
 request = ChatRequest(messages=(Message(role="user", content="?"),))
 for model, base in zip(sys.argv[1::2], sys.argv[2::2]):
     LiteLLMChat(model, effort="low", api_base=base).send(request)

@@ -126,7 +126,7 @@ class TestCache:
         for _ in range(2):
             chat.accepted(QUESTION, reply)
         again = chat.complete(QUESTION)
-        assert (again.text, again.source, again.usage) == ("answer", "cache", Usage(cost=0.0))
+        assert (again.text, again.source, again.usage) == ("answer", "cache", Usage(cost=0.0, kept=1))
         assert len(inner.requests) == 1
         assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]
 

@@ -66,6 +66,10 @@ def test_two_reasks_at_most() -> None:
         (ChatReply(text="", reasoning="7", finish_reason="length"), "cut off"),
         (ChatReply(text="no", finish_reason="refusal"), "refuses"),
         (ChatReply(text="", finish_reason="content_filter"), "content filter"),
+        (
+            ChatReply(text="{}", finish_reason="call of the tool 'go'"),
+            "a call of the tool 'go' in place of an",
+        ),
     ],
 )
 def test_useless_replies_are_named(reply: ChatReply, problem: str) -> None:

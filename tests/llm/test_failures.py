@@ -121,7 +121,13 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
             "allowed for the organisation",
         ),
         (Step(raw='{"choices": [], "object": "chat.completion"}'), "without any choice"),
-        (Step(raw='{"error": "model not loaded"}'), "model not loaded"),
+        (Step(raw='{"error": "model not loaded"}'), "/v1: the server reports: model not loaded"),
+        (Step(raw='{"error": {"message": "overloaded"}}'), "/v1: the server reports: overloaded"),
+        (
+            Step(raw='{"error": {"message": "no", "code": 401}}'),
+            "check OPENAI_API_KEY. the server reports: no",
+        ),
+        (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
@@ -130,3 +136,5 @@ def test_each_failure_names_its_cure(step: Step, cure: str, monkeypatch: pytest.
     with serving(step) as server, pytest.raises(ChatError) as caught:
         LiteLLMChat("openai/m", api_base=server.url, options={"top_k": 3}).send(REQUEST)
     assert cure in str(caught.value)
+    if "overloaded" in cure:
+        assert isinstance(caught.value, TransientChatError)

@@ -62,12 +62,26 @@ def test_a_wait_beyond_the_deadline_is_not_begun(naps: list[float]) -> None:
 
 def test_requests_that_timed_out_are_counted_as_paid() -> None:
     late = TransientChatError("late")
-    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, timed_out=1)
+    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
     usage = asked(ScriptedChat([late, late, "yes"])).usage
-    assert (usage.timed_out, usage.estimated) == (2, True)
+    assert (usage.without_reply, usage.estimated) == (2, True)
     plain = ScriptedChat(["yes"]).complete(QUESTION).usage
     assert usage.prompt_tokens == plain.prompt_tokens + 100
     assert usage.cost == (None if plain.cost is None else plain.cost + 1.0)
     with pytest.raises(ChatError) as caught:
         asked(ScriptedChat([late, late]), attempts=2)
-    assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, timed_out=2)
+    assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, without_reply=2)
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model")], ids=repr)
+def test_requests_that_timed_out_are_counted_however_the_wait_for_a_reply_ends(ending: BaseException) -> None:
+    late = TransientChatError("late")
+    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
+    failures = iter([late, ending])
+
+    def fail(_: ChatRequest) -> str:
+        raise next(failures)
+
+    with pytest.raises(type(ending)) as ended:
+        asked(ScriptedChat(fail))
+    assert getattr(ended.value, "lost", None) == late.lost

@@ -54,6 +54,15 @@ def test_an_engine_without_candidates_does_not_stall_the_run() -> None:
         falsify(lag_problem(), Mine(), budget=3)
 
 
+def test_an_engine_that_makes_a_signal_of_nan_is_named() -> None:
+    class Broken(Mine):
+        def ask(self, n: int = 1) -> list[Candidate]:
+            return [level(float("nan"))]
+
+    with pytest.raises(SpecError, match=r"engine 'mine': control-point .* finite numbers, got nan"):
+        falsify(lag_problem(), Broken(), budget=3)
+
+
 def test_more_candidates_than_asked_for_are_refused() -> None:
     with pytest.raises(SpecError, match=r"engine 'mine' returned 2 candidates: ask\(1\)"):
         falsify(lag_problem(), Mine(level(0.0), level(0.5)), budget=3)

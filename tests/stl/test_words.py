@@ -10,6 +10,8 @@ from tests.stl.randoms import random_formula
     ("text", "words"),
     [
         ("F[3,5] (x > 1)", "At some time from 3 to 5 s, x is above 1."),
+        ("G[0,1234567.8] (x > 1)", "At all times from 0 to 1234567.8 s, x is above 1."),
+        ("G[0.1234567,0.1234568] b", "At all times from 0.1234567 to 0.1234568 s, b is true."),
         ("G (x < 1)", "At all times, x is below 1."),
         ("G F (x >= 1)", "At all times, at some later time, x is at least 1."),
         ("F G b", "At some time, from then on, b is true."),

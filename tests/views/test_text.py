@@ -56,9 +56,11 @@ def test_a_run_that_can_be_continued_says_how(tmp_path: Path) -> None:
 
 def test_what_the_language_model_used_is_told(found: Result) -> None:
     assert "language model" not in result_text(found)
-    spent = Spent(simulations=1, calls=3, timed_out=1, prompt_tokens=90, completion_tokens=10, cost=0.25)
+    spent = Spent(simulations=1, calls=3, without_reply=1, prompt_tokens=90, completion_tokens=10, cost=0.25)
     text = result_text(replace(found, spent=spent))
-    assert "3 requests (1 of them timed out), 100 tokens" in text and "0.2500 US dollars" in text
+    assert "3 requests (1 of them without a usable reply), 100 tokens" in text and "0.2500 US dollars" in text
+    kept = result_text(replace(found, spent=Spent(simulations=1, kept=1)))
+    assert "language model 0 requests, 1 reply from the cache, 0 tokens, 0.0000 US dollars" in kept
     unknown = result_text(replace(found, spent=replace(spent, cost=None)))
     assert "unknown" in unknown
 

@@ -57,7 +57,9 @@ class System(Isolated):
         instance("components", self.components, Mapping, "FMUs by name")
         instance("connections", self.connections, Mapping, "outputs by input")
         instance("coupling", self.coupling, Coupling, "a Coupling such as Coupling('jacobi')")
+        instance("name", self.name, str, "a text")
         for name, given in self.components.items():
+            instance("components", name, str, "names of FMUs that are texts")
             instance(
                 f"components: {name}", given, (Component, str, Path), "a Component or the path of an FMU"
             )

@@ -113,7 +113,8 @@ class Questions:
         self._count: Callable[[str], int] = lambda text: count_tokens(text, llm)
         self._fixed = self._count(self._standing(1))
         self._aim = min(MOST_PROMPT_TOKENS, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
-        self._samples: list[_Sample] = []
+        self._samples: list[_Sample] = []  # those that are told
+        self._judged: list[_Sample] = []  # all with a verdict, by which samples are ranked
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
@@ -134,7 +135,10 @@ class Questions:
         if self._variant.is_published:
             self._samples = [*self._samples, self._published(evaluation, doubt)][-MOST_SAMPLES:]
         else:
-            self._samples.append(self._seen(evaluation, doubt, why))
+            sample = self._seen(evaluation, doubt, why)
+            self._samples.append(sample)
+            if sample.robustness is not None:
+                self._judged.append(sample)
             self._shorten()
 
     def ask(
@@ -257,10 +261,9 @@ class Questions:
 
     def _best_first(self) -> list[_Sample]:
         """Samples with a verdict by their robustness; where it is flat, by how far their signals got."""
-        judged = [s for s in self._samples if s.robustness is not None]
         if self._is_flat():
-            return sorted(judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
-        return sorted(judged, key=lambda s: (s.robustness or 0.0, s.number))
+            return sorted(self._judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
+        return sorted(self._judged, key=lambda s: (s.robustness or 0.0, s.number))
 
     def _left(self, budget: int | None) -> str:
         if budget is None:
@@ -299,7 +302,7 @@ class Questions:
             _text(inputs, *head, *found.short),
             _text(brief, *head, found.line),
         )
-        best = min((s.robustness for s in self._samples if s.robustness is not None), default=None)
+        best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
         depth = _FULL if news or best is None or verdict.robustness < best else _SHORT
         tokens = tuple(map(self._count, texts))
         return _Sample(self._told, texts, tokens, depth, verdict.robustness, progress, bool(news))
@@ -333,9 +336,9 @@ class Questions:
         return sum(s.tokens[s.depth] for s in self._samples)
 
     def _lightest_first(self) -> list[_Sample]:
-        """The oldest ones first; at the end those that were first somewhere, and the best or furthest one."""
-        best = self._best_first()[:1]
-        return sorted(self._samples, key=lambda s: (s in best, s.is_first, s.number))
+        """The oldest ones first, then those that were first somewhere; at the end those named as the best."""
+        weights = {s.number: _NAMED - place for place, s in enumerate(self._best_first()[:_NAMED])}
+        return sorted(self._samples, key=lambda s: (weights.get(s.number, 0), s.is_first, s.number))
 
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
         if not self._variant.is_published:

@@ -55,7 +55,7 @@ def html_report(*directories: Path) -> str:
     sides = gather(*directories)
     title = " and ".join(side.title for side in sides)
     requirements = by_requirement(sides)
-    asking = [sum(s.run.spent.calls > 0 for s in c.shown) for side in sides for c in side.sections]
+    asking = [sum(s.run.spent.questions > 0 for s in c.shown) for side in sides for c in side.sections]
     most = max(1, _MOST_QUESTIONS // max(1, sum(min(_MOST_TALKS, count) for count in asking)))
     links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in requirements]
     found = differences(sides)
@@ -234,7 +234,7 @@ def _runs(runs: Sequence[Run]) -> Html:
         robustness = signed(run.verdict.robustness) if run.verdict else "–"
         simulation = run.spent.simulation_seconds / max(1, run.simulations)
         proposal = run.spent.engine_seconds / max(1, run.simulations)
-        asked = ", questions included" if run.spent.calls else ""
+        asked = ", questions included" if run.spent.questions else ""
         seconds = f"simulation {simulation:.3g}, proposal {proposal:.3g}{asked}" if run.simulations else "–"
         ended = replay_command(run) if run.falsified else run.reason
         rows.append((run_name(run), run.status, run.spent.simulations_text, robustness, seconds, ended))
@@ -252,7 +252,7 @@ def _shown_details(shown: Shown) -> Html:
 
 def _questions(section: Section, most: int) -> str:
     """What the runs of a requirement asked a language model."""
-    asked = [shown.run for shown in section.shown if shown.run.spent.calls]
+    asked = [shown.run for shown in section.shown if shown.run.spent.questions]
     if not asked:
         return ""
     parts = [

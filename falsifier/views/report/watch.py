@@ -169,7 +169,7 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     history = drawn(partial(plot_history, run), "Robustness over simulations")
     covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
     facts = [("time", seconds_text(run.spent))]
-    facts += [("language model", llm_use(run.spent))] if run.spent.calls else []
+    facts += [("language model", llm_use(run.spent))] if run.spent.questions else []
     of = "" if len(tried) == count else f" ({len(tried)} of {count} simulations)"
     more = [el("h3", "Robustness over simulations"), history]
     more += [el("h3", f"What was tried{of}"), covered] if tried else []

@@ -81,6 +81,18 @@ def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPat
         Questions(View.of(PROBLEM), VARIANTS["MP5"]).ask()
 
 
+def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 2600)
+    points = np.random.default_rng(3).uniform(-1, 1, (40, 5))
+    evaluations = sampled(PROBLEM, *points)
+    evaluations.sort(key=lambda e: e.robustness or 0.0)
+    order = [*range(10, 25), 2, 0, 1, *range(25, 40), *range(3, 10)]  # the best in the middle
+    last = asked_each(PROBLEM, [evaluations[n] for n in order])[-1].content
+    assert " of 40, in the order in which" in last
+    assert "Lowest robustness so far: sample 17, sample 18 and sample 16." in last
+    assert all(f"Sample {n}: " in last for n in (16, 17, 18)) and "Sample 15: " not in last
+
+
 def test_what_decided_and_everything_there() -> None:
     problem, evaluation = transmission()
     _, changing = told(problem, "MP5", [evaluation])
