@@ -64,7 +64,7 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
         "corners": Registered("falsifier.engines.simple:Corners", "constant extremes first, then random"),
         "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(
-            "falsifier.engines.optimisers.bayesian:Bayesian", "Gaussian process with expected improvement"
+            "falsifier.engines.optimisers.bayesian:Bayesian", "Gaussian processes in a trust region"
         ),
         "optuna": Registered(
             "falsifier.engines.optimisers.optuna_tpe:TPE",

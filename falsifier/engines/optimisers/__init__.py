@@ -1,1 +1,1 @@
-"""Optimisers of a vector in [0, 1]^d: what is known of a system is only the robustness of its simulations."""
+"""Optimisers of a vector in [0, 1]^d, which know the robustness of simulations, or of their conditions."""

@@ -1,99 +1,123 @@
-"""Bayesian optimisation: a Gaussian process of the robustness, maximising the expected improvement."""
+"""Bayesian optimisation: Gaussian processes in a trust region, one for each condition of the formula.
+
+The region follows TuRBO (Eriksson et al., NeurIPS 2019): around the best point, it grows while steps succeed
+and shrinks while they fail; when it is small, the search starts again elsewhere.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import minimize
-from scipy.special import log_ndtr, ndtr
 
-from falsifier.engines.box import Proposal
+from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
-from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
-from falsifier.engines.simple import Sobol
+from falsifier.engines.optimisers.conditions import Conditions
+from falsifier.engines.optimisers.gaussian_process import fit_lengths
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-# Maximum number of points of the process, whose cost grows with their cube: half the best, half the latest.
-_MAX_POINTS = 200
-# Variance of the observation noise, relative to that of the standardised costs; keeps the covariance regular.
-_NOISE = 1e-4
-# Starts of the local optimisation, chosen from random samples.
-_STARTS = 3
-_SAMPLES = 512
+# First, longest and shortest side of the region, as shares of the ranges.
+_FIRST_SIDE, _LONGEST, _SHORTEST = 0.8, 1.6, 0.02
+# Successes in a row after which the side doubles.
+_SUCCESSES = 3
+# Points of the process, those nearest to the best one; candidates from which the next point is chosen.
+_MOST_POINTS, _CANDIDATES = 80, 1000
+# Mean number of coordinates in which a candidate differs from the best point: all at once seldom helps.
+_CHANGED = 8.0
+# Of the changed coordinates, the share that is at a bound.
+_AT_BOUND = 0.1
+# Variance of the observation noise, relative to that of a condition; distance in standard deviations from the
+# mean at which a condition is cut: what is far off would hide the differences among the rest.
+_NOISE, _FARTHEST = 1e-4, 5.0
 
 
-class Bayesian(Sobol):
-    """Sobol points first, then the maximum of the log expected improvement of a Gaussian process."""
+class Bayesian(BoxEngine):
+    """Proposes points near the best one where draws of the processes are lowest; learns from all points."""
 
     name = "bayesian"
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        self._start = min(20, 2 * self.box.dimension + 2)
+        self._conditions = Conditions(problem.requirement.formula)
         self._points: list[Array] = []
-        self._costs: list[float] = []
+        self._values: list[Array] = []
+        self._own: list[Array] = []
+        self._restart(first=0)
+
+    def _restart(self, *, first: int) -> None:
+        self._first, self._side = first, _FIRST_SIDE
+        self._successes = self._failures = 0
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
-        if self._asked < self._start or len(self._costs) < 2:
-            few = "a Sobol point: too few evaluations for a Gaussian process yet"
-            return Proposal(super()._propose(rng).point, few)
-        points, costs = self._kept()
-        return self._most_promising(points, standardised(costs), rng)
-
-    def _learn(self, point: Array, cost: float | None) -> None:
-        if cost is not None:
-            self._points.append(point)
-            self._costs.append(cost)
-
-    def _kept(self) -> tuple[Array, Array]:
-        points, costs = np.array(self._points), np.array(self._costs)
-        if len(costs) <= _MAX_POINTS:
-            return points, costs
-        order = np.argsort(costs, kind="stable")[: _MAX_POINTS // 2]
-        latest = np.arange(len(costs) - _MAX_POINTS // 2, len(costs))
-        keep = np.unique(np.concatenate([order, latest]))
-        return points[keep], costs[keep]
-
-    def _most_promising(self, points: Array, targets: Array, rng: np.random.Generator) -> Proposal:
-        process = fit_lengths(points, targets, noise=_NOISE)
-        best = float(targets.min())
         d = self.box.dimension
-        incumbent = process.points[int(np.argmin(targets))]
-        near = np.clip(incumbent + 0.1 * rng.standard_normal((_SAMPLES // 2, d)), 0.0, 1.0)
-        samples = np.concatenate([rng.random((_SAMPLES // 2, d)), near])
-        values = log_improvement(*process.predict(samples), best)
-        step = 1e-4
+        if len(self._points) - self._first < min(d + 2, 12):
+            drawn: Array = rng.random(d)
+            why = "a new start of the trust region"
+        else:
+            drawn = self._step(np.array(self._points[self._first :]), self._scores(), rng)
+            why = "a step in a trust region"
+        point = self.box.settled(drawn)
+        self._own.append(point)
+        return Proposal(point, why)
 
-        def loss_and_slope(x: Array) -> tuple[float, Array]:
-            shifts = np.where(x > 0.5, -step, step)
-            around = np.concatenate([x[None], x + np.diag(shifts)])
-            loss = -log_improvement(*process.predict(around), best)
-            return float(loss[0]), (loss[1:] - loss[0]) / shifts
+    def _scores(self) -> Array:
+        """Return what the conditions were since the last start, divided by their spread: (conditions, n)."""
+        values = np.array(self._values[self._first :]).T
+        spread = values.std(axis=1, keepdims=True)
+        return np.asarray(values / np.where(spread > 0.0, spread, 1.0))
 
-        winner, value = samples[int(np.argmax(values))], float(values.max())
-        for start in samples[np.argsort(-values, kind="stable")[:_STARTS]]:
-            found = minimize(
-                loss_and_slope,
-                start,
-                jac=True,
-                method="L-BFGS-B",
-                bounds=[(0, 1)] * d,
-                options={"maxiter": 30},
-            )
-            if -found.fun > value:
-                winner, value = np.asarray(found.x), -float(found.fun)
-        return Proposal(winner, f"log expected improvement {value:.3g} of the scaled robustness")
+    def _step(self, points: Array, scores: Array, rng: np.random.Generator) -> Array:
+        d = self.box.dimension
+        best = points[int(np.argmin(self._conditions.lowest(scores, scores)))]
+        near = np.argsort(np.abs(points - best).max(axis=1), kind="stable")[:_MOST_POINTS]
+        points, scores = points[near], scores[:, near]
+        centre, spread = scores.mean(axis=1, keepdims=True), scores.std(axis=1, keepdims=True) + 1e-12
+        targets = np.clip((scores - centre) / spread, -_FARTHEST, _FARTHEST)
+        processes = [fit_lengths(points, row, noise=_NOISE) for row in targets]
+        # Coordinates on which little depends get a longer side.
+        logs = np.mean([np.log(process.lengths) for process in processes], axis=0)
+        half = 0.5 * self._side * np.clip(np.exp(logs - logs.mean()), 0.25, 4.0)
+        low, high = np.clip(best - half, 0.0, 1.0), np.clip(best + half, 0.0, 1.0)
+        moved = rng.random((_CANDIDATES, d)) < min(1.0, _CHANGED / d)
+        moved[np.arange(_CANDIDATES), rng.integers(0, d, _CANDIDATES)] = True
+        levels = low + (high - low) * rng.random((_CANDIDATES, d))
+        levels = np.where(
+            rng.random((_CANDIDATES, d)) < _AT_BOUND, np.where(levels > best, high, low), levels
+        )
+        candidates = self.box.settled(np.where(moved, levels, best))
+        candidates = candidates[np.abs(candidates[:, None] - points).max(axis=2).min(axis=1) > 1e-6]
+        if not len(candidates):
+            return rng.random(d)
+        predicted = [process.predict(candidates) for process in processes]
+        means, deviations = (np.array(rows) for rows in zip(*predicted, strict=True))
+        margin = np.abs(rng.standard_normal(len(candidates))) * deviations
+        bounds = (centre + spread * (means + side) for side in (-margin, margin))
+        return np.asarray(candidates[np.argmin(self._conditions.lowest(*bounds))])
 
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Learn from the evaluations whose candidates have the fixed parameterization."""
+        for evaluation in evaluations:
+            if self.box.represents(evaluation.candidate):
+                self._add(self.box.point(evaluation.candidate), self._conditions.values(evaluation))
 
-def log_improvement(mean: Array, deviation: Array, best: float) -> Array:
-    """Return the logarithm of the expected improvement below ``best``.
-
-    It is finite even if the mean is so far above ``best`` that the expected improvement underflows to 0;
-    without that, the optimiser would have no gradient there.
-    """
-    z = (best - mean) / deviation
-    log_density = -0.5 * z * z - 0.5 * np.log(2 * np.pi)
-    plain = np.exp(log_density) + z * ndtr(z)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # For z << 0, phi(z) + z Phi(z) suffers from cancellation and tends to phi(z) / z^2.
-        ratio = 1.0 + z * np.exp(log_ndtr(z) - log_density)
-        tail = log_density + np.where(z < -20.0, -2.0 * np.log(np.abs(z)), np.log(np.maximum(ratio, 1e-300)))
-        inside = np.log(plain)
-    return np.asarray(np.where(z < -3.0, tail, inside) + np.log(deviation))
+    def _add(self, point: Array, values: Array | None) -> None:
+        improved = False
+        if values is not None:
+            self._points.append(point)
+            self._values.append(values)
+            scores = self._scores()
+            *others, latest = self._conditions.lowest(scores, scores)
+            improved = all(latest < other - 1e-9 * abs(other) for other in others)
+        own = [own for own in self._own if not self._is_same(point, own)]
+        if len(own) == len(self._own):
+            return
+        self._own = own
+        if improved:
+            self._successes, self._failures = self._successes + 1, 0
+        else:
+            self._successes, self._failures = 0, self._failures + 1
+        if self._successes >= _SUCCESSES:
+            self._side, self._successes = min(2.0 * self._side, _LONGEST), 0
+        elif self._failures >= max(4, self.box.dimension // 2):
+            self._side, self._failures = 0.5 * self._side, 0
+            if self._side < _SHORTEST:
+                self._restart(first=len(self._points))

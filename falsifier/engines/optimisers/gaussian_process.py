@@ -6,7 +6,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from falsifier.engines.layout import Array, learnable
+from falsifier.engines.layout import Array
 
 # Limits of length scales in the unit box: far beyond them rounding makes the covariance indefinite.
 _SHORTEST, _LONGEST = 1e-3, 1e3
@@ -77,17 +77,3 @@ def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProce
         loss_and_slope, centre, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": _STEPS}
     )
     return GaussianProcess.fit(points, targets, np.exp(found.x), noise=noise)
-
-
-def standardised(costs: Array) -> Array:
-    """Return costs as targets of a process: half their z-scores plus half the normal scores of their ranks.
-
-    Because of the ranks, one very large cost cannot hide the differences among the small ones.
-    """
-    from scipy.special import ndtri
-
-    costs = learnable(costs)
-    count = len(costs)
-    ranks = np.argsort(np.argsort(costs, kind="stable"), kind="stable") / max(count - 1, 1)
-    scores = (costs - costs.mean()) / (costs.std() + 1e-12)
-    return np.asarray(0.5 * scores + 0.5 * ndtri(0.02 + 0.96 * ranks))

@@ -10,6 +10,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.engines.box import BoxEngine
 from falsifier.engines.coverage import Explorer, Ladder
 from falsifier.engines.layout import Array, TimeGrid, planning_layout
+from falsifier.engines.optimisers.bayesian import Bayesian
 from falsifier.engines.optimisers.cma import CMA
 from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecasts, LinearDynamics
@@ -20,7 +21,6 @@ from falsifier.engines.surrogate.planning import Push, Pushes, is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import Margins, inner_windows, needs_several
 from falsifier.engines.surrogate.settings import Settings
-from falsifier.engines.surrogate.trust_region import TrustRegion
 from falsifier.engines.surrogate.variation import random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Levels
@@ -101,7 +101,7 @@ class Surrogate:
         self._ladder = Ladder(problem, self._explorer.programs)
         self._corners = Corners(problem, seed=seed)
         self._engines: dict[str, BoxEngine] = {
-            "region": TrustRegion(problem, seed=seed),
+            "region": Bayesian(problem, seed=seed),
             "uniform": Uniform(problem, seed=seed),
             "corners": self._corners,
             "cma": CMA(problem, seed=seed),

@@ -1,4 +1,4 @@
-"""The trust region."""
+"""Gaussian processes in a trust region."""
 
 from functools import partial
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
 from falsifier.core.space import ParameterRange, SearchSpace
-from falsifier.engines.surrogate.trust_region import TrustRegion
+from falsifier.engines.optimisers.bayesian import Bayesian
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
@@ -48,7 +48,7 @@ def test_the_trust_region_finds_the_bottom_of_a_bowl_in_few_simulations(kind: st
         distance = float(np.abs(problem.space.encode(candidate) - target).sum())
         return Evaluation(candidate, verdict=Verdict(distance, 0.0, "bowl"))
 
-    found = [judge(c).robustness for c in drive(TrustRegion(problem, seed=0), judge, rounds=70)]
+    found = [judge(c).robustness for c in drive(Bayesian(problem, seed=0), judge, rounds=70)]
     assert min(d for d in found if d is not None) <= 6.0, "uniform points come within about 22"
 
 
@@ -71,12 +71,12 @@ def test_two_conditions_of_different_size_are_met_at_once() -> None:
     )
     judged = partial(evaluate, problem)
     for seed in range(3):
-        asked = drive(TrustRegion(problem, seed=seed), judged, rounds=50)
+        asked = drive(Bayesian(problem, seed=seed), judged, rounds=50)
         assert any(judged(candidate).violated for candidate in asked), "of the robustness alone, 54 and more"
 
 
 def test_the_trust_region_starts_again_where_nothing_improves() -> None:
     problem = parameters_problem("real", 2)
-    asked = drive(TrustRegion(problem, seed=0), flat, rounds=60)
+    asked = drive(Bayesian(problem, seed=0), flat, rounds=60)
     starts = [i for i, c in enumerate(asked) if c.rationale.startswith("a new start")]
     assert max(starts) > 20 and len(starts) < 30

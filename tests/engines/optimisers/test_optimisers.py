@@ -5,11 +5,9 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 from falsifier.engines import make_engine
-from falsifier.engines.optimisers.bayesian import log_improvement
-from falsifier.engines.optimisers.gaussian_process import fit_lengths, standardised
+from falsifier.engines.optimisers.gaussian_process import fit_lengths
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.testing import drive, lag_problem
 from tests.engines.support import best_of, bowl, box_problem, flat
@@ -80,21 +78,6 @@ def test_optuna_learns_from_candidates_of_others_and_announces_nothing(
     assert capfd.readouterr() == ("", "")
 
 
-def test_log_improvement_is_the_logarithm_and_finite_where_that_underflows() -> None:
-    z = np.array([-8.0, -4.0, -2.9, 0.0, 3.0])
-    exact = np.log(norm.pdf(z[1:]) + z[1:] * norm.cdf(z[1:]))
-    values = log_improvement(-z, np.ones(5), 0.0)
-    assert values[1:] == pytest.approx(exact, abs=1e-6)
-    far = log_improvement(np.array([20.0, 40.0, 400.0]), np.ones(3), 0.0)
-    assert np.isfinite(far).all() and (np.diff(far) < 0).all()
-
-
-def test_one_huge_cost_does_not_hide_small_differences_and_equal_ones_are_no_trouble() -> None:
-    assert np.diff(standardised(np.array([1.0, 1.1, 1.2, 1e9]))).min() > 0.1
-    assert np.isfinite(standardised(np.full(5, 3.0))).all()
-    assert np.isfinite(standardised(np.array([2.0]))).all()
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_points_that_nearly_coincide_leave_a_covariance_that_can_be_factored(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -106,6 +89,7 @@ def test_points_that_nearly_coincide_leave_a_covariance_that_can_be_factored(see
 
 def test_two_of_thirty_coordinates_that_matter_are_told_from_few_points() -> None:
     points = np.random.default_rng(0).random((30, 30))
-    targets = standardised(np.sin(4 * points[:, 3]) + (points[:, 17] - 0.4) ** 2)
+    values = np.sin(4 * points[:, 3]) + (points[:, 17] - 0.4) ** 2
+    targets = (values - values.mean()) / values.std()
     lengths = fit_lengths(points, targets, noise=1e-4).lengths
     assert set(np.argsort(lengths)[:2]) == {3, 17}

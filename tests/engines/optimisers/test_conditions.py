@@ -6,7 +6,7 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.layout import Array
-from falsifier.engines.surrogate.conditions import Conditions
+from falsifier.engines.optimisers.conditions import Conditions
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.stl import Monitor, Verdict, parse
 
