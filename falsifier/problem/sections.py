@@ -12,15 +12,21 @@ from falsifier.core.signals import Interpolation
 from falsifier.errors import did_you_mean, shown
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
-Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, bool | str):  # pydantic would take true for 1, and "5" for 5
+def _no_text(value: Any) -> Any:
+    if isinstance(value, str):  # pydantic would take "5" for 5
         raise ValueError(f"expected a number, got {shown(value)}")
     return value
 
 
+def _plain(value: Any) -> Any:
+    if isinstance(value, bool):  # and true for 1, which only a value of a Boolean variable may be
+        raise ValueError(f"expected a number, got {shown(value)}")
+    return _no_text(value)
+
+
+Number = Annotated[float, BeforeValidator(_no_text), Field(allow_inf_nan=False)]
+Bound = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
 Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
 Count = Annotated[int, BeforeValidator(_plain)]
 
@@ -31,7 +37,7 @@ def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-Range = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+Range = Annotated[tuple[Bound, Bound], AfterValidator(_in_order)]
 # Maximum number of control points of one input.
 MAX_CONTROL_POINTS = 10_000
 
