@@ -1,7 +1,7 @@
 """The sections of a spec file."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
@@ -46,6 +46,8 @@ class Strict(BaseModel):
     """A section that takes no other keys than its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    # Keys that make another section of it.
+    other_keys: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -56,7 +58,7 @@ class Strict(BaseModel):
         fields = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key in section:
             if key not in fields:
-                raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), fields)}")
+                raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), (*fields, *cls.other_keys))}")
         for key, field in fields.items():
             if field.is_required() and key not in section:
                 raise _wrong(key, missing(field))
@@ -259,6 +261,8 @@ class ModelChanges(Strict):
 
 class RequirementSection(ModelChanges):
     """One requirement, and what it overrides."""
+
+    other_keys = ("template",)
 
     formula: str = Field(description="Formula in Signal Temporal Logic; or a template with its arguments.")
     description: str = Field("", description="Its meaning in words.")

@@ -63,9 +63,9 @@ def changes_from(
     inputs, parameters = inputs or {}, parameters or {}
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
-    for kind, choices in (("inputs", inputs), ("parameters", parameters)):
-        if wrong := [key for key in choices if not isinstance(key, str)]:
-            raise SpecError(f"{kind}: names must be text, got the key {wrong[0]!r}")
+    for what, choices in (("inputs", inputs), ("parameters", parameters)):
+        if wrong := [n for n in choices if not isinstance(n, str)]:
+            raise SpecError(f"{what}: names must be text, got the key {wrong[0]!r}")
     data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
     if both := sorted(inputs.keys() & parameters.keys()):
         why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
