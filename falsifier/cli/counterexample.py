@@ -215,7 +215,7 @@ def _shrink(
         found = shrunk.evaluation
         confirmation = confirm(problem, found) if found.violated else None
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
-            confirmation = None
+            confirmation = None  # else case.content says so
         files = (
             [write_csv(input_table(problem, found.candidate), file, problem.model)] if case.is_miss else []
         )

@@ -160,15 +160,8 @@ def counterexample_case(place: Path) -> Case:
     """Return the counterexample of a run directory or file; SpecError if there is none or more than one."""
     file = counterexample_file(place)
     stored = load_counterexample(file)
-    return Case(
-        file,
-        Candidate.from_json(stored.candidate),
-        stored.problem,
-        stored.allow,
-        stored.deny,
-        stored.origin,
-        stored,
-    )
+    candidate = Candidate.from_json(stored.candidate)
+    return Case(file, candidate, stored.problem, stored.allow, stored.deny, stored.origin, stored)
 
 
 def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Case:

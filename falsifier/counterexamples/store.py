@@ -34,7 +34,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import Origin, RequirementRecord
+from falsifier.record.manifest import Origin
 from falsifier.record.records import ConfirmedRecord
 from falsifier.search.request import Strict
 from falsifier.stl.margins import signed
@@ -110,31 +110,25 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
     """
     problem = confirmation.problem
     return _content(
-        RequirementRecord.of(problem.requirement),
+        problem.name,
         reloadable(problem),
         confirmation.evaluation,
         outcome=confirmation.outcome,
         reason=confirmation.reason,
-        origin=Origin.of(str(problem.requirement.formula), manifest.file_hashes(problem)),
+        **Origin.of(str(problem.requirement.formula), manifest.file_hashes(problem))._asdict(),
         allow=tuple(getattr(problem.model, "allow", ())),
         deny=tuple(getattr(problem.model, "deny", ())),
     )
 
 
 def _content(
-    requirement: RequirementRecord,
-    source: ProblemSource | None,
-    evaluation: Evaluation,
-    *,
-    origin: Origin,
-    **recorded: Any,
+    requirement: str, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
 ) -> StoredCounterexample:
     verdict = evaluation.verdict
     if verdict is None:
         raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
     return StoredCounterexample(
-        requirement=requirement.name,
-        **origin._asdict(),
+        requirement=requirement,
         problem=source,
         candidate=evaluation.candidate.to_json(),
         robustness=verdict.robustness,
@@ -282,12 +276,12 @@ def keep_recorded(directory: Path) -> None:
                 "run writes this; start a new one"
             )
         content = _content(
-            alone.requirement,
+            record.requirement,
             alone.request.source,
             evaluation,
             outcome="confirmed",
             reason=record.reason,
-            origin=alone.origin,
+            **alone.origin._asdict(),
             allow=described.allow,
             deny=described.deny,
         )

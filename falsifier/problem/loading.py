@@ -66,8 +66,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
             return path, name
         names.extend(requirements)
     if (fmu := target.rpartition(":")[0]).endswith(MODEL_FILES):
-        begin = f"or write a spec with `falsifier init {shlex.quote(fmu)}`"
-        raise SpecError(f"{target}: an FMU has no requirements of its own; {_stating(fmu)}, {begin}")
+        raise SpecError(f"{target}: an FMU has no requirements of its own; {_stating(fmu)}")
     if not target:
         raise SpecError("the target is empty; give a spec file, an FMU or a bundled name")
     if Path(target).is_dir():
@@ -233,7 +232,8 @@ def reloadable(problem: Problem) -> ProblemSource | None:
 
 def _stating(fmu: str) -> str:
     """Say how to state a requirement of an FMU."""
-    return written(f"add --stl '{_EXAMPLE}'", f"use load_problem({fmu!r}, stl={_EXAMPLE!r})")
+    add = written(f"add --stl '{_EXAMPLE}'", f"use load_problem({fmu!r}, stl={_EXAMPLE!r})")
+    return f"{add}, or write a spec with `falsifier init {shlex.quote(fmu)}`"
 
 
 def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:

@@ -66,13 +66,11 @@ class RequirementRecord(Strict):
 
 
 class Origin(NamedTuple):
-    """What a counterexample belongs to."""
+    """What a counterexample belongs to: a formula, and SHA-256 of what was simulated."""
 
     formula: str
-    fmu_sha256: (
-        str | None
-    )  # SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither
-    spec_sha256: str | None  # SHA-256 of the spec or SSP package; None if there is none
+    fmu_sha256: str | None  # one for all FMUs of a system; None if the model is neither
+    spec_sha256: str | None  # of the spec or SSP package; None if there is none
 
     @classmethod
     def of(cls, formula: str, hashes: Mapping[str, str]) -> "Origin":
@@ -137,7 +135,7 @@ class Manifest(Surroundings):
         return self.requirements[0]
 
     @property
-    def origin(self) -> "Origin":
+    def origin(self) -> Origin:
         """What a counterexample of the requirement belongs to."""
         return Origin.of(self.requirement.formula, self.hashes)
 
