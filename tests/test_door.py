@@ -78,7 +78,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         r"no requirement; use load_problem\('.*AT\.fmu', stl='G\[0,10\]",
     ),
     "a search without a requirement": (lambda: untyped.falsify(str(AT)), r"use load_problem\('.*', stl='G"),
-    "several requirements": (lambda: untyped.falsify("AT"), r"falsify\(load_problems\('AT'\)\) falsifies"),
+    "several requirements": (lambda: untyped.falsify("AT"), r"falsify\(load_problems\('AT'\)\) searches"),
     "no target": (lambda: untyped.load_problem(""), "the target is empty; give a spec file"),
     "a folder": (lambda: untyped.load_problem("."), r"resume\('\.'\) continues it"),
     "no language model": (lambda: untyped.falsify(easy(), engine="hybrid"), r"name one \(llm=NAME\)"),

@@ -117,8 +117,8 @@ class Assurance:
         if self.violations:
             return f"{found}."
         return (
-            f"{found}; none of {counted(self.drawn, 'draw')} did: the probability is below {self.bound:.3g}, "
-            "not zero."
+            f"{found}; none of {counted(self.drawn, 'draw')} did: with {self.confidence * 100:g} % "
+            f"confidence, the probability is at most {self.bound:.3g}, but not zero."
         )
 
 

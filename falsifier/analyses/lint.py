@@ -19,12 +19,12 @@ from falsifier.problem.source import ProblemSource, source_of
 from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.vacuity import hidden_margin
 from falsifier.stl import Formula
-from falsifier.stl.formula import Always, And, Eventually, Or, Until, Window
+from falsifier.stl.formula import Always, And, Bare, Eventually, Or, Until, Window
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import Interval, decided
 
 LintKind = Literal[
-    "invalid", "unmoved", "always", "never", "margin", "window", "units", "duplicate", "implied"
+    "invalid", "unmoved", "always", "never", "margin", "window", "units", "boolean", "duplicate", "implied"
 ]
 # Simulations of the measured check of whether an input moves a requirement's signals.
 SIMULATIONS = 6
@@ -38,8 +38,8 @@ class LintFinding:
         requirement: its name.
         kind: ``invalid`` (it cannot be loaded), ``unmoved`` (no input moves it), ``always`` or ``never``
             (it holds or fails for every trajectory in range), ``margin`` (its robustness cannot say how near
-            a violation is), ``window`` (a window that does not matter), ``units``, ``duplicate`` or
-            ``implied`` (by another requirement or another part).
+            a violation is), ``window`` (a window that does not matter), ``units``, ``boolean`` (a number
+            stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or part).
         place: the part of the formula; empty if it is about the whole requirement.
         text: what is wrong.
         advice: what to do.
@@ -99,6 +99,9 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
         yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
     for part in formula.walk():
+        if isinstance(part, Bare):
+            text = f"{part.left} stands alone like a Boolean, but is a number, so that it means {part}"
+            yield LintFinding(name, "boolean", str(part.left), text, "write the comparison that is meant")
         if isinstance(part, And | Or):
             yield from _implied_side(name, part)
 

@@ -30,7 +30,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import MANIFEST, check_in_sight, check_no_folder
+from falsifier.record.manifest import MANIFEST, check_in_sight, check_no_folder, check_unchanged, file_hashes
 from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
@@ -132,7 +132,8 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
 
     Raises:
         click.UsageError: if options change the problem of a run, or a requirement is chosen from no run.
-        JournalError: if the target is a folder without a run, or no requirement is chosen of several.
+        JournalError: if the target is a folder without a run, no requirement is chosen of several, or the
+            FMU or the spec has changed since.
         SpecError: if the run's problem was made in Python.
     """
     place = Path(options["target"])
@@ -164,8 +165,11 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
     check_in_sight(place, [source])
+    problem = load_source(source)
+    remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
+    check_unchanged(place, described.hashes, file_hashes(problem), remedy)
     evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
-    return load_source(source), list(evaluations.values())
+    return problem, list(evaluations.values())
 
 
 def _between(text: str) -> tuple[float, float]:

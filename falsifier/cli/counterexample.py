@@ -16,7 +16,6 @@ from falsifier.cli.files import (
     checked_picture,
     draw_evaluation,
     made_folder,
-    write_counterexample,
 )
 from falsifier.cli.options import (
     PATH,
@@ -25,6 +24,7 @@ from falsifier.cli.options import (
     json_option,
     out_option,
     policy_options,
+    quiet_option,
     requirement_option,
     run_argument,
 )
@@ -38,10 +38,10 @@ from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET
 from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET
 from falsifier.counterexamples.shrink import shrink
-from falsifier.counterexamples.store import EXPLANATION, beside
+from falsifier.counterexamples.store import EXPLANATION, beside, save
 from falsifier.counterexamples.store import replay as replay_stored
-from falsifier.errors import CandidateError, SpecError
 from falsifier.evaluation.confirm import confirm, other_interface
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
@@ -77,6 +77,7 @@ Told = tuple[list[str], dict[str, Any]]
     "File to write; default: shrunk.json, or shrunk.csv for a nearest miss; with --map robustness-map.png."
 )
 @policy_options
+@quiet_option
 @json_option
 def explain(
     *,
@@ -87,6 +88,7 @@ def explain(
     at_most: float | None,
     requirement: str | None,
     out: Path | None,
+    quiet: bool,
     as_json: bool,
     **rights: Any,
 ) -> None:
@@ -107,7 +109,7 @@ def explain(
         refuse("add --shrink or --map", budget=budget, out=out)
     case = case_of(run, requirement, shrunk=not shrunk)
     if shrunk:
-        lines, content = _shrink(case, rights, budget or SHRINK_BUDGET, at_most, out)
+        lines, content = _shrink(case, rights, budget or SHRINK_BUDGET, at_most, out, quiet=quiet)
     elif mapped:
         lines, content = _map(case, run, rights, budget or MAP_BUDGET, out)
     else:
@@ -130,13 +132,12 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
     """
     case = counterexample_case(run)
     assert case.stored is not None, "a counterexample has a file"
-    with _loaded(case, rights) as problem:
+    with _loaded(case, rights, today=True) as problem:
+        case.admitted(problem)
         own = getattr(problem.model, "interface", None)
         judged = problem if interface in (None, own) else other_interface(problem)
         replayed = replay_stored(case.stored, judged)
         judged.model.close()
-    if replayed.status == "does not fit":
-        raise CandidateError(replayed.text)
     content = {
         "status": replayed.status,
         "robustness": replayed.evaluation and replayed.evaluation.robustness,
@@ -171,16 +172,24 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
     if store is None:
         made_folder(directory)
     with _loaded(case, rights) as problem:
-        evaluation = case.simulated(problem)
+        evaluation, stored = case.simulated(problem), case.stored
+        if case.changes(problem):  # the files are about one simulation
+            stored = case.content(confirm(problem, evaluation))
         if store is not None:
-            written = [Database(store).save(problem, case.stored)]
+            written = [Database(store).save(problem, stored)]
         else:
-            written = export_counterexample(problem, case.stored, evaluation, directory)
+            written = export_counterexample(problem, stored, evaluation, directory)
     say("\n".join(map(str, written)))
 
 
 def _shrink(
-    case: Case, rights: Mapping[str, Any], budget: int, at_most: float | None, out: Path | None
+    case: Case,
+    rights: Mapping[str, Any],
+    budget: int,
+    at_most: float | None,
+    out: Path | None,
+    *,
+    quiet: bool,
 ) -> Told:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
     from falsifier.counterexamples.export.tables import input_table, write_csv
@@ -194,32 +203,27 @@ def _shrink(
     check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)
     check_out(file.with_suffix(".npz"), begins=b"PK")
     check_out(file.with_suffix(".png"), holds=DRAWN)
+
+    def said(simpler: Evaluation, n: int) -> None:
+        if not quiet:
+            robustness = signed(simpler.robustness)
+            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {robustness}")
+
     with _loaded(case, rights) as problem:
         original = case.simulated(problem)
-        shrunk = shrink(
-            problem,
-            original,
-            budget=budget,
-            at_most=at_most,
-            progress=lambda simpler, n: warn(
-                f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}"
-            ),
-        )
+        shrunk = shrink(problem, original, budget=budget, at_most=at_most, progress=said)
         found = shrunk.evaluation
         confirmation = confirm(problem, found) if found.violated else None
-        if confirmation is not None and confirmation.outcome == "refuted":
-            if not case.is_miss:
-                raise SpecError(f"{case.place}: {confirmation.reason}")
-            confirmation = None
+        if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
+            confirmation = None  # else case.content says so
         files = (
             [write_csv(input_table(problem, found.candidate), file, problem.model)] if case.is_miss else []
         )
-        if confirmation is None:
-            files += draw_evaluation(problem, found, file.with_suffix(".png"))
-        else:
-            files += write_counterexample(confirmation, file.parent, name=file.with_suffix(".json").name)
+        if confirmation is not None:
+            files.append(save(case.content(confirmation), file.with_suffix(".json")))
             if found.trajectory is not None:  # for reports, which simulate nothing
                 found.trajectory.save(file.with_suffix(".npz"))
+        files += draw_evaluation(problem, found, file.with_suffix(".png"))
         beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
     content = {
         "violated": found.violated,
@@ -245,6 +249,8 @@ def _shrink(
         f"  robustness     {signed(found.robustness)}; up to {signed(shrunk.at_most)} was allowed{changed}"
     )
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
+    if confirmation is not None and case.changes(problem):
+        lines.append("  note           not of the run's FMU and spec: its reports show the original")
     lines.append(f"  files          {', '.join(map(str, files))}")
     return list(map(one_line, lines)), content
 
@@ -259,8 +265,9 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
         explanation = explain(problem, evaluation)
         if case.is_miss:
             pictures = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
+        about = "\n".join([*case.changes(problem), explanation.text])  # reports repeat it
     with suppress(OSError):  # it is printed anyway
-        write_whole(beside(case.file, EXPLANATION), f"{explanation.text}\n")
+        write_whole(beside(case.file, EXPLANATION), f"{about}\n")
     content = {
         "violated": explanation.violated,
         "text": explanation.text,
@@ -304,12 +311,17 @@ def _about(case: Case, problem: Problem, named: Path) -> list[str]:
 
 
 @contextmanager
-def _loaded(case: Case, rights: Mapping[str, Any]) -> Iterator[Problem]:
-    """Load the problem, say what its FMU may do, and close the model at the end."""
+def _loaded(case: Case, rights: Mapping[str, Any], *, today: bool = False) -> Iterator[Problem]:
+    """Load the problem, say what its FMU may do, and close the model at the end.
+
+    Unless ``today``, its formula is the recorded one, and what has changed since is said.
+    """
     problem, withheld = case.problem(allow=rights["allow"], deny=rights["deny"])
     for note in rights_notes(problem.model):
         warn(note)
     if withheld:
         warn(f"not allowed, as when this was recorded: {', '.join(withheld)}; --allow grants it")
+    for change in () if today else case.changes(problem):
+        warn(f"{case.place}: {change}")
     with closing(problem.model):
-        yield problem
+        yield problem if today else case.as_recorded(problem)

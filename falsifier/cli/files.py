@@ -1,13 +1,11 @@
-"""Files written by several commands: a counterexample as JSON, and its picture."""
+"""Files written by several commands: where they may be written, and pictures."""
 
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.errors import SpecError
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.record.files import can_be_a_folder
@@ -17,20 +15,6 @@ from falsifier.views.terminal import warn
 PICTURES = (".svg", ".png", ".pdf")
 # Which every picture of ours names, as what has drawn it.
 DRAWN = b"falsifier"
-
-
-def write_counterexample(confirmation: Confirmation, directory: Path, *, name: str = FILE_NAME) -> list[Path]:
-    """Write a counterexample as JSON for ``falsifier replay`` and as a picture; return both paths.
-
-    A picture that cannot be drawn or written is reported on stderr; the counterexample counts without it. It
-    has the name of the JSON file, with the extension .png.
-
-    Raises:
-        OSError: if the JSON file cannot be written.
-    """
-    data = save(to_store(confirmation), directory / name)
-    picture = data.with_suffix(".png")
-    return [data, *draw_evaluation(confirmation.problem, confirmation.evaluation, picture)]
 
 
 def check_out(path: Path, *, begins: bytes = b"", holds: bytes = b"", kept: Path | None = None) -> None:

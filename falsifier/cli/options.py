@@ -182,7 +182,10 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
         ),
         *([search] if searches else []),
         parameterization_option(),
-        interface_option("FMI interface; default: the spec's, or co-simulation if the FMU offers it."),
+        interface_option(
+            "FMI interface; default: the spec's, which is needed if the FMU offers both; without a spec "
+            "co-simulation if the FMU offers it."
+        ),
         click.option("--stop-time", type=number, metavar="SECONDS", help="End of each simulation."),
         click.option(
             "--output-interval",

@@ -51,12 +51,6 @@ def check(*, budget: int, as_json: bool, **options: Any) -> None:
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
     source = problem_source(options)
-    target = source.target
-    if source.stl is None and source.parts.kind == "fmu" and Path(target).is_file():
-        raise SpecError(
-            f"{target}: no requirement to check; add --stl 'G[0,10] (SIGNAL <= 1)', or give a spec "
-            f"(falsifier init {shlex.quote(target)} begins one)"
-        )
     findings = lint(source, simulations=budget)
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0

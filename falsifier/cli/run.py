@@ -209,7 +209,8 @@ def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
 
 def _write_counterexamples(result: "Result", directory: Path) -> None:
     """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
-    from falsifier.cli.files import write_counterexample
+    from falsifier.cli.files import draw_evaluation
+    from falsifier.counterexamples.store import save, to_store
     from falsifier.views.text import counterexample_name
 
     name = counterexample_name(result)
@@ -220,7 +221,8 @@ def _write_counterexamples(result: "Result", directory: Path) -> None:
     }
     for file, confirmation in found.items():
         try:
-            write_counterexample(confirmation, directory, name=file)
+            data = save(to_store(confirmation), directory / file)
+            draw_evaluation(confirmation.problem, confirmation.evaluation, data.with_suffix(".png"))
         except (OSError, FalsifierError) as error:
             warn(f"falsifier: {directory / file} cannot be written: {error}")
 

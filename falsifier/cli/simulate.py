@@ -57,6 +57,8 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         for name, (low, high) in tried.items():
             if excess := problem.info[name].excess(low, high):
                 warn(f"{name}: {f'{low:g}' if low == high else f'[{low:g}, {high:g}]'} {excess}")
+        if signals and (kept := [n for n in problem.space.names if n in inputs and n not in signals]):
+            warn(f"no inputs given for {', '.join(kept)}: kept at the model's start value")
         if inputs and not signals:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "

@@ -25,12 +25,12 @@ def whole(name: str, given: object, *, least: int) -> int:
     raise SpecError(f"{name}: expected a whole number, at least {least}, got {given!r}")
 
 
-def finite(name: str, given: object) -> float:
+def finite(name: str, given: object, expected: str = "a finite number") -> float:
     """Return a number that a user gave, numpy's too, as a float."""
     with suppress(OverflowError):  # of an int that no float can be
         if isinstance(given, Real) and not isinstance(given, bool) and isfinite(given):
             return float(given)
-    raise SpecError(f"{name}: expected a finite number, got {reprlib.repr(given)}")
+    raise SpecError(f"{name}: expected {expected}, got {reprlib.repr(given)}")
 
 
 def positive(name: str, given: object) -> float:

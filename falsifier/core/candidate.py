@@ -6,6 +6,7 @@ from typing import Any
 
 from falsifier.core.arguments import finite, instance
 from falsifier.core.signals import Signal
+from falsifier.errors import SpecError, in_section
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +63,17 @@ class Candidate:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> "Candidate":
-        """Return the candidate that ``to_json`` wrote."""
-        return cls(
-            {
-                name: Signal(tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold"))
-                for name, s in data.get("signals", {}).items()
-            },
-            {name: float(v) for name, v in data.get("parameters", {}).items()},
-            data.get("origin", ""),
-            data.get("rationale", ""),
-        )
+        """Return the candidate that ``to_json`` wrote; SpecError naming the key that was changed and how."""
+        for what in ("signals", "parameters"):
+            instance(what, data.get(what, {}), Mapping, f"{what} by name")
+        signals = {}
+        for name, s in data.get("signals", {}).items():
+            with in_section(key=f"signals.{name}"):
+                try:
+                    signals[name] = Signal(
+                        tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold")
+                    )
+                except (KeyError, TypeError):
+                    raise SpecError("expected times, values and interpolation") from None
+        parameters = {n: finite(f"parameters.{n}", v) for n, v in data.get("parameters", {}).items()}
+        return cls(signals, parameters, data.get("origin", ""), data.get("rationale", ""))

@@ -9,24 +9,28 @@ from falsifier.core.fitting import Fitted, fit
 from falsifier.core.words import counted
 from falsifier.counterexamples.store import (
     StoredCounterexample,
+    changes_since,
     counterexample_file,
     file_of,
     keep_recorded,
     load_counterexample,
     shrunk_file,
+    to_store,
 )
 from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError, written
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import FmuModel, System
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import Manifest
+from falsifier.record.manifest import Manifest, Origin
 from falsifier.stl.margins import margin_words, signed
 
 
@@ -39,6 +43,7 @@ class Case:
     source: ProblemSource | None  # how to load the problem; None if it was made in Python
     allow: tuple[str, ...] | None  # what the FMU was allowed then; None if that is not recorded
     deny: tuple[str, ...]  # what it was denied then
+    origin: Origin  # by what it was judged then
     # Content of the counterexample's file; None for a nearest miss.
     stored: StoredCounterexample | None = None
     # What a nearest miss is, in words, before anything is said about it; empty for a counterexample.
@@ -92,6 +97,41 @@ class Case:
         denied = tuple(dict.fromkeys((*model.deny, *self.deny, *given["deny"])))
         return replace(problem, model=replace(model, allow=allowed, deny=denied)), withheld
 
+    def changes(self, problem: Problem) -> list[str]:
+        """Say what of the problem has changed since this was recorded."""
+        return list(changes_since(self.origin, problem))
+
+    def as_recorded(self, problem: Problem) -> Problem:
+        """Return the problem with the formula that this was judged by: it is about no other one."""
+        if str(problem.requirement.formula) == self.origin.formula:
+            return problem
+        requirement = Requirement(problem.name, self.origin.formula, problem.requirement.description)
+        experiment = problem.experiment
+        known = {*experiment.outputs, *problem.space.names, *(v.name for v in problem.info.inputs)}
+        more = (name for name in requirement.formula.signals if name not in known)
+        experiment = replace(experiment, outputs=(*experiment.outputs, *more))
+        return replace(problem, requirement=requirement, experiment=experiment)
+
+    def admitted(self, problem: Problem) -> Candidate:
+        """Return the candidate as the problem simulates it; CandidateError if the problem has changed."""
+        try:
+            return problem.space.admit(self.candidate)
+        except CandidateError as error:
+            raise CandidateError(
+                f"{self.place}: does not fit what is searched now: {error}; undo what has changed in the "
+                "spec, or search again"
+            ) from None
+
+    def content(self, confirmation: Confirmation) -> StoredCounterexample:
+        """Return what to store of a confirmation of this, or of what it was made of.
+
+        Raises:
+            SpecError: if the violation is refuted.
+        """
+        if confirmation.outcome == "refuted":
+            raise SpecError(f"{self.place}: {confirmation.reason}")
+        return to_store(confirmation).model_copy(update={"problem": self.source})
+
     def simulated(self, problem: Problem) -> Evaluation:
         """Simulate it again, for its trajectory.
 
@@ -99,7 +139,7 @@ class Case:
             SimulationError: if the simulation of a nearest miss fails.
             SpecError: if a counterexample no longer violates, or a nearest miss does now.
         """
-        evaluation = evaluate(problem, problem.space.admit(self.candidate))
+        evaluation = evaluate(problem, self.admitted(problem))
         if self.is_miss and evaluation.robustness is None:
             raise SimulationError(f"{problem.name}: the simulation now fails: {evaluation.reason}")
         if self.is_miss and evaluation.violated:
@@ -120,9 +160,8 @@ def counterexample_case(place: Path) -> Case:
     """Return the counterexample of a run directory or file; SpecError if there is none or more than one."""
     file = counterexample_file(place)
     stored = load_counterexample(file)
-    return Case(
-        file, Candidate.from_json(stored.candidate), stored.problem, stored.allow, stored.deny, stored
-    )
+    candidate = Candidate.from_json(stored.candidate)
+    return Case(file, candidate, stored.problem, stored.allow, stored.deny, stored.origin, stored)
 
 
 def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Case:
@@ -131,7 +170,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     Args:
         place: run directory or counterexample file.
         requirement: which one, if a run searched several.
-        shrunk: whether to return what a run's counterexample was shrunk to, if it was.
+        shrunk: whether to return what a run's counterexample was shrunk to, if it was, of the same model.
 
     Raises:
         SpecError: if there is neither.
@@ -147,8 +186,9 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     file = place / file_of(name, shared=described.shared)
     if not file.exists():
         return nearest_miss(place, name)
-    simpler = shrunk_file(file)
-    return counterexample_case(simpler if shrunk and simpler.exists() else file)
+    found, simpler = counterexample_case(file), shrunk_file(file)
+    other = counterexample_case(simpler) if shrunk and simpler.exists() else found
+    return other if other.origin == found.origin else found
 
 
 def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
@@ -175,6 +215,7 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
         described.of(name).request.source,
         described.allow,
         described.deny,
+        described.of(name).origin,
         text=f"{name} was not falsified in {counted(len(judged), 'simulation')}; this is about the nearest "
         f"miss, with robustness {signed(robustness)} ({margin_words(robustness)}).",
     )

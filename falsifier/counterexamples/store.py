@@ -17,16 +17,24 @@ from falsifier import __version__
 from falsifier.core.arguments import path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
-from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError, first_fault, written
+from falsifier.errors import (
+    CandidateError,
+    JournalError,
+    SimulationError,
+    SpecError,
+    first_fault,
+    in_section,
+    written,
+)
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.fmu import fmu_files, fmus_sha256, resolved
-from falsifier.problem.loading import reloadable
+from falsifier.fmu import fmu_files, resolved
+from falsifier.problem.loading import reloadable, spec_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import RequirementRecord
+from falsifier.record.manifest import Origin
 from falsifier.record.records import ConfirmedRecord
 from falsifier.search.request import Strict
 from falsifier.stl.margins import signed
@@ -62,12 +70,18 @@ class StoredCounterexample(Strict):
     outcome: Outcome
     reason: str
     fmu_sha256: str | None = None
+    spec_sha256: str | None = None
     allow: tuple[str, ...] | None = Field(
         None, description="What the FMU was allowed, paths relative to this file; null: as the spec says."
     )
     deny: tuple[str, ...] = Field((), description="What it was denied.")
     falsifier: str = __version__
     sum: str = Field("", description="Checksum of the file up to here; without it, nothing is checked.")
+
+    @property
+    def origin(self) -> Origin:
+        """What it belongs to."""
+        return Origin(self.formula, self.fmu_sha256, self.spec_sha256)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,26 +110,25 @@ def to_store(confirmation: Confirmation) -> StoredCounterexample:
     """
     problem = confirmation.problem
     return _content(
-        RequirementRecord.of(problem.requirement),
+        problem.name,
         reloadable(problem),
         confirmation.evaluation,
         outcome=confirmation.outcome,
         reason=confirmation.reason,
-        fmu_sha256=fmus_sha256(fmu_files(problem.model).values()),
+        **Origin.of(str(problem.requirement.formula), manifest.file_hashes(problem))._asdict(),
         allow=tuple(getattr(problem.model, "allow", ())),
         deny=tuple(getattr(problem.model, "deny", ())),
     )
 
 
 def _content(
-    requirement: RequirementRecord, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
+    requirement: str, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
 ) -> StoredCounterexample:
     verdict = evaluation.verdict
     if verdict is None:
         raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
     return StoredCounterexample(
-        requirement=requirement.name,
-        formula=requirement.formula,
+        requirement=requirement,
         problem=source,
         candidate=evaluation.candidate.to_json(),
         robustness=verdict.robustness,
@@ -167,6 +180,8 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
         raise SpecError(
             f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
         ) from None
+    with in_section(str(file), "candidate"):
+        Candidate.from_json(stored.candidate)
     found = stored.problem and _moved(stored.problem, lambda relative: str(file.parent / relative))
     allow = stored.allow and resolved(stored.allow, file.parent)
     return stored.model_copy(update={"problem": found, "allow": allow, "sum": ""})
@@ -258,12 +273,12 @@ def keep_recorded(directory: Path) -> None:
                 "run writes this; start a new one"
             )
         content = _content(
-            alone.requirement,
+            record.requirement,
             alone.request.source,
             evaluation,
             outcome="confirmed",
             reason=record.reason,
-            fmu_sha256=described.fmu_sha256,
+            **alone.origin._asdict(),
             allow=described.allow,
             deny=described.deny,
         )
@@ -276,7 +291,7 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
     Raises:
         SimulationError: if the simulation fails.
     """
-    changes = "".join(f"; {change}" for change in _changes(stored, problem))
+    changes = "".join(f"; {change}" for change in changes_since(stored.origin, problem))
     try:
         candidate = problem.space.admit(Candidate.from_json(stored.candidate))
     except CandidateError as error:
@@ -297,14 +312,17 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
     return Replayed(status, confirmation, evaluation, text + changes)
 
 
-def _changes(stored: StoredCounterexample, problem: Problem) -> Iterator[str]:
-    digest = fmus_sha256(fmu_files(problem.model).values())
-    if stored.fmu_sha256 is not None and digest != stored.fmu_sha256:
+def changes_since(then: Origin, problem: Problem) -> Iterator[str]:
+    """Say what of a problem is no longer as it was when something was recorded."""
+    now = Origin.of(str(problem.requirement.formula), manifest.file_hashes(problem))
+    if then.fmu_sha256 is not None and now.fmu_sha256 != then.fmu_sha256:
         several = len(fmu_files(problem.model)) > 1
         yield f"{'an FMU of the system' if several else 'the FMU'} has changed since it was stored"
-    formula = str(problem.requirement.formula)
-    if formula != stored.formula:
-        yield f"the requirement has changed from {stored.formula} to {formula}"
+    if then.spec_sha256 is not None and now.spec_sha256 != then.spec_sha256:
+        spec = problem.source and spec_file(problem.source)
+        yield f"{spec.name if spec else 'the spec'} has changed since it was stored"
+    if now.formula != then.formula:
+        yield f"the requirement has changed from {then.formula} to {now.formula}"
 
 
 def _moved(source: ProblemSource, move: Callable[[str], str]) -> ProblemSource:

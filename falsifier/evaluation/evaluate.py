@@ -4,17 +4,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
+from os import PathLike, fspath
 from time import perf_counter
 from typing import Literal
 
 import numpy as np
 
-from falsifier.core.arguments import instance
+from falsifier.core.arguments import finite, instance
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
+from falsifier.errors import (
+    CandidateError,
+    ModelError,
+    MonitorError,
+    SimulationError,
+    SpecError,
+    did_you_mean,
+)
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem
 from falsifier.stl import Formula, Monitor
@@ -111,27 +119,52 @@ def simulate(
 
     Raises:
         CandidateError: if a name is not an input, or not a parameter or start value that can be set.
+        SpecError: naming what is no number and no signal.
         ModelError: if the model cannot be used at all.
 
     >>> simulate(load_problem("AT1"), {"throttle": 100.0}).robustness  # doctest: +SKIP
     -0.213
     """
     check_problem(problem)
-    info, driven = problem.info, dict(inputs or {})
+    info, driven, values = (
+        problem.info,
+        {} if inputs is None else inputs,
+        {} if parameters is None else parameters,
+    )
+    if isinstance(driven, str | PathLike):
+        raise SpecError(
+            f"inputs: expected signals or numbers by name, got the path {fspath(driven)!r}; of a CSV file: "
+            f"falsifier.evaluation.input_file.read_inputs(Path({fspath(driven)!r}), problem.info).signals"
+        )
+    instance("inputs", driven, Mapping, "signals or numbers by name, such as {'u': 1.0}")
+    instance("parameters", values, Mapping, "numbers by name, such as {'p': 1.5}")
     known = [v.name for v in info.inputs]
     settable = [v.name for v in info.variables if v.settable and v.causality != "input"]
     settable += [v.name for v in info.parameters]
     for name in driven:
         if name not in known:
-            raise CandidateError(f"the model has no input {name!r}; {did_you_mean(name, known)}")
-    for name in parameters or {}:
+            raise CandidateError(f"the model has no input {name!r}; {did_you_mean(str(name), known)}")
+    for name in values:
         if name not in settable:
             others = [other for other in (*known, *settable) if other != name]
-            raise CandidateError(f"the model has no parameter {name!r} to set; {did_you_mean(name, others)}")
-    signals = {n: s if isinstance(s, Signal) else Signal((0.0,), (float(s),)) for n, s in driven.items()}
+            near = did_you_mean(str(name), others)
+            raise CandidateError(f"the model has no parameter {name!r} to set; {near}")
+    signals = {name: _signal(name, given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
-    candidate = Candidate(signals, {n: float(v) for n, v in (parameters or {}).items()}, "user")
-    return evaluate_any(replace(problem, parameters=fixed), candidate)
+    numbers = {name: finite(f"parameters.{name}", _plain(value)) for name, value in values.items()}
+    return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
+
+
+def _signal(name: str, given: Signal | float) -> Signal:
+    if isinstance(given, Signal):
+        return given
+    number = finite(f"inputs.{name}", _plain(given), "a finite number or a Signal(times, values)")
+    return Signal((0.0,), (number,))
+
+
+def _plain(given: object) -> object:
+    """Return the number of a truth value, as Boolean variables are set."""
+    return int(given) if isinstance(given, bool) else given
 
 
 def check_evaluation(problem: Problem, evaluation: Evaluation) -> None:

@@ -106,6 +106,10 @@ def _time(cell: str, before: Sequence[float], line: int) -> float:
 
 def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell: str, what: str) -> None:
     parts = cell.split()
+    if not parts:
+        raise SpecError(
+            f"{what}: the cell is empty; expected {'a number' if len(column) == 1 else 'numbers'}"
+        )
     if len(parts) != len(column):
         raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}")
     for variable, part in zip(column, parts, strict=True):

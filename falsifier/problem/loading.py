@@ -25,7 +25,7 @@ from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem, alike
 from falsifier.problem.sections import ModelChanges, RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
-from falsifier.problem.source import Parameterization, ProblemSource, Target, source_of
+from falsifier.problem.source import MODEL_FILES, Parameterization, ProblemSource, Target, source_of
 from falsifier.problem.spec import read_spec
 
 # Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
@@ -65,6 +65,8 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         if name in requirements:
             return path, name
         names.extend(requirements)
+    if (fmu := target.rpartition(":")[0]).endswith(MODEL_FILES):
+        raise SpecError(f"{target}: an FMU has no requirements of its own; {_stating(fmu)}")
     if not target:
         raise SpecError("the target is empty; give a spec file, an FMU or a bundled name")
     if Path(target).is_dir():
@@ -228,14 +230,19 @@ def reloadable(problem: Problem) -> ProblemSource | None:
     return source if known == problem.fingerprint else None
 
 
+def _stating(fmu: str) -> str:
+    """Say how to state a requirement of an FMU."""
+    add = written(f"add --stl '{_EXAMPLE}'", f"use load_problem({fmu!r}, stl={_EXAMPLE!r})")
+    return f"{add}, or write a spec with `falsifier init {shlex.quote(fmu)}`"
+
+
 def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
     """Join what a source names."""
     stated = None if source.stl is None else requirement_of(source.stl)
     if source.parts.kind == "fmu":
         fmu = Path(source.target)
         if stated is None and fmu.is_file():
-            add = written(f"add --stl '{_EXAMPLE}'", f"use load_problem({str(fmu)!r}, stl={_EXAMPLE!r})")
-            raise SpecError(f"{fmu}: no requirement; {add}")
+            raise SpecError(f"{fmu}: no requirement; {_stating(str(fmu))}")
         joined = join_formula(
             fmu,
             stated or RequirementSection(formula=""),
@@ -255,7 +262,7 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
             every = written(f"falsifier run {target}", f"falsify(load_problems({target!r}))")
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
-                f"{target}:{requirement}; {every} falsifies all of them. Known: {names}",
+                f"{target}:{requirement}; {every} searches all of them. Known: {names}",
                 file=str(path),
             )
         first, *rest = (section.model_dump(include=_OVERRIDES) for section in spec.requirements.values())

@@ -13,7 +13,7 @@ from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
 from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
-from falsifier.stl.formula import replaced
+from falsifier.stl.formula import Bare, Flag, replaced
 
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
 PLACEHOLDER = "LIMIT"
@@ -77,6 +77,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             raise SpecError(_unknown(name, info))
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]
+    numbers = [Flag.of(Name(v.name)) for v in variables if v.kind != "boolean" and v.limits != (0.0, 1.0)]
+    formula = replaced(formula, {flag: Bare(flag.operator, *flag.sides) for flag in numbers})
     aliases = [v for v in variables if v.alias_of and v.causality == "input"]
     formula = replaced(formula, {Name(v.name): Name(v.alias_of) for v in aliases})
     try:

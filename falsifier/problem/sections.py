@@ -1,7 +1,7 @@
 """The sections of a spec file."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
@@ -12,15 +12,21 @@ from falsifier.core.signals import Interpolation
 from falsifier.errors import did_you_mean, shown
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
-Number = Annotated[float, Field(strict=False, allow_inf_nan=False)]
 
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, bool | str):  # pydantic would take true for 1, and "5" for 5
+def _no_text(value: Any) -> Any:
+    if isinstance(value, str):  # pydantic would take "5" for 5
         raise ValueError(f"expected a number, got {shown(value)}")
     return value
 
 
+def _plain(value: Any) -> Any:
+    if isinstance(value, bool):  # and true for 1, which only a value of a Boolean variable may be
+        raise ValueError(f"expected a number, got {shown(value)}")
+    return _no_text(value)
+
+
+Number = Annotated[float, BeforeValidator(_no_text), Field(allow_inf_nan=False)]
+Bound = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
 Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
 Count = Annotated[int, BeforeValidator(_plain)]
 
@@ -31,7 +37,7 @@ def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
     return limits
 
 
-Range = Annotated[tuple[Number, Number], AfterValidator(_in_order)]
+Range = Annotated[tuple[Bound, Bound], AfterValidator(_in_order)]
 # Maximum number of control points of one input.
 MAX_CONTROL_POINTS = 10_000
 
@@ -40,6 +46,8 @@ class Strict(BaseModel):
     """A section that takes no other keys than its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+    # Keys that make another section of it.
+    other_keys: ClassVar[tuple[str, ...]] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -50,7 +58,7 @@ class Strict(BaseModel):
         fields = {field.alias or name: field for name, field in cls.model_fields.items()}
         for key in section:
             if key not in fields:
-                raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), fields)}")
+                raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), (*fields, *cls.other_keys))}")
         for key, field in fields.items():
             if field.is_required() and key not in section:
                 raise _wrong(key, missing(field))
@@ -251,6 +259,8 @@ class ModelChanges(Strict):
 
 class RequirementSection(ModelChanges):
     """One requirement, and what it overrides."""
+
+    other_keys = ("template",)
 
     formula: str = Field(description="Formula in Signal Temporal Logic; or a template with its arguments.")
     description: str = Field("", description="Its meaning in words.")

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
 from falsifier.core.model import Interface
-from falsifier.errors import SpecError, first_fault, in_section, naming, setting, written
+from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.spec import AnyRequirement, parse_spec
@@ -63,6 +63,9 @@ def changes_from(
     inputs, parameters = inputs or {}, parameters or {}
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
+    for what, choices in (("inputs", inputs), ("parameters", parameters)):
+        if wrong := [n for n in choices if not isinstance(n, str)]:
+            raise SpecError(f"{what}: names must be text, got the key {wrong[0]!r}")
     data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
     if both := sorted(inputs.keys() & parameters.keys()):
         why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
@@ -150,6 +153,7 @@ def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, s
 
 
 def _input_section(name: str, choice: InputChoice) -> object:
+    choice = _from_numpy(choice)
     match choice:
         case None:
             return {}
@@ -159,10 +163,12 @@ def _input_section(name: str, choice: InputChoice) -> object:
             return {"value": choice}
         case (low, high, *more) if len(more) <= 2:
             return {"range": (low, high)} | dict(zip(("control_points", "interpolation"), more, strict=False))
-    raise SpecError(f"inputs.{name}: expected a number, (low, high[, points[, interpolation]]) or None")
+    expected = "a number, (low, high[, points[, interpolation]]), an InputSection or None"
+    raise SpecError(f"inputs.{name}: expected {expected}, got {shown(choice)}")
 
 
 def _parameter_section(name: str, choice: ParameterChoice) -> object:
+    choice = _from_numpy(choice)
     match choice:
         case ParameterSection():
             return choice
@@ -172,7 +178,12 @@ def _parameter_section(name: str, choice: ParameterChoice) -> object:
             return {"value": named_file(choice, Path())}
         case (low, high):
             return {"range": (low, high)}
-    raise SpecError(f"parameters.{name}: expected a number, text or (low, high)")
+    expected = "a number, text, (low, high) or a ParameterSection"
+    raise SpecError(f"parameters.{name}: expected {expected}, got {shown(choice)}")
+
+
+def _from_numpy(choice: Any) -> Any:
+    return choice.tolist() if hasattr(choice, "tolist") else choice
 
 
 def named_file(text: str, folder: Path) -> str:

@@ -216,7 +216,9 @@ def _error_of(error: ValidationError) -> SpecError:
         elif section == "parameters" and wrong in InputSection.model_fields:
             message = f"only inputs have {wrong}: write [inputs.{name}] if it is one"
         elif quoted := _unquoted(where, wrong, given):
-            return SpecError(f"names with dots are written in quotes: {quoted}", key=key_of(where[:2]))
+            is_near = message.startswith("unknown key; did you mean") and "=" in quoted
+            said = f"names with dots are written in quotes: {quoted}"
+            return SpecError(f"{message}; {said}" if is_near else said, key=key_of(where[:2]))
         where.append(wrong)
     elif section in _TABLES and not isinstance(given, Mapping):
         message = f"expected a table: {_TABLES[str(section)].format(name)}"
@@ -230,5 +232,6 @@ def _unquoted(where: Sequence[str | int], key: str, given: Mapping[str, Any]) ->
     if section in ("inputs", "parameters") and isinstance(value, dict):
         return f"[{section}.{quoted}]"
     dotless = not {"range", "value"} & given.keys() if section == "parameters" else "." not in str(name)
-    is_dotted = section in ("parameters", "connections") and dotless
-    return f"{quoted} = ..." if is_dotted and value is not None else ""
+    is_list = isinstance(value, list)  # of which no fixed value consists
+    is_dotted = section == "connections" or (section == "parameters" and not is_list)
+    return f"{quoted} = ..." if is_dotted and dotless and value is not None else ""

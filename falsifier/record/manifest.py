@@ -2,12 +2,12 @@
 
 import platform
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import Field
 
@@ -66,6 +66,21 @@ class RequirementRecord(Strict):
         )
 
 
+class Origin(NamedTuple):
+    """What a counterexample belongs to: a formula, and SHA-256 of what was simulated."""
+
+    formula: str
+    fmu_sha256: str | None  # one for all FMUs of a system; None if the model is neither
+    spec_sha256: str | None  # of the spec or SSP package; None if there is none
+
+    @classmethod
+    def of(cls, formula: str, hashes: Mapping[str, str]) -> "Origin":
+        """Return it for a formula and hashes of files by path."""
+        fmus = [digest for path, digest in hashes.items() if path.endswith(".fmu")]
+        others = (digest for path, digest in hashes.items() if not path.endswith(".fmu"))
+        return cls(formula, fmus_sha256(fmus), next(others, None))
+
+
 class Surroundings(Strict):
     """With what and when a run or a campaign was started."""
 
@@ -121,9 +136,9 @@ class Manifest(Surroundings):
         return self.requirements[0]
 
     @property
-    def fmu_sha256(self) -> str | None:
-        """SHA-256 of the FMU, or one for all FMUs of a system; None if the model is neither."""
-        return fmus_sha256(digest for path, digest in self.hashes.items() if path.endswith(".fmu"))
+    def origin(self) -> Origin:
+        """What a counterexample of the requirement belongs to."""
+        return Origin.of(self.requirement.formula, self.hashes)
 
     def of(self, name: str | None) -> "Manifest":
         """Return the manifest reduced to one requirement; None: to the only one.
@@ -231,15 +246,17 @@ def file_hashes(problem: Problem) -> dict[str, str]:
     return {str(p): sha256(p.read_bytes()).hexdigest() for p in (*fmus, *([spec] if spec else []))}
 
 
-def check_unchanged(directory: Path, recorded: dict[str, str], found: dict[str, str]) -> None:
-    """Refuse to resume a run or campaign if hashes by path, or fingerprints by requirement, have changed.
+def check_unchanged(
+    directory: Path, recorded: dict[str, str], found: dict[str, str], remedy: str = "start a new run instead"
+) -> None:
+    """Refuse to go on with a run or campaign if hashes by path, or fingerprints by requirement, have changed.
 
     Raises:
         JournalError: naming what has changed.
     """
     for name, digest in found.items():
         if recorded.get(name, digest) != digest:
-            raise JournalError(f"{directory}: {name} has changed since the start; start a new run instead")
+            raise JournalError(f"{directory}: {name} has changed since the start; {remedy}")
 
 
 def _modes(problem: Problem) -> Iterator[ModeRecord]:

@@ -155,6 +155,12 @@ class Flag(Predicate):
         return str(self.left)
 
 
+class Bare(Predicate):
+    """A signal alone that is no Boolean: compared with 0.5, too, and its text says so."""
+
+    __slots__ = ()
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class _Unary(Formula):
     operand: Formula

@@ -123,7 +123,10 @@ def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero(
     number = len(searched)
     assert found.searched == Searched(number, searched[-1].robustness, number)
     assert f"The search found a violation in {number} simulation" in found.text
-    assert "none of 100 draws did: the probability is below 0.0295, not zero." in found.text
+    assert (
+        "none of 100 draws did: with 95 % confidence, the probability is at most 0.0295, but not zero."
+        in found.text
+    )
 
 
 def test_a_violation_with_signals_that_are_not_drawn_says_nothing_of_the_draws() -> None:

@@ -57,6 +57,7 @@ FOUND = [
     ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
     ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
     ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
+    ("G[0,20] speed", "boolean", "speed", "so that it means speed >= 0.5"),
     ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "speed is in mph, rpm in "),
     *((formula, "", "", "") for formula in ("G[0,20] (gear == 3)", "G[0,20] (gear != 3)", "F (gear == 3)")),
     ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),

@@ -141,6 +141,72 @@ def test_replay_after_the_fmu_was_mended_ends_with_zero(tmp_path: Path) -> None:
     assert (refused.code, "no longer violates" in refused.err) == (2, True)
 
 
+SPEC = """
+[model]
+fmu = "AT.fmu"
+interface = "co-simulation"
+stop_time = 20.0
+[inputs.throttle]
+[inputs.brake]
+[parameters]
+finalDrive = 3.23
+[requirements.R1]
+formula = "G[0,20] (speed <= 60)"
+"""
+
+
+@pytest.fixture
+def changeable(tmp_path: Path) -> Path:
+    """A folder with a run of a spec that is edited afterwards."""
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "AT.fmu")
+    (tmp_path / "w.toml").write_text(SPEC)
+    done = run(tmp_path, "run", "w.toml", "--engine", "uniform", "--quiet", "--out", "rw")
+    assert done.code == 1, done.err
+    return tmp_path
+
+
+def test_a_counterexample_belongs_to_the_formula_that_it_was_found_for(changeable: Path) -> None:
+    folder, recorded = changeable, "G[0,20] (speed <= 60)"
+    (folder / "w.toml").write_text(SPEC.replace("<= 60", "<= 5"))
+    changed = f"the requirement has changed from {recorded} to G[0,20] (speed <= 5)"
+    shrunk = run(folder, "explain", "rw", "--shrink", "--at-most", "0", "--quiet")
+    assert shrunk.code == 0 and changed in shrunk.err and "simulation 6" not in shrunk.err
+    assert "w.toml has changed since it was stored" in shrunk.err
+    stored = json.loads((folder / "rw" / "shrunk.json").read_text())
+    assert (stored["formula"], stored["problem"]["target"]) == (recorded, "../w.toml")
+    explained = run(folder, "explain", "rw")
+    assert "What broke: speed <= 60 was violated" in explained.out and changed in explained.err
+    refused = run(folder, "assess", "rw", "--budget", "5")
+    assert refused.code == 2 and "rw: w.toml has changed since the start; " in refused.err
+    assert "assess w.toml, or start a new run" in refused.err
+    exported = run(folder, "export", "rw", "--out", "x")
+    assert exported.code == 0 and changed in exported.err
+    assert json.loads((folder / "x" / "counterexample.json").read_text())["formula"] == recorded
+    assert all(recorded in (folder / "x" / name).read_text() for name in ("replay.py", "replay.mos"))
+    text = run(folder, "report", "rw", "--markdown").out
+    assert "robustness: -" in text and "speed \\<= 60 was violated" in text
+
+
+def test_what_is_of_another_model_is_said_and_does_not_stand_for_the_run(changeable: Path) -> None:
+    folder = changeable
+    before = json.loads((folder / "rw" / "counterexample.json").read_text())["robustness"]
+    (folder / "w.toml").write_text(SPEC.replace("3.23", "3.3"))
+    assert "w.toml has changed since it was stored" in run(folder, "replay", "rw").out
+    assert "its reports show the original" in run(folder, "explain", "rw", "--shrink").out
+    assert f"robustness: {before:+.6g}" in run(folder, "report", "rw", "--markdown").out
+    assert run(folder, "export", "rw", "--out", "x").code == 0
+    stored = json.loads((folder / "x" / "counterexample.json").read_text())
+    assert f"Recorded robustness {stored['robustness']:+.6g}" in (folder / "x" / "replay.py").read_text()
+    assert run(folder, "explain", "rw").code == 0
+    assert (folder / "rw" / "explanation.txt").read_text().startswith("w.toml has changed")
+    (folder / "w.toml").write_text(SPEC.replace("[inputs.throttle]", "[inputs.throttle]\nrange = [0, 1]"))
+    for command in (("explain",), ("explain", "--shrink"), ("explain", "--map"), ("export",), ("replay",)):
+        done = run(folder, command[0], "rw/counterexample.json", *command[1:])
+        assert done.code == 2
+        assert "rw/counterexample.json: does not fit what is searched now: input 'throttle'" in done.err
+        assert "undo what has changed in the spec, or search again" in done.err
+
+
 @pytest.fixture(scope="module")
 def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one search for two requirements that both fell."""

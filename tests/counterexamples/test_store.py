@@ -111,6 +111,24 @@ def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> 
         load_counterexample(tmp_path / "c.json")
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"values": [1.0]}, r"candidate\.signals\.u: 2 times and 1 values"),
+        ({"times": None}, r"candidate\.signals\.u: expected times, values and interpolation"),
+        ({"times": [0.0, 0.0]}, r"candidate\.signals\.u: control-point times must increase strictly"),
+        ({"values": ["a", "b"]}, r"candidate\.signals\.u: control-point times and values: expected"),
+    ],
+)
+def test_what_is_wrong_in_an_edited_file_is_named(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    stored = to_store(violation(lag_problem(points=2)))
+    stored.candidate["signals"]["u"] |= change
+    with pytest.raises(SpecError, match=rf"n2\.json: {message}"):
+        load_counterexample(save(stored.model_copy(), tmp_path / "n2.json"))
+
+
 def test_what_is_not_there_is_said(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="not a run directory"):
         load_counterexample(tmp_path)

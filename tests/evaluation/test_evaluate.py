@@ -1,11 +1,12 @@
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel
 from falsifier.core.signals import Signal
-from falsifier.errors import CandidateError, SimulationError
+from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
 from falsifier.problem.loading import load_problem
 from falsifier.testing import START, Array, lag_problem
@@ -136,3 +137,28 @@ def test_what_cannot_be_initialised_has_no_start() -> None:
 def test_only_what_is_searched_is_evaluated(candidate: Candidate, message: str) -> None:
     with pytest.raises(CandidateError, match=message):
         evaluate(lag_problem(), candidate)
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({1: 100}, "the model has no input 1; known: u"),
+        (
+            "u3.csv",
+            r"got the path 'u3.csv'; of a CSV file: .*read_inputs\(Path\('u3.csv'\), problem.info\)",
+        ),
+        ({"u": [0, 1]}, r"inputs.u: expected a finite number or a Signal\(times, values\), got \[0, 1\]"),
+        ({"u": None}, "inputs.u: .*got None"),
+        ({"u": float("nan")}, "inputs.u: .*got nan"),
+        ({"u": "1"}, "inputs.u: .*got '1'"),
+        (([0, 10], [0, 1]), "inputs: expected signals or numbers by name, .*tuple"),
+    ],
+)
+def test_what_is_no_signal_is_named(inputs: Any, message: str) -> None:
+    with pytest.raises(FalsifierError, match=message):
+        simulate(lag_problem(), inputs)
+
+
+def test_numbers_as_text_are_no_parameters() -> None:
+    with pytest.raises(SpecError, match=r"parameters.x0: expected a finite number, got '1'"):
+        simulate(lag_problem(parameters=[START]), {}, {"x0": "1"})  # type: ignore[dict-item]

@@ -62,6 +62,7 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
         ("t,u\n0,nan\n", "row 2, column u"),
         ("t,u\n3,1\n", "first time must be 0 s"),
         ("t,u\n0,1\n2,1\n1,1\n", "row 4: time 1 s is before 2 s"),
+        ("t,u\n0,\n", "row 2, column u: the cell is empty; expected a number"),
         ("t,w\n0,1\n", "1 numbers, expected 2"),
         ("t,u,u\n0,1,2\n", "u is given by two columns"),
         ("t,w,w[1]\n0,1 2,3\n", r"w\[1\] is given by two columns"),

@@ -59,8 +59,12 @@ def test_unknown_names_come_with_what_there_is() -> None:
         load_problem("AT1x")
     with pytest.raises(SpecError, match="no requirement 'AT3'; did you mean"):
         load_problem("AT:AT3")
-    with pytest.raises(SpecError, match=r"for example AT:AT1; falsify\(load_problems\('AT'\)\) fal"):
+    with pytest.raises(SpecError, match=r"for example AT:AT1; falsify\(load_problems\('AT'\)\) searches"):
         load_problem("AT")
+    with pytest.raises(
+        SpecError, match=r"my\.fmu:R1: an FMU has no requirements of its own; .*init my\.fmu`"
+    ):
+        load_problem("my.fmu:R1")
     with pytest.raises(
         SpecError, match=r"'instance3'; did you mean 'instance2'.*; without a profile: free or fi"
     ):

@@ -1,5 +1,6 @@
 from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.errors import SpecError
@@ -83,3 +84,27 @@ def test_values_that_mean_nothing_are_named(value: object) -> None:
 def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_command_line: None) -> None:
     with pytest.raises(SpecError, match=message):
         changes_from_options(**options)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"inputs": {1: (0, 1)}}, "^inputs: names must be text, got the key 1"),
+        ({"parameters": {1: 2}}, "^parameters: names must be text, got the key 1"),
+        ({"inputs": {"u": {"range": (0, 1)}}}, r"an InputSection or None, got \{'range': \(0, 1\)\}"),
+        ({"inputs": {"u": "0:1"}}, "inputs.u: .*got '0:1'"),
+        ({"inputs": {"u": {0, 100}}}, "inputs.u: .*got "),
+        ({"parameters": {"p": None}}, "parameters.p: .*a ParameterSection, got None"),
+        ({"inputs": {"u": ("0", "100")}}, "inputs.u.range, entry 1: expected a number, got '0'"),
+        ({"inputs": {"u": (False, True)}}, "inputs.u.range, entry 1: expected a number, got false"),
+        ({"parameters": {"p": ("3", "4")}}, "parameters.p.range, entry 1: expected a number, got '3'"),
+    ],
+)
+def test_what_is_no_choice_is_named(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(SpecError, match=message):
+        changes_from(**given)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    given = changes_from(inputs={"u": np.array([0, 100]), "v": np.int64(3)})  # type: ignore[dict-item]
+    assert given == changes_from(inputs={"u": (0, 100), "v": 3})

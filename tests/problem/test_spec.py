@@ -29,6 +29,8 @@ def changed(path: str, value: object) -> dict[str, Any]:
     ("path", "value", "message"),
     [
         ("inputs.u.rnage", [0, 1], r"inputs\.u\.rnage: unknown key; did you mean 'range'\?"),
+        ("parameters.q", {"rnage": [3, 4]}, r"parameters\.q\.rnage: unknown key; did you mean 'range'\?"),
+        ("parameters.q", {"vlaue": 3}, r"parameters\.q: unknown key; did you mean 'value'\?.*\"q\.vlaue\""),
         ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
         ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
         ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
@@ -42,6 +44,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
         ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected either range"),
         ("requirements", {}, r"requirements: "),
+        ("requirements.R", {"tempalte": "x"}, r"requirements\.R\.tempalte: .* did you mean 'template'"),
         ("requirements.R", {"formul": "x"}, r"requirements\.R\.formul: unknown key; did you mean 'formula'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
         ("requirements.R.template", "settles", r"requirements\.R\.formula: .* has a template, too; give one"),

@@ -25,7 +25,7 @@ def test_it_says_what_was_asked_for_and_with_what(tmp_path: Path) -> None:
     ]
     assert (DESCRIBED.model, DESCRIBED.parameterization, DESCRIBED.stop_time) == ("ArchComp.AT", "free", 50.0)
     assert {Path(p).name for p in DESCRIBED.hashes} == {"AT.fmu", "AT.toml"}
-    assert DESCRIBED.fmu_sha256 == PROBLEMS[0].model.sha256  # type: ignore[attr-defined]
+    assert DESCRIBED.origin.fmu_sha256 == PROBLEMS[0].model.sha256  # type: ignore[attr-defined]
     assert {"numpy", "rtamt"} <= DESCRIBED.packages.keys()
     manifest.write(tmp_path, DESCRIBED)
     assert manifest.read(tmp_path).model_copy(update={"sum": ""}) == DESCRIBED
@@ -33,7 +33,7 @@ def test_it_says_what_was_asked_for_and_with_what(tmp_path: Path) -> None:
 
 def test_a_problem_made_in_python_has_no_files() -> None:
     described = describe(RunRequest(problems=()), [lag_problem(free=FREE, parameters=[START])], "mine")
-    assert (described.hashes, described.fmu_sha256, described.shared) == ({}, None, False)
+    assert (described.hashes, described.origin.fmu_sha256, described.shared) == ({}, None, False)
     assert [p.name for p in described.parameters] == ["x0"]
     assert [(h.name, h.value) for h in described.not_searched] == [("gain", 1.0), ("bias", 0.0)]
     assert describe(RunRequest(problems=()), [lag_problem()], "mine").parameterization == "fixed"

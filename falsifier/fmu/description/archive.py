@@ -89,8 +89,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
     except UNREADABLE as error:
         what = _KINDS.get(path.suffix.lower(), "FMU")
-        kind = ModelError if isinstance(error, OSError) else ModelFileError
-        raise kind(f"{path}: not a readable {what}, which is a zip archive ({error})") from error
+        raise _damaged(f"{path}: not a readable {what}, which is a zip archive", error) from error
     with archive:
         for fault in _faults(archive.infolist()):
             raise ModelError(f"{path}: {fault}")
@@ -101,8 +100,8 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
     """Return the contents of one text file of an FMU, or the first bytes of any file.
 
     Raises:
-        ModelError: if the archive is rejected or does not contain the file, or the file is too large or
-            damaged.
+        ModelFileError: if the archive does not contain the file, or is damaged.
+        ModelError: if the archive is rejected, or the file is too large.
     """
     with open_archive(path) as archive:
         try:
@@ -119,14 +118,16 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except UNREADABLE as error:
-            raise ModelError(f"{path}: {name} is damaged ({error}); copy or export the FMU again") from error
+            again = "; copy or export the FMU again"
+            raise _damaged(f"{path}: {name} is damaged", error, again) from error
 
 
 def extract(path: Path, folder: Path) -> None:
     """Unpack an FMU into a folder after checking its entries.
 
     Raises:
-        ModelError: if the archive is rejected or damaged.
+        ModelFileError: if the archive is damaged.
+        ModelError: if it is rejected.
         OSError: if the machine has no room for it, or allows no files so large.
     """
     with open_archive(path) as archive:
@@ -136,7 +137,13 @@ def extract(path: Path, folder: Path) -> None:
             if isinstance(error, OSError) and error.errno in _EXHAUSTED:
                 error.filename = f"{folder}, to which {path} is unpacked"
                 raise
-            raise ModelError(f"{path}: cannot be unpacked into {folder} ({error})") from error
+            raise _damaged(f"{path}: cannot be unpacked into {folder}", error) from error
+
+
+def _damaged(what: str, error: Exception, remedy: str = "") -> ModelError:
+    """Return the error of a file that is no archive, or a damaged one, or that the system does not read."""
+    kind = ModelError if isinstance(error, OSError) and error.errno is not None else ModelFileError
+    return kind(f"{what} ({error}){remedy}")
 
 
 def entry_names(path: Path) -> tuple[str, ...]:

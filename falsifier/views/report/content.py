@@ -178,7 +178,10 @@ def shown_of(run: Run, candidate: Candidate) -> Shown:
 
 
 def _shrunk(run: Run) -> Shown | None:
-    """Return a run's shrunk counterexample, which ``falsifier explain`` leaves in the run directory."""
+    """Return a run's shrunk counterexample, which ``falsifier explain`` leaves in the run directory.
+
+    None if there is none, or if its formula, FMU or spec is no longer that of the run.
+    """
     file = shrunk_file(run.counterexample_file)
     samples = file.with_suffix(".npz")
     if not run.falsified or not (file.is_file() and samples.is_file()):
@@ -190,6 +193,8 @@ def _shrunk(run: Run) -> Shown | None:
         return None  # the original is shown instead
     formula = parse(run.manifest.requirement.formula)
     verdict = Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
+    if stored.origin != run.manifest.origin or not verdict.violated:
+        return None
     return _drawn(run, candidate, trajectory, verdict, stored.reason, is_shrunk=True)
 
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.errors import ModelError, SpecError
+from falsifier.core.files import bundled
+from falsifier.errors import ModelError, ModelFileError, SpecError
 from falsifier.fmu import read_info
 from falsifier.fmu.description import archive, xml
 from falsifier.fmu.description.xml import read_xml
@@ -100,6 +101,17 @@ def test_what_is_not_an_fmu_is_named(tmp_path: Path) -> None:
         read_info(tmp_path / "none.fmu")
     with pytest.raises(ModelError, match=r"no modelDescription\.xml"):
         read_info(write(tmp_path / "zip.fmu", ("a.txt", b"x")))
+
+
+def test_damaged_data_is_no_fmu_as_a_file_that_is_cut_off(tmp_path: Path) -> None:
+    data = bytearray((bundled("fmus") / "AT.fmu").read_bytes())
+    start = data.index(b"modelDescription.xml") + 60
+    (tmp_path / "cut.fmu").write_bytes(data[:5000])
+    data[start : start + 40] = b"\xff" * 40
+    (tmp_path / "damaged.fmu").write_bytes(data)
+    for name in ("cut", "damaged"):
+        with pytest.raises(ModelFileError, match=rf"{name}\.fmu: .*(damaged|not a readable FMU)"):
+            read_info(tmp_path / f"{name}.fmu")
 
 
 @pytest.mark.parametrize(("header", "name_at"), [(b"PK\x03\x04", 30), (b"PK\x01\x02", 46)])
