@@ -113,8 +113,7 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
         low, high = v.limits
         found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
-    space = problem.space
-    return found | {r.name: Interval(r.low, r.high) for r in (*space.inputs, *space.parameters)}
+    return found | {r.name: Interval(r.low, r.high) for r in problem.space.ranges}
 
 
 def _constants(problem: Problem) -> dict[str, float]:
