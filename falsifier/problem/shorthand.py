@@ -50,12 +50,8 @@ def changes_from(
 ) -> ModelChanges:
     """Return the changes for Python values.
 
-    Args:
-        inputs: choices by input name.
-        parameters: choices by parameter name.
-        allow: what the FMU may do beyond simulating; see Rights. Paths begin in the current folder.
-        deny: what it may not do.
-        experiment: fields of ModelChanges; None leaves a field unchanged.
+    Paths in ``allow`` begin in the current folder. What else is given are fields of ModelChanges; None leaves
+    a field unchanged.
 
     Raises:
         SpecError: naming the input, parameter or field that is invalid.
