@@ -72,9 +72,7 @@ class SpecError(FalsifierError):
 def in_section(file: str | None = None, key: str | None = None) -> Iterator[None]:
     """Complete errors raised within, which name only keys of this section and no file.
 
-    Args:
-        file: the spec file; None if something around knows it.
-        key: the section's key.
+    Without a file, something around knows it.
     """
     try:
         yield

@@ -203,13 +203,7 @@ def coverage(directory: str | PathLike[str]) -> Coverage:
 
 
 def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, ...] = ()) -> Coverage:
-    """Return the coverage of simulations.
-
-    Args:
-        described: what was searched.
-        tried: each candidate with a verdict, and its trajectory if there is one.
-        failures: why the simulations without a verdict failed.
-    """
+    """Return the coverage of candidates with a verdict, each with its trajectory if there is one."""
     candidates: list[Candidate] = []
     seen = _Seen(described)
     for candidate, trajectory in tried:
@@ -248,10 +242,7 @@ def _of_range(
 ) -> tuple[RangeCoverage, Cells]:
     """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
-    Args:
-        r: its range.
-        tried: the values of each simulation, shape (n,); n is _SAMPLES for an input, 1 for a parameter.
-        paces: number of simulations by the input's fastest change.
+    n is _SAMPLES for an input, 1 for a parameter, which has no paces.
     """
     values = np.array(tried, np.float64).reshape(len(tried), _SAMPLES if paces else 1)
     cells, count = cells_of(r, values), len(edges_of(r))

@@ -8,7 +8,7 @@ from falsifier.analyses.lint import ranges_of, static_findings
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
-from falsifier.evaluation.evaluate import Evaluation, simulate
+from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
 from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.formalizing import (
     ReadingReply,
@@ -26,7 +26,7 @@ from falsifier.problem.writing import Subject, subject_of
 from falsifier.search.budget import Spent
 from falsifier.search.make_engines import open_chat
 from falsifier.search.request import LLMSettings
-from falsifier.stl import Formula, Monitor, in_words
+from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import margins
@@ -228,8 +228,7 @@ def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> 
     ):
         trajectory = example_trajectory(signals, formula.signals, experiment.times)
         try:
-            monitor = Monitor(formula, experiment.output_interval, experiment.samples)
-            verdict = monitor.evaluate(trajectory)
+            verdict = compiled(formula, experiment.output_interval, experiment.samples).evaluate(trajectory)
         except FalsifierError as error:
             raise RejectedReplyError(f"the formula has no value on an example: {error}") from None
         if verdict.violated != (said == "violated"):

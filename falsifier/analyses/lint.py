@@ -113,8 +113,7 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
         low, high = v.limits
         found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
-    space = problem.space
-    return found | {r.name: Interval(r.low, r.high) for r in (*space.inputs, *space.parameters)}
+    return found | {r.name: Interval(r.low, r.high) for r in problem.space.ranges}
 
 
 def _constants(problem: Problem) -> dict[str, float]:
@@ -198,11 +197,8 @@ def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[Lin
     """Yield requirements about signals on which nothing that is searched has an effect.
 
     What the FMU declares counts only if no simulation contradicts it. Without a declaration, signals that are
-    continuous and the same in all simulations count.
-
-    Args:
-        group: problems that differ only in their requirement.
-        simulations: number of random simulations; 0: only what the FMU declares.
+    continuous and the same in all simulations count. Without simulations, only what is declared counts. The
+    problems of a group differ only in their requirement.
     """
     named = {p.name: set(p.requirement.formula.signals) for p in group}  # none: it is always decided
     suspects = [p for p in group if named[p.name] and not named[p.name] & set(p.space.names)]

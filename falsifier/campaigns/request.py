@@ -161,10 +161,6 @@ def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | 
 
     Runs without a limit on simulations are not counted, and calls of tools come on top.
 
-    Args:
-        request: the campaign.
-        price_of: returns the price of a language model, None if it is unknown.
-
     Returns:
         The estimate; None if the campaign asks no language model.
     """

@@ -188,7 +188,9 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
         rows.append(tuple(row))
     notes = {_UNFINISHED} if any(s.unfinished for s in found.values()) else set[str]()
     legend = f"{_LEGEND} {_PUBLISHED_LEGEND}" if names else _LEGEND
-    notes |= set(_sources(published)) if names else set()
+    if names:
+        named = ((COLUMNS.get(name, name), source) for name, source in published.sources.items() if source)
+        notes |= {f"Source of {name}: {source}." for name, source in named}
     header = ("requirement", "method", "FR", *_NUMBERS, *(("rank",) if names else ()), *names.values())
     return Table("Falsification", header, tuple(rows), (legend, *sorted(notes)))
 
@@ -285,14 +287,6 @@ def _cell(cell: Score | None) -> str:
     return f"{tool}{cell.falsified} / {_number(cell.mean, 1)}"
 
 
-def _sources(published: Published) -> tuple[str, ...]:
-    return tuple(
-        f"Source of {COLUMNS.get(name, name)}: {source}."
-        for name, source in published.sources.items()
-        if source
-    )
-
-
 def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
     """Scores by column and requirement; methods whose name is empty are omitted."""
     found: dict[str, dict[str, Score]] = {}
@@ -307,12 +301,9 @@ def _side_by_side(
 ) -> Table:
     requirements = list(dict.fromkeys(r for column in ours.values() for r in column))
     every: dict[str, Mapping[str, Score]] = {**ours, **theirs}
-    rows: Sequence[tuple[str, ...]] = [
-        (requirement, *(_share_cell(column.get(requirement)) for column in every.values()))
-        for requirement in requirements
-    ]
+    rows = []
+    for requirement in requirements:
+        cells = (column.get(requirement) for column in every.values())
+        texts = (NONE if c is None else f"{c.falsified}/{c.runs} / {_number(c.mean, 1)}" for c in cells)
+        rows.append((requirement, *texts))
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
-
-
-def _share_cell(cell: Score | None) -> str:
-    return NONE if cell is None else f"{cell.falsified}/{cell.runs} / {_number(cell.mean, 1)}"

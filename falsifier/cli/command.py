@@ -98,9 +98,7 @@ def add(command: Function, *decorators: Decorator) -> Function:
 def refuse(reason: str, **given: object) -> None:
     """Refuse options that are given although they do not apply.
 
-    Args:
-        reason: why, and what to do.
-        given: their values by name; None, False and an empty tuple: the option is not given.
+    The reason says what to do, too. None, False and an empty tuple: the option is not given.
 
     Raises:
         click.UsageError: naming the options.

@@ -240,8 +240,7 @@ def _sources(source: "ProblemSource") -> "tuple[ProblemSource, ...]":
 
 
 def _new_directory(name: str) -> Path:
-    stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
-    base = Path("runs") / f"{file_name(name)}-{stamp}"
+    base = Path("runs") / f"{file_name(name)}-{datetime.now():%Y%m%d-%H%M%S}"
     return next(
         p for p in (base, *(base.with_name(f"{base.name}-{i}") for i in range(2, 1000))) if not p.exists()
     )

@@ -70,9 +70,8 @@ class Candidate:
         for name, s in data.get("signals", {}).items():
             with in_section(key=f"signals.{name}"):
                 try:
-                    signals[name] = Signal(
-                        tuple(s["times"]), tuple(s["values"]), s["interpolation"], s.get("hold")
-                    )
+                    points = tuple(s["times"]), tuple(s["values"])
+                    signals[name] = Signal(*points, s["interpolation"], s.get("hold"))
                 except (KeyError, TypeError):
                     raise SpecError("expected times, values and interpolation") from None
         parameters = {n: finite(f"parameters.{n}", v) for n, v in data.get("parameters", {}).items()}

@@ -32,12 +32,7 @@ def compiler() -> list[str]:
 
 
 def compile_c(what: Path, folder: Path, arguments: Sequence[str]) -> None:
-    """Compile C files.
-
-    Args:
-        what: what errors name.
-        folder: where to.
-        arguments: those of the compiler.
+    """Compile C files into a folder; errors name what that is.
 
     Raises:
         ModelError: if there is no compiler, it does not end, or it finds errors.

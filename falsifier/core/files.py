@@ -77,11 +77,8 @@ def write_whole(path: Path, content: str | bytes) -> Path:
 def remove_partial(folder: Path, names: str) -> None:
     """Remove what processes that were killed within ``write_whole`` have left in a folder.
 
-    Only for a folder in which no other thread of this process writes.
-
-    Args:
-        folder: the folder; what is below it stays.
-        names: regular expression of the whole names of the files that they meant to write.
+    Only for a folder in which no other thread of this process writes. What is below the folder stays.
+    ``names`` is a regular expression of the whole names of the files that they meant to write.
     """
     form = re.compile(rf"(?:{names})\.([1-9]\d*)\.partial")
     with suppress(OSError):  # what is left takes room and does no harm

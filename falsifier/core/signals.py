@@ -196,11 +196,7 @@ def inner_slope(step: float, next_step: float, secant: float, next_secant: float
 def end_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
     """Return the slope of a pchip curve at an end: by three points, limited to preserve the data's shape.
 
-    Args:
-        step: length of the piece at the end.
-        next_step: length of the one beside it.
-        secant: slope of the straight line between the ends of the first piece.
-        next_secant: the same of the one beside it.
+    ``step`` and ``secant`` are length and mean slope of the piece at the end, the others of that beside it.
     """
     slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
     if slope * secant <= 0.0:

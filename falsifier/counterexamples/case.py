@@ -69,11 +69,8 @@ class Case:
     ) -> tuple[Problem, tuple[str, ...]]:
         """Load the problem; its FMU gets no more rights than it had then, and those that are given here.
 
-        Whoever is handed a counterexample may not read what a spec has come to allow since.
-
-        Args:
-            allow: what the user allows now; paths begin in the current folder.
-            deny: what the user denies now, beside what was denied then.
+        Whoever is handed a counterexample may not read what a spec has come to allow since. What is
+        denied now adds to what was denied then. Paths that are given begin in the current folder.
 
         Returns:
             The problem, and the rights that the spec gives now but did not give then, which are withheld.
@@ -167,10 +164,7 @@ def counterexample_case(place: Path) -> Case:
 def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False) -> Case:
     """Return the counterexample of a run or file; of a run without one, its nearest miss.
 
-    Args:
-        place: run directory or counterexample file.
-        requirement: which one, if a run searched several.
-        shrunk: whether to return what a run's counterexample was shrunk to, if it was, of the same model.
+    ``shrunk``: what a run's counterexample was shrunk to, if it was, of the same model.
 
     Raises:
         SpecError: if there is neither.
@@ -192,11 +186,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
 
 
 def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
-    """Return the simulation of a run that came nearest to a violation.
-
-    Args:
-        directory: run directory.
-        requirement: name of the requirement; None: the run's first.
+    """Return the simulation of a run that came nearest to violating a requirement; None: the run's first.
 
     Raises:
         SpecError: if no simulation has a robustness that is not negative.
@@ -232,10 +222,8 @@ def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
 def known_inputs(place: Path, problem: Problem) -> Fitted:
     """Read known inputs, and fit them to a problem's search space.
 
-    Args:
-        place: a CSV file of inputs, a counterexample file, or a run directory, of which the evaluation with
-            the smallest robustness is taken.
-        problem: the problem that is to be searched.
+    The place is a CSV file of inputs, a counterexample file, or a run directory, of which the evaluation with
+    the smallest robustness is taken.
 
     Raises:
         SpecError: if the place is none of these, or the run simulated nothing with success.
@@ -254,9 +242,7 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
 def recorded_inputs(place: Path, requirement: str) -> Candidate:
     """Return a counterexample, or the candidate with the smallest robustness in a run.
 
-    Args:
-        place: counterexample file or run directory.
-        requirement: the requirement that a run is judged by, if it searched that; otherwise the run's first.
+    A run is judged by the requirement if it searched that, otherwise by its first one.
 
     Raises:
         SpecError: if it is neither, or every simulation of the run failed.

@@ -47,7 +47,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
     signals = [(r, candidate.signals[r.name]) for r in problem.space.inputs]
     parameters = [(p, candidate.parameters[p.name]) for p in problem.space.parameters]
     numbers = [(r, v) for r, s in signals for v in sorted(set(s.values))] + parameters
-    rests = {ranged.name: rest_value(problem, ranged) for ranged, _ in (*signals, *parameters)}
+    rests = {ranged.name: rest_value(problem, ranged) for ranged in problem.space.ranges}
     return (
         sum(len(set(s.values)) for _, s in signals),
         sum(s.switches for _, s in signals),

@@ -74,7 +74,7 @@ class Layout:
     @property
     def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
         """Ranges of the inputs, then of the parameters."""
-        return (*self.space.inputs, *self.space.parameters)
+        return self.space.ranges
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:

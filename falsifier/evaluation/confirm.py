@@ -204,12 +204,7 @@ def sufficient_step(
 ) -> float | None:
     """Return the largest step in s at which halving changes no output by more than a share of its range.
 
-    Args:
-        model: the model to simulate.
-        experiment: times, outputs, and the step to begin with.
-        signals: inputs by name.
-        share: the share, such as 0.01.
-        halvings: maximum number of times that the step is halved.
+    The experiment has the step to begin with, which is halved so many times at most.
 
     Returns:
         The step, which is the first one or a half, a quarter, ... of it; None if none of these is enough.

@@ -126,11 +126,9 @@ def simulate(
     -0.213
     """
     check_problem(problem)
-    info, driven, values = (
-        problem.info,
-        {} if inputs is None else inputs,
-        {} if parameters is None else parameters,
-    )
+    info = problem.info
+    driven = {} if inputs is None else inputs
+    values = {} if parameters is None else parameters
     if isinstance(driven, str | PathLike):
         raise SpecError(
             f"inputs: expected signals or numbers by name, got the path {fspath(driven)!r}; of a CSV file: "

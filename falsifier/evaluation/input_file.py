@@ -33,10 +33,6 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     further column is one input, linear between two rows; inputs that are not real hold their values. An array
     may be one column, with spaces between its elements.
 
-    Args:
-        path: the file.
-        info: the model whose inputs they are.
-
     Raises:
         SpecError: naming the file, the row or column and what is wrong.
     """

@@ -104,11 +104,7 @@ class Climb:
     ) -> None:
         """Add a simulation.
 
-        Args:
-            number: its number, from 1.
-            verdict: its verdict.
-            trajectory: its trajectory; None if it is not known.
-            predicates: those of the requirement.
+        Its number counts from 1; its trajectory may be unknown. The predicates are those of the requirement.
         """
         if self.levels.add(verdict.robustness, number) == 0:
             known = _known(predicates, verdict.values)  # engines may be told verdicts without values

@@ -26,10 +26,6 @@ def compile_sources(path: Path, out: Path) -> Path:
 
     The copy is loaded before it is written.
 
-    Args:
-        path: path of an FMU with sources.
-        out: path of the FMU to write.
-
     Returns:
         The path of the FMU that was written.
 

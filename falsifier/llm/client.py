@@ -47,7 +47,7 @@ from falsifier.llm.messages import (
 from falsifier.llm.model_file import check_model_file, is_model_file, served
 from falsifier.llm.providers import check_address, find_key, first_mode, known
 from falsifier.llm.transport import UnusableReplyError, within
-from falsifier.llm.usage import Price, lost_usage, usage_of
+from falsifier.llm.usage import Price, tokens_sent, usage_of
 
 _LOG = logging.getLogger(__name__)
 
@@ -240,8 +240,11 @@ class LiteLLMChat:
             raise failure from None
 
     def _lost(self, request: ChatRequest, *, without_reply: int) -> Usage:
+        """Usage of a request that brought nothing: the provider charges at least for what was sent."""
         price = self.price or listed_price(self.llm, api_base=self.api_base)
-        return lost_usage(request, llm=self.llm, price=price, without_reply=without_reply)
+        sent = tokens_sent(request, self.llm)
+        cost = None if price is None else price.cost(sent, 0)
+        return Usage(prompt_tokens=sent, cost=cost, estimated=True, without_reply=without_reply)
 
     def _options(self) -> dict[str, Any]:
         return {**known(self.llm).defaults, **self.options}

@@ -68,7 +68,7 @@ def check_model_file(llm: str) -> Path:
             f"{llm}: serving a model file needs llama.cpp's server: pip install 'falsifier[llama]'"
         )
     memory = posix.machine_memory()
-    if memory and size + _MORE_BYTES > memory:
+    if size + _MORE_BYTES > memory:
         raise ChatSetupError(
             f"{llm}: the model needs about {(size + _MORE_BYTES) / 2**30:.1f} GiB of memory, and this "
             f"machine has {memory / 2**30:.1f} GiB; use a smaller model or a stronger quantization"

@@ -86,7 +86,7 @@ def usage_of(
     kept = getattr(response_usage, "prompt_tokens_details", None)
     cached = possible_count(getattr(kept, "cached_tokens", None))
     estimated = not prompt or (not completion and bool(text))
-    prompt = prompt or _sent(request, llm)
+    prompt = prompt or tokens_sent(request, llm)
     completion = completion or count_tokens(text, llm)
     if price is not None:
         cost: float | None = price.cost(prompt, completion)
@@ -102,13 +102,6 @@ def usage_of(
     )
 
 
-def lost_usage(request: ChatRequest, *, llm: str, price: Price | None, without_reply: int) -> Usage:
-    """Usage of a request that brought nothing: the provider charges at least for what was sent."""
-    sent = _sent(request, llm)
-    cost = None if price is None else price.cost(sent, 0)
-    return Usage(prompt_tokens=sent, cost=cost, estimated=True, without_reply=without_reply)
-
-
 def possible_count(reported: Any) -> int:
     """A reported number of tokens; 0 if none was reported, or one that cannot be true."""
     is_number = isinstance(reported, int | float) and not isinstance(reported, bool)
@@ -122,7 +115,8 @@ def _believable(cost: Any) -> float | None:
     return float(cost)
 
 
-def _sent(request: ChatRequest, llm: str) -> int:
+def tokens_sent(request: ChatRequest, llm: str) -> int:
+    """Count the tokens of a request."""
     return sum(count_tokens(message.content, llm) for message in request.messages)
 
 

@@ -32,10 +32,7 @@ def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | 
 def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
     """Return the problem with what its context files say.
 
-    Args:
-        problem: the problem.
-        is_told: whether a language model will be told; else only the crossings are kept, for engines, which
-            send nothing.
+    Unless a language model is told, only the crossings are kept, for engines, which send nothing.
 
     Raises:
         SpecError: naming the file that cannot be read, or the line that looks like a secret.

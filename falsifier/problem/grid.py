@@ -170,10 +170,8 @@ def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
 def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:
     """Return limits wide enough for inputs that change several times within each window.
 
-    Args:
-        formulas: the formulas; those that cannot be parsed have no windows.
-        stop_time: end of the simulation in s.
-        step: step of the time grid in s; the shortest piece is a multiple of it.
+    Formulas that cannot be parsed have no windows. The shortest piece is a multiple of the time grid's
+    step; all times are in s.
     """
     stop, grid = exact(stop_time), exact(step)
     window = smallest_window(formulas)

@@ -50,16 +50,10 @@ def join(
 ) -> Joined:
     """Join a validated spec with its FMU or system.
 
-    Args:
-        spec: the spec.
-        requirement: name of the requirement.
-        path: path of the spec file, for relative paths and error messages.
-        profile: name of a profile of the spec.
-        stated: requirement of an option, to use instead of the spec's with what that one overrides.
-        stated_name: its name.
-        changes: overrides for experiment, inputs and parameters; stronger than everything in the spec.
-        model: the model; None: the one that the spec names.
-        searches: whether to refuse a spec in which everything is fixed.
+    ``path`` is that of the spec file, for relative paths and error messages. ``stated`` is the requirement of
+    an option, to use instead of the spec's with what that one overrides. ``changes`` are stronger than
+    everything in the spec. Without a model, it is the one that the spec names. ``searches``: whether to
+    refuse a spec in which everything is fixed.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -122,13 +116,6 @@ def join_formula(
     If no input or parameter is to be searched, all inputs with a min and a max are searched, and those whose
     type states them (Booleans, enumerations). There must be one, unless the problem is made for other things
     than a search.
-
-    Args:
-        model: path of the FMU or package, or the system.
-        stated: the requirement.
-        changes: overrides for experiment, inputs and parameters.
-        name: name of the requirement.
-        searches: whether to refuse a model in which there is nothing to search.
 
     Raises:
         SpecError: naming what is unknown and the option that specifies it.

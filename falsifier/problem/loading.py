@@ -184,9 +184,7 @@ def spec_file(source: ProblemSource) -> Path | None:
 def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
     """Load the problem that a source describes.
 
-    Args:
-        source: the source.
-        searches: whether to refuse a problem in which there is nothing to search.
+    ``searches``: whether to refuse a problem in which there is nothing to search.
 
     Raises:
         SpecError: naming what is wrong and the remedy.

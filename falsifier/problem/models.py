@@ -26,10 +26,8 @@ from falsifier.problem.spec import Spec, read_spec
 def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     """Return the model of a spec.
 
-    Args:
-        spec: the spec.
-        layers: sections that override the spec's; later ones override earlier ones.
-        path: path of the spec file, for relative paths and error messages.
+    Layers override the spec, and later ones earlier ones. ``path`` is that of the spec file, for relative
+    paths and error messages.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -57,10 +55,7 @@ def rights_of(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what the FMUs may do and may not do, as a spec and what overrides it say together.
 
-    Args:
-        path: path of the spec file; None if there is none.
-        layers: sections that add to the spec's.
-        section: the spec's own; None: it is read from the file.
+    The layers add to the section ``model`` of the spec, which is read from its file if it is not given.
 
     Raises:
         SpecError: naming what is unknown.

@@ -23,12 +23,8 @@ def search_space(
 ) -> tuple[SearchSpace, dict[str, float]]:
     """Return what is searched, and the values of what is fixed.
 
-    Args:
-        inputs: the inputs' sections by name, as they hold after all overrides.
-        parameters: the same of parameters and start values.
-        info: the model's variables.
-        stop_time: end of the simulation in s.
-        changes: what of this options or arguments state.
+    The sections are as they hold after all overrides; ``changes`` are what options or arguments state of
+    them. The stop time is in s.
 
     Raises:
         SpecError: naming the key and the remedy.

@@ -103,11 +103,7 @@ def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> li
 def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment, *, key: str) -> Formula:
     """Return the formula of a requirement, checked against a model and an experiment.
 
-    Args:
-        section: the requirement.
-        info: the model.
-        experiment: stop time and time grid.
-        key: the section's key in its spec; empty if it was given by an option.
+    ``key`` is the section's key in its spec; empty if it was given by an option.
 
     Raises:
         SpecError: naming what is wrong with the formula, or with the arguments of a template.

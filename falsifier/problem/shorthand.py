@@ -50,12 +50,8 @@ def changes_from(
 ) -> ModelChanges:
     """Return the changes for Python values.
 
-    Args:
-        inputs: choices by input name.
-        parameters: choices by parameter name.
-        allow: what the FMU may do beyond simulating; see Rights. Paths begin in the current folder.
-        deny: what it may not do.
-        experiment: fields of ModelChanges; None leaves a field unchanged.
+    Paths in ``allow`` begin in the current folder. What else is given are fields of ModelChanges; None leaves
+    a field unchanged.
 
     Raises:
         SpecError: naming the input, parameter or field that is invalid.
@@ -70,8 +66,8 @@ def changes_from(
     if both := sorted(inputs.keys() & parameters.keys()):
         why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
         raise SpecError(f"{both[0]}: {why}; drop one of them")
-    data["inputs"] = {name: _input_section(name, choice) for name, choice in inputs.items()}
-    data["parameters"] = {name: _parameter_section(name, choice) for name, choice in parameters.items()}
+    data["inputs"] = {name: _input_section(name, _from_numpy(c)) for name, c in inputs.items()}
+    data["parameters"] = {name: _parameter_section(name, _from_numpy(c)) for name, c in parameters.items()}
     data |= {name: words for name, words in given_rights(allow, deny).items() if words}
     try:
         return ModelChanges.model_validate(data)
@@ -153,7 +149,6 @@ def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, s
 
 
 def _input_section(name: str, choice: InputChoice) -> object:
-    choice = _from_numpy(choice)
     match choice:
         case None:
             return {}
@@ -168,7 +163,6 @@ def _input_section(name: str, choice: InputChoice) -> object:
 
 
 def _parameter_section(name: str, choice: ParameterChoice) -> object:
-    choice = _from_numpy(choice)
     match choice:
         case ParameterSection():
             return choice

@@ -145,11 +145,7 @@ def _text_of(path: Path) -> str:
 
 
 def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
-    """Validate the content of a spec file.
-
-    Args:
-        data: parsed TOML.
-        file: name of the file in error messages.
+    """Validate the content of a spec file, as parsed from TOML; errors name the file.
 
     Raises:
         SpecError: naming the file, the key and what was expected.

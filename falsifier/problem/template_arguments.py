@@ -171,14 +171,8 @@ class Template(ModelChanges):
     ) -> str:
         """Return what must hold after a time, or each time when a condition becomes true.
 
-        Args:
-            after: time in s, or the condition.
-            clock: end of the simulation, and step.
-            operator: whether it holds throughout or at some time.
-            body: what must hold.
-            lasts: time in s up to which it must hold; None: to the end of the simulation.
-            key: the argument that states it.
-            begins: time in s after the moment at which that begins.
+        That begins ``begins`` s after the moment and lasts up to ``lasts`` s after it, as the argument
+        ``key`` states; None: to the end of the simulation.
         """
         if isinstance(after, str):
             if lasts is None:

@@ -81,12 +81,7 @@ def unit_conflicts(formula: Formula, info: ModelInfo, units: Units) -> Iterator[
     """Yield each comparison whose units do not fit, and what is wrong with it.
 
     Numbers fit any unit, and so do units that nobody defines. Products and quotients are not judged: a factor
-    may convert units.
-
-    Args:
-        formula: the formula.
-        info: units of the signals.
-        units: what the model says of its units, beside the usual ones.
+    may convert units. ``units`` are those that the model defines, beside the usual ones.
     """
     known = {name: info[name].unit for name in formula.signals if name in info}
     for predicate in formula.predicates:

@@ -238,9 +238,7 @@ def subject_of(target: str) -> Subject:
 def problem_of_starter(text: str, path: Path) -> Problem:
     """Return the problem of a starter spec, with another requirement than its placeholder.
 
-    Args:
-        text: the spec.
-        path: file for which it is meant; its paths are relative to that file's folder.
+    Its paths are relative to the folder of the file ``path``, for which it is meant.
 
     Raises:
         SpecError: if anything else of it is not valid.
@@ -260,13 +258,8 @@ def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
 def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
     """Return the spec's text with one more requirement, and its name; comments are kept.
 
-    The name is the first free one of R1, R2, ...
-
-    Args:
-        subject: the spec.
-        out: file that it will be written to; the path of the FMU is changed accordingly.
-        formula: the requirement's formula.
-        description: the sentence that it stands for.
+    The name is the first free one of R1, R2, ... The path of the FMU becomes one from the folder of ``out``,
+    to which the text will be written.
     """
     document = tomlkit.parse(subject.text)
     if subject.path.parent.resolve() != out.resolve().parent:

@@ -39,12 +39,7 @@ def write_sealed(path: Path, content: BaseModel) -> None:
 
 
 def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
-    """Read a value.
-
-    Args:
-        path: the file.
-        kind: its type.
-        what: what it belongs to, such as ``run``.
+    """Read a value; errors say what it belongs to, such as ``run``.
 
     Raises:
         JournalError: if there is no such file, or it is damaged or not valid.

@@ -180,10 +180,8 @@ class Journal:
 def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
     """Open the journal of a run directory as its only writer, and close it even after an exception.
 
-    Args:
-        directory: run directory; created if missing.
-        keep: which trajectories are kept.
-        patience: time in s to wait for another process that writes here.
+    The directory is created if missing. Another process that writes here is waited for, ``patience`` s at
+    most.
 
     Raises:
         JournalError: if another process still writes here after that time, or a line is damaged.
@@ -288,12 +286,8 @@ def recorded_evaluations(
 ) -> dict[int, Evaluation]:
     """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
 
-    Args:
-        directory: run directory.
-        records: records of its journal.
-        requirement: name of the requirement whose verdicts to return; None: of each evaluation, the
-            requirement whose engine suggested the candidate.
-        with_trajectories: False: leave out the trajectories.
+    The verdicts are those on the requirement; None: of each evaluation, on the requirement whose engine
+    suggested the candidate.
     """
     candidates = recorded_candidates(records)
     asked = [record for record in records if isinstance(record, AskedRecord)]

@@ -198,11 +198,8 @@ def describe(
 ) -> Manifest:
     """Make the manifest of a run before it starts.
 
-    Args:
-        request: what to run.
-        problems: what is searched; they differ only in their requirement.
-        engine: name of the engine.
-        hashes: of the files when the problems were loaded, see file_hashes; None: as they are now.
+    The problems differ only in their requirement. The hashes are of the files when these were loaded, see
+    file_hashes; None: as they are now.
     """
     problem = problems[0]
     space = problem.space

@@ -26,7 +26,7 @@ from falsifier.record.records import (
     Record,
     elapsed_at,
 )
-from falsifier.search.budget import Spent
+from falsifier.search.budget import USED, Spent
 from falsifier.search.steps import Steps, proposals
 
 
@@ -127,11 +127,6 @@ def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
     for exchange in played:
         again = again.plus_requests(exchange.requests, exchange.usage)
     return Spent(
-        calls=spent.calls - again.calls,
-        kept=spent.kept - again.kept,
-        without_reply=spent.without_reply - again.without_reply,
-        prompt_tokens=spent.prompt_tokens - again.prompt_tokens,
-        completion_tokens=spent.completion_tokens - again.completion_tokens,
-        reasoning_tokens=spent.reasoning_tokens - again.reasoning_tokens,
         cost=None if spent.cost is None else max(0.0, round(spent.cost - (again.cost or 0.0), 12)),
+        **{name: getattr(spent, name) - getattr(again, name) for name in ("calls", *USED)},
     )

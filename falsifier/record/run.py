@@ -252,16 +252,10 @@ def carry_out(
 ) -> list[Result]:
     """Carry out a request whose problems are loaded; for falsify, resume and the workers of campaigns.
 
-    Args:
-        request: what to run.
-        problems: what is searched; they differ only in their requirement.
-        directory: run directory; None: no record.
-        hashes: of the files when the problems were loaded; None: as they are now.
-        engine: the engine, if it was made in Python.
-        chat: chat with the language model, if it was made in Python.
-        listeners: called with every event.
-        resume: continue from the directory's journal; without a journal, start.
-        patience: time in s to wait for another process that writes to the directory.
+    The problems differ only in their requirement; the hashes are of their files when they were loaded, None:
+    as they are now. Engine and chat are given if they were made in Python. Without a directory, nothing is
+    recorded. ``resume``: continue from the directory's journal; without a journal, start. Another process
+    that writes to the directory is waited for, ``patience`` s at most.
     """
     if engine is not None and len(problems) > 1:
         raise SpecError(

@@ -14,6 +14,8 @@ from falsifier.search import DEFAULT_SIMULATIONS
 UNKNOWN_PRICE = (
     "the price of {} is unknown, so its cost cannot be limited: state it ({}), or limit the tokens"
 )
+# What requests to a language model use beside their cost, which may be unknown.
+USED = ("without_reply", "kept", "prompt_tokens", "completion_tokens", "reasoning_tokens")
 
 
 def stated_price() -> str:
@@ -80,16 +82,9 @@ class Spent:
 
     def plus_requests(self, count: int, usage: Usage) -> "Spent":
         """Return this with more requests to a language model, and what they used."""
-        return replace(
-            self,
-            calls=self.calls + count,
-            without_reply=self.without_reply + usage.without_reply,
-            kept=self.kept + usage.kept,
-            prompt_tokens=self.prompt_tokens + usage.prompt_tokens,
-            completion_tokens=self.completion_tokens + usage.completion_tokens,
-            reasoning_tokens=self.reasoning_tokens + usage.reasoning_tokens,
-            cost=None if usage.cost is None or self.cost is None else self.cost + usage.cost,
-        )
+        used = {name: getattr(self, name) + getattr(usage, name) for name in USED}
+        cost = None if usage.cost is None or self.cost is None else self.cost + usage.cost
+        return replace(self, calls=self.calls + count, cost=cost, **used)
 
 
 @dataclass(frozen=True, slots=True)

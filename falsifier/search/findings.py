@@ -79,10 +79,7 @@ def cause_of(reason: str) -> str:
 
 
 def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
-    """Group failed simulations by their cause; the most frequent first.
-
-    Args:
-        reasons: index of each failed simulation, and why it failed.
+    """Group failed simulations, given by index and reason, by their cause; the most frequent first.
 
     >>> [f.text for f in failures([(3, "index 0 is outside of 1..5"), (7, "index 9 is outside of 1..5")])]
     ['2 simulations failed: index 0 is outside of 1..5 (for example simulation 4)']

@@ -49,18 +49,10 @@ def search(
 
     Every simulation is judged against all requirements. The engines of the requirements not yet falsified
     take turns; every engine is told every simulation. A result counts the simulations until its requirement
-    was falsified.
-
-    Args:
-        problems: what to falsify; they differ only in their requirement.
-        engines: one per problem.
-        budget: limits of the run.
-        known: candidates that are simulated first, before any engine is asked; they count.
-        steps: how to ask, simulate and confirm; default: everything in this process.
-        jobs: number of simulations at a time.
-        searched: the part of the search space that the engines use; default: all of it.
-        directory: where the run is recorded, to be stated in the results.
-        listeners: called with every event.
+    was falsified. The problems differ only in their requirement, and each has an engine. Known candidates are
+    simulated before any engine is asked, and count. ``searched`` is the part of the search space that the
+    engines use; default: all of it. Without ``steps``, everything is done in this process. ``directory``,
+    where the run is recorded, is stated in the results.
 
     Returns:
         One result per problem, in their order.

@@ -55,10 +55,7 @@ def told_problems(
 ) -> list[Problem]:
     """Return the problems with what their context files say to the language model or engine that leads.
 
-    Args:
-        request: what was requested.
-        problems: what is searched.
-        recorded: contexts that the run's record has, by requirement; their files are not read again.
+    Files of recorded contexts, which are given by requirement, are not read again.
 
     Raises:
         SpecError: if a file cannot be read, looks like it holds a secret, or must not be told.
@@ -98,10 +95,8 @@ def check_names(engine: str | None, llm: LLMSettings | None) -> None:
 def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int | None = None) -> Chat:
     """Make the chat with a language model; nothing is sent.
 
-    Args:
-        llm: which one, and how to ask it.
-        max_cost: limit of the cost in US dollars, if there is one.
-        attempts: maximum number of requests per reply if failures are temporary; None: as of a run.
+    ``max_cost`` is the limit of the cost in US dollars, ``attempts`` the maximum number of requests per reply
+    if failures are temporary; None: as of a run.
 
     Raises:
         SpecError: if the cost is limited although the price is unknown.

@@ -53,12 +53,8 @@ class RequirementState:
     ) -> Result:
         """Return the result for this requirement of a search that has ended.
 
-        Args:
-            status: how the search ended; if this requirement was falsified, that is its status.
-            reason: why, in words.
-            searched: the part of the search space that the engine used.
-            spent: what the whole search has spent.
-            directory: where it is recorded.
+        ``spent`` is that of the whole search. A requirement that was falsified has a status and a reason of
+        its own.
         """
         found, findings = self.counterexample, list[Finding]()
         if self.best is not None and found is None:

@@ -99,14 +99,11 @@ class Result:
 
 
 def evaluation_columns(evaluations: Sequence[Evaluation]) -> Columns:
-    """Return one row per evaluation, as columns of equal length.
+    """Return one row per evaluation of a run, in order, as columns of equal length.
 
     An input whose control points are always at the same times has one column of numbers per control point,
     named ``throttle @ 8.33 s``; a constant input and a parameter have one, named like them. An input whose
     control points move has one column of texts: ``pchip 0:0 8.33:100``, times in s before values.
-
-    Args:
-        evaluations: all evaluations of a run, in order.
 
     Returns:
         ``simulation`` (from 1), ``status``, ``robustness`` and ``critical_time`` in s (None without a

@@ -172,12 +172,7 @@ class Vacuity:
 def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme, what: str, off: str) -> Finding:
     """Return the finding about a part: what was not tested, and how close the part came to changing.
 
-    Args:
-        kind: what it is about.
-        seen: the part.
-        closest: when it came closest to changing its truth.
-        what: what was not tested, in words.
-        off: how its margin is said if its values are not telling.
+    ``off`` says how the margin is told if its values are not telling.
     """
     margin = abs(closest.margin)
     near = _reached(seen.part, closest.values) or f"{off} by {shown(margin):.6g}"

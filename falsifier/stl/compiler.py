@@ -52,11 +52,7 @@ _CONNECTIVES: dict[type[Formula], op.Function] = {Not: _NEGATION, And: np.minimu
 def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 0) -> Program:
     """Compile a formula for trajectories on one time grid.
 
-    Args:
-        formula: the formula.
-        step: sampling step in s.
-        samples: number of samples of a trajectory.
-        last: last sample at which the formula's robustness is needed; the first one is 0.
+    The sampling step is in s; the robustness is needed at the samples from 0 to ``last``.
 
     Raises:
         FormulaError: naming the window that ends after the trajectory or is not a multiple of the step.

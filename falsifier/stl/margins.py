@@ -41,11 +41,7 @@ def shown(robustness: float) -> float:
 
 
 def margin_words(robustness: float, predicate: str = "") -> str:
-    """Say what a robustness means.
-
-    Args:
-        robustness: the robustness.
-        predicate: text of the predicate that decided it; it counts exactly on the limit.
+    """Say what a robustness means; the predicate that decided it counts exactly on the limit.
 
     >>> margin_words(-0.5), margin_words(0.5)
     ('violated by this margin', 'holds with this margin; below 0 is a violation')

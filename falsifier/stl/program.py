@@ -204,9 +204,7 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
 def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
     """Evaluate a program on many trajectories; return the robustness of each, shape (m,).
 
-    Args:
-        program: the compiled formula.
-        columns: samples of all trajectories by signal name, shape (m, n) each.
+    The columns are the samples of all trajectories by signal name, shape (m, n) each.
 
     Raises:
         MonitorError: naming the first trajectory that cannot be evaluated, and the signal.

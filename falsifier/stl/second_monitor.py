@@ -73,12 +73,7 @@ class _Translation:
     aliases: dict[Expression, str] = field(default_factory=dict)
 
     def text(self, f: Formula, *, at_start: bool = False) -> str:
-        """Return the text of a formula, in parentheses.
-
-        Args:
-            f: the formula.
-            at_start: whether only its value at time 0 counts.
-        """
+        """Return the text of a formula, in parentheses; ``at_start``: only its value at time 0 counts."""
         match f:
             case Predicate() if self.of_truth:
                 return f"({self.truth(f)} >= 0)"

@@ -28,12 +28,7 @@ def tell_apart(
 ) -> Trajectory | None:
     """Return a trajectory of few steps that satisfies one formula and violates the other; None: none found.
 
-    Args:
-        satisfied: formula to satisfy.
-        violated: formula to violate.
-        step: step of the time grid in s.
-        samples: number of samples.
-        ranges: range of each signal; signals without one may have any value.
+    The step of the time grid is in s. Signals without a range may have any value.
 
     Raises:
         FormulaError: if a formula does not fit the time grid.

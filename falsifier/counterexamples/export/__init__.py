@@ -43,13 +43,7 @@ def export_counterexample(
     """Write a counterexample for other tools; return the files.
 
     Files that do not apply are omitted: input.csv if the model has no inputs, the simulation scripts if the
-    model is not an FMU.
-
-    Args:
-        problem: the problem whose requirement is violated.
-        stored: the counterexample.
-        evaluation: a current simulation of it.
-        directory: where to write; created if missing.
+    model is not an FMU. The evaluation is a current simulation of it. The directory is created if missing.
     """
     with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)

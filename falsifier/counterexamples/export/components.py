@@ -58,13 +58,7 @@ _MARGIN = 1e-6
 
 
 def write_components(problem: Problem, candidate: Candidate, directory: Path) -> list[Path]:
-    """Write a folder per component of a problem's system; return the files.
-
-    Args:
-        problem: a problem whose model is a system.
-        candidate: the inputs to simulate.
-        directory: folder of the export, in which the folder ``components`` is written.
-    """
+    """Write a folder per component of a problem's system, below that of the export; return the files."""
     system, experiment = problem.model, problem.experiment
     assert isinstance(system, System), "only systems have components"
     network = system.network
@@ -108,10 +102,7 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
 def _seen(network: Network, position: int, recorded: Trajectory) -> tuple[InputTable, InputTable]:
     """Return the inputs that a component had over each of its steps, and its outputs at their ends.
 
-    Args:
-        network: the system's components and connections.
-        position: of the component among its members.
-        recorded: all inputs and outputs of all components at all communication points.
+    ``recorded`` has all inputs and outputs of all components at all communication points.
     """
     member = network.members[position]
     every = 1 if member.step is None else round(member.step / recorded.step)
@@ -196,13 +187,8 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
     """Write a system as an SSP 1.0 package.
 
     Conversions of units are written as the transformations that they are. What SSP has no place for is left
-    out: steps of components' own, and how values are exchanged.
-
-    Args:
-        system: the system.
-        stop_time: stop time of the default experiment in s.
-        resources: files to add, by name; an ``.ssv`` file among them is bound to the system.
-        path: the ``.ssp`` file to write.
+    out: steps of components' own, and how values are exchanged. The stop time in s is the
+    default experiment's. Of the resources, which are files by name, an ``.ssv`` file is bound to the system.
     """
     network = system.network
     sources = {m.name: f"resources/{k}_{m.path.name}" for k, m in enumerate(network.members)}

@@ -101,10 +101,7 @@ getErrorString();
 def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str | None:
     """Python script that needs only FMPy; None if the model is not an FMU.
 
-    Args:
-        problem: what was simulated.
-        evaluation: the counterexample.
-        inputs: names of the columns of input.csv after the time.
+    ``inputs`` are the names of the columns of input.csv after the time.
     """
     model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
     if not isinstance(model, FmuModel) or verdict is None:

@@ -50,12 +50,8 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
 def conversion(source: str, target: str, known: tuple[Units, Units]) -> tuple[float, float] | None:
     """Return factor and offset that convert a value from one unit to another; None if nobody defines them.
 
-    A unit that is not stated converts to any other unchanged.
-
-    Args:
-        source: unit of the value.
-        target: unit that is wanted.
-        known: units defined by the FMU of the source, and by that of the target.
+    A unit that is not stated converts to any other unchanged. ``known`` are the units that the FMU of the
+    source defines, and that of the target.
 
     >>> conversion("km/h", "m/s", ({}, {}))
     (0.2777777777777778, 0.0)

@@ -113,10 +113,7 @@ def given_values(
 ) -> NDArray[np.float64]:
     """Return what one simulation is given: parameters, then the rows of the inputs; shape (plan.given,).
 
-    Args:
-        plan: of the simulation.
-        inputs: each input as a piecewise cubic (``Signal.pieces``); unused pieces of a row start at inf.
-        parameters: values of parameters and start values.
+    The inputs are piecewise cubics (``Signal.pieces``); unused pieces of a row start at inf.
 
     Raises:
         SimulationError: if values do not fit a variable; names the variable and the range of its type.

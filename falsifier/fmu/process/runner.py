@@ -51,11 +51,8 @@ class Runner:
 
         A simulation that fails in a process that has simulated before is repeated in a new one before it
         counts as failed: the reuse may be to blame. If it is, the FMU's instances are not reused any more.
-        The repetition asks the FMU for messages, which most FMUs give only on request.
-
-        Args:
-            plan: what the simulations have in common.
-            given: the numbers of this one; see ``given_values``.
+        The repetition asks the FMU for messages, which most FMUs give only on request. ``given`` are the
+        numbers of this simulation; see ``given_values``.
 
         Returns:
             The outputs, shape (outputs, samples), and the FMU's messages.

@@ -48,11 +48,7 @@ Label = Callable[[float, str], str]
 def change_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
     """Values with the times at which they begin.
 
-    Args:
-        times: time grid in s.
-        column: the signal.
-        clock: decimals of times.
-        label: names a value, given it and its text.
+    ``clock`` is the number of decimals of times; ``label`` names a value, given it and its text.
 
     >>> change_list(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 1.0, 2.0, 2.0]), clock=2)
     '1, then 2 from 2 s'

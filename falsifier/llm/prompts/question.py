@@ -92,11 +92,8 @@ class _Sample:
 class Questions:
     """Makes the questions of one run from what it is told.
 
-    Args:
-        view: the problem.
-        variant: which parts a question contains.
-        start: smallest and largest value of each output at time 0, by name, as far as known.
-        llm: name of the LLM whose tokens are counted.
+    ``start`` has the smallest and the largest value of each output at time 0, by name, as far as known;
+    ``llm`` is the LLM whose tokens are counted.
     """
 
     def __init__(
@@ -124,10 +121,8 @@ class Questions:
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
         """Add a sample.
 
-        Args:
-            evaluation: what came of it.
-            doubt: why a violation does not count; empty: nothing speaks against it.
-            why: the LLM's rationale, if it was its candidate.
+        ``doubt`` says why a violation does not count; ``why`` is the LLM's rationale, if it was its
+        candidate.
         """
         self._told += 1
         if evaluation.verdict is None and not self._variant.has("failures"):
