@@ -15,8 +15,6 @@ from falsifier.search.result import ResultStatus
 from falsifier.stl.monitor import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
-# What a confirmation and its record have in common.
-_CONFIRMED = ("outcome", "robustness", "reference", "reason", "halved")
 
 
 class _Record(BaseModel):
@@ -80,13 +78,28 @@ class ConfirmedRecord(_Record):
     @classmethod
     def of(cls, confirmation: Confirmation, *, index: int, spent: Spent) -> "ConfirmedRecord":
         """Return the record of a confirmation."""
-        found = {name: getattr(confirmation, name) for name in _CONFIRMED}
-        return cls(index=index, requirement=confirmation.problem.name, spent=spent, **found)
+        return cls(
+            index=index,
+            requirement=confirmation.problem.name,
+            outcome=confirmation.outcome,
+            robustness=confirmation.robustness,
+            reference=confirmation.reference,
+            reason=confirmation.reason,
+            halved=confirmation.halved,
+            spent=spent,
+        )
 
     def confirmation(self, problem: Problem, evaluation: Evaluation) -> Confirmation:
         """Return what was recorded, given the problem and the evaluation that violates its requirement."""
-        found = {name: getattr(self, name) for name in _CONFIRMED}
-        return Confirmation(problem=problem, evaluation=evaluation, **found)
+        return Confirmation(
+            problem=problem,
+            evaluation=evaluation,
+            outcome=self.outcome,
+            robustness=self.robustness,
+            reference=self.reference,
+            reason=self.reason,
+            halved=self.halved,
+        )
 
 
 class EndedRecord(_Record):
