@@ -76,8 +76,8 @@ class Origin(NamedTuple):
     @classmethod
     def of(cls, formula: str, hashes: Mapping[str, str]) -> "Origin":
         """Return it for a formula and hashes of files by path."""
-        fmus = [digest for path, digest in hashes.items() if path.endswith(".fmu")]
-        others = (digest for path, digest in hashes.items() if not path.endswith(".fmu"))
+        fmus = [digest for path, digest in hashes.items() if path.lower().endswith(".fmu")]
+        others = (digest for path, digest in hashes.items() if not path.lower().endswith(".fmu"))
         return cls(formula, fmus_sha256(fmus), next(others, None))
 
 
@@ -236,11 +236,12 @@ def environment() -> dict[str, Any]:
 
 
 def file_hashes(problem: Problem) -> dict[str, str]:
-    """SHA-256, by path, of the files that determine what is simulated: the FMUs and the spec."""
+    """SHA-256, by path, of what determines what is simulated: the FMUs, as they were loaded, and the spec."""
     spec = None if problem.source is None else spec_file(problem.source)
     # What is in a package was extracted to a folder of this process; the package's own hash covers it.
-    fmus = [] if is_packaged(problem.model) else fmu_files(problem.model)
-    return {str(p): sha256(p.read_bytes()).hexdigest() for p in (*fmus, *([spec] if spec else []))}
+    fmus = {} if is_packaged(problem.model) else fmu_files(problem.model)
+    specs = {spec: sha256(spec.read_bytes()).hexdigest()} if spec else {}
+    return {str(path): digest for path, digest in (fmus | specs).items()}
 
 
 def check_unchanged(
