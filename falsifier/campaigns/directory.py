@@ -16,7 +16,7 @@ from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError, written
-from falsifier.record.files import CAMPAIGN, can_be_a_folder, locked, read_sealed, write_sealed
+from falsifier.record.files import CAMPAIGN, can_be_a_folder, is_locked, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -114,10 +114,4 @@ def campaign_lock(directory: Path) -> Iterator[None]:
 def is_worked_on(directory: Path) -> bool:
     """Whether a process holds the campaign's lock; that of a killed process is released by the system."""
     path = directory / _LOCK
-    if not path.exists():
-        return False
-    try:
-        with locked(path, busy=""):
-            return False
-    except (JournalError, OSError):  # OSError: without write access the lock cannot be tested
-        return True
+    return path.exists() and is_locked(path)

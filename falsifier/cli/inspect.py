@@ -159,6 +159,8 @@ def _print_convergence(
         most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
         share = f"{100 * moved.relative:.2f} % of its range"
         say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({share})")
+    if not any(moved.largest for moved in movements.values()):
+        say("  if the model rests at its start values, this says nothing about the step")
     if advice:
         say(f"  {advice}")
 

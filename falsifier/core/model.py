@@ -109,6 +109,14 @@ class Variable:
         """Numbers and names of an enumeration's items; empty for other types."""
         return ", ".join(f"{number} = {name}" for name, number in self.literals.items())
 
+    def expected(self, value: float) -> str:
+        """Say what is expected instead of a value that the type does not have; empty if it has it."""
+        numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))
+        if self.kind == "real" or value in numbers:
+            return ""
+        whole = "0 or 1" if self.kind == "boolean" else "an integer"
+        return f"expected {f'one of {self.items_text}' if self.literals else whole} for {self.name!r}"
+
     def excess(self, low: float, high: float) -> str:
         """Say which limits a range, or a single value, exceeds; empty if none."""
         numbers = self.literals.values()

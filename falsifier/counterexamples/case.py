@@ -189,12 +189,17 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     """Return the simulation of a run that came nearest to violating a requirement; None: the run's first.
 
     Raises:
-        SpecError: if no simulation has a robustness that is not negative.
+        SpecError: if no simulation was judged, or none has a robustness that is not negative.
     """
     described = manifest.read(directory)
     name = described.names[0] if requirement is None else requirement
     judged = _judged(directory, name)
     misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
+    if not judged:
+        raise SpecError(
+            f"{directory}: no simulation of this run could be judged by {name}; falsifier coverage "
+            f"{directory} says why"
+        )
     if not misses:
         raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
     robustness, candidate = min(misses, key=lambda pair: pair[0])

@@ -34,7 +34,8 @@ class Confirmation:
     Attributes:
         problem: the problem whose requirement is violated.
         evaluation: the violation as found.
-        outcome: ``confirmed``: it recurred, also at half the step, and both monitors agree on the sign;
+        outcome: ``confirmed``: it recurred, also at half the step unless that simulation fails, and both
+            monitors agree on the sign;
             ``fragile``: it recurred, but not at half the step; ``refuted``: anything else.
         robustness: robustness of the fresh simulation; None if it failed.
         reference: the second monitor's robustness of the fresh simulation; None if it failed.

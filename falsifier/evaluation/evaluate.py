@@ -1,6 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
@@ -12,7 +12,7 @@ import numpy as np
 
 from falsifier.core.arguments import finite, instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING
+from falsifier.core.model import GRID_ROUNDING, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import (
@@ -118,7 +118,8 @@ def simulate(
         parameters: values by name; other parameters keep the problem's or the model's values.
 
     Raises:
-        CandidateError: if a name is not an input, or not a parameter or start value that can be set.
+        CandidateError: if a name is not an input, or not a parameter or start value that can be set, or a
+            value is one that the variable's type does not have: the FMU would get another one.
         SpecError: naming what is no number and no signal.
         ModelError: if the model cannot be used at all.
 
@@ -150,7 +151,19 @@ def simulate(
     signals = {name: _signal(name, given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
     numbers = {name: finite(f"parameters.{name}", _plain(value)) for name, value in values.items()}
+    for name, signal in signals.items():
+        if info[name].kind != "real" and signal.interpolation != "constant" and len(signal.values) > 1:
+            raise CandidateError(f"{name}: expected interpolation 'constant': it is no real number")
+        _check_type(info[name], signal.values)
+    for name, number in numbers.items():
+        _check_type(info[name], (number,))
     return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
+
+
+def _check_type(variable: Variable, values: Sequence[float]) -> None:
+    for value in values:
+        if expected := variable.expected(value):
+            raise CandidateError(f"{variable.name} = {value:g}: {expected}")
 
 
 def _signal(name: str, given: Signal | float) -> Signal:

@@ -109,7 +109,10 @@ def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell:
     if len(parts) != len(column):
         raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}")
     for variable, part in zip(column, parts, strict=True):
-        values[variable.name].append(_number(part, what))
+        number = _number(part, what)
+        if expected := variable.expected(number):
+            raise SpecError(f"{what}: {number:g}: {expected}")
+        values[variable.name].append(number)
 
 
 def _number(text: str, what: str) -> float:

@@ -150,14 +150,12 @@ def _fixed(variable: Variable, value: float | str) -> float:
 def _check(variable: Variable, low: float, high: float | None = None) -> None:
     """Check a range, or a single value, against the variable's type and the FMU's min and max."""
     key, shown, high = ("value", f"{low:g}", low) if high is None else ("range", f"[{low:g}, {high:g}]", high)
-    numbers = variable.literals.values()
     with in_section(key=key):
         if excess := variable.excess(low, high):
             raise SpecError(f"{shown} {excess}")
         # Whether a range contains such a number is checked by the range itself.
-        if variable.kind != "real" and key == "value" and low not in (numbers or (round(low),)):
-            expected = f"one of {variable.items_text}" if numbers else "an integer"
-            raise SpecError(f"{shown}: expected {expected} for {variable.name!r}")
+        if key == "value" and (expected := variable.expected(low)):
+            raise SpecError(f"{shown}: {expected}")
 
 
 def _value_kind(variable: Variable) -> ValueKind:

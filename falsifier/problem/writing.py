@@ -1,7 +1,7 @@
 """Writing specs: starters for an FMU, with comments on what to fill in, and requirements added to a spec."""
 
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor
 from os.path import relpath
@@ -115,7 +115,7 @@ def _input(v: Variable) -> str:
     return "\n".join([*lines, _comment(points)])
 
 
-def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) -> str:
+def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) -> str:
     lines = ["[parameters]"]
     for v in searched:
         start = v.start_number or 0.0
@@ -123,11 +123,13 @@ def _parameters(tunable: Sequence[Variable], *, searched: Iterable[Variable]) ->
         low, high = v.limits
         limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)
         lines.append(_noted(f"{_key(v.name)}.range = {limits}", "replace with the real range"))
-    lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
-    for v in tunable[:_SHOWN_PARAMETERS]:
+    others = [v for v in tunable if v not in searched]
+    if others:
+        lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
+    for v in others[:_SHOWN_PARAMETERS]:
         low, high = v.limits
         shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        default = f"{v.start} {v.unit}".rstrip()
+        default = "not stated" if v.start is None else f"{v.start} {v.unit}".rstrip()
         lines.append(_comment(f"{_key(v.name)}.range = {shown}  # default: {default}"))
     return "\n".join(lines)
 

@@ -80,6 +80,30 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
         lock.release()
 
 
+def is_locked(path: Path) -> bool:
+    """Whether a process holds a lock file that exists; also where it may be read only."""
+    try:
+        with locked(path, busy=""):
+            return False
+    except JournalError:
+        return True
+    except OSError:
+        return _is_locked_for_reading(path)
+
+
+def _is_locked_for_reading(path: Path) -> bool:
+    try:
+        import fcntl  # of POSIX only, as folders that cannot be written but read are
+    except ImportError:
+        return True
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    return False
+
+
 def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
     """Write a trajectory to a run directory and force it to disk; return its name for the record."""
     buffer = BytesIO()

@@ -44,3 +44,17 @@ def test_one_process_works_on_a_campaign_and_others_can_see_it(tmp_path: Path) -
         with pytest.raises(JournalError, match="another process"), campaign_lock(directory):
             pass
     assert not is_worked_on(directory)
+
+
+def test_a_lock_that_may_only_be_read_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    directory, refused = tmp_path / "c", PermissionError("read-only")
+    with campaign_lock(directory):
+        pass
+
+    def refuse(*_: object, **__: object) -> None:
+        raise refused
+
+    with campaign_lock(directory):
+        monkeypatch.setattr("falsifier.record.files.locked", refuse)
+        assert is_worked_on(directory)
+    assert not is_worked_on(directory)

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import FunctionModel
+from falsifier.core.model import FunctionModel, Variable
 from falsifier.core.signals import Signal
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
@@ -162,3 +162,21 @@ def test_what_is_no_signal_is_named(inputs: Any, message: str) -> None:
 def test_numbers_as_text_are_no_parameters() -> None:
     with pytest.raises(SpecError, match=r"parameters.x0: expected a finite number, got '1'"):
         simulate(lag_problem(parameters=[START]), {}, {"x0": "1"})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "message"),
+    [
+        (Variable("n", "integer", "input"), 1.5, "n = 1.5: expected an integer for 'n'"),
+        (Variable("n", "boolean", "input"), 2, "n = 2: expected 0 or 1 for 'n'"),
+        (Variable("n", "enumeration", "input", literals={"Off": 1, "On": 7}), 5, "one of 1 = Off, 7 = On"),
+        (Variable("n", "integer", "input"), Signal((0, 1), (1, 2), "linear"), "interpolation 'constant'"),
+    ],
+)
+def test_values_that_a_type_does_not_have_are_refused(variable: Variable, value: Any, message: str) -> None:
+    problem = lag_problem()
+    assert isinstance(problem.model, FunctionModel)
+    info = replace(problem.info, variables=(*problem.info.variables, variable))
+    changed = replace(problem, model=replace(problem.model, info=info))
+    with pytest.raises(CandidateError, match=message):
+        simulate(changed, {"n": value})

@@ -56,6 +56,7 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
         ("", "a row of names"),
         ("t,throtle\n0,1\n", "column 'throtle'"),
         ("t,speed\n0,1\n", "no column is an input"),
+        ("t,gear\n0,1\n1,1.5\n", "row 3, column gear: 1.5: expected an integer for 'gear'"),
         ("u,w\n0,1\n", "the first column must be the time in s, got the input 'u'"),
         ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2"),
         ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),

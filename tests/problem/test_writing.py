@@ -53,7 +53,9 @@ def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> 
     (tmp_path / "ball.toml").write_text(text)
     problem = loaded(tmp_path / "ball.toml")
     assert problem.space.inputs == ()
-    assert len(problem.space.parameters) == 1, "without inputs a parameter is searched"
+    (searched,) = problem.space.parameters  # without inputs one is searched
+    assert text.count(f"\n{searched.name}.range") == 1
+    assert f"# {searched.name}.range" not in text
 
 
 def written(name: str, folder: Path) -> Path:

@@ -247,8 +247,9 @@ def _doubt(v: Variable) -> str:
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:
     """Say that an FMU cannot run without the tool that exported it."""
+    need = "needs" if len(interfaces) == 1 else "need"
     return (
-        f"{' and '.join(interfaces)} needs the exporting tool to be installed on this machine"
+        f"{' and '.join(interfaces)} {need} the exporting tool to be installed on this machine"
         f"{f' ({tool})' if tool else ''}, as the FMU says with needsExecutionTool"
     )
 
