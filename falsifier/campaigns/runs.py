@@ -99,7 +99,7 @@ def load(directory: Path) -> list[Run]:
     return runs
 
 
-def load_run(directory: Path, requirement: str | None = None) -> Run:
+def load_run(directory: str | Path, requirement: str | None = None) -> Run:
     """Load one run directory; trajectories stay on disk.
 
     Args:
@@ -109,8 +109,9 @@ def load_run(directory: Path, requirement: str | None = None) -> Run:
     Raises:
         JournalError: if a file is invalid, or several requirements share the search and none is named.
     """
-    name = manifests.read(directory).of(requirement).requirement.name
-    (run,) = (run for run in RunFollower(directory, unread_runs(directory)).look() if run.requirement == name)
+    place = Path(directory)
+    name = manifests.read(place).of(requirement).requirement.name
+    (run,) = (run for run in RunFollower(place, unread_runs(place)).look() if run.requirement == name)
     return run
 
 

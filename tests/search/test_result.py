@@ -34,7 +34,7 @@ def test_a_result_and_its_record_give_every_evaluation(tmp_path: Path) -> None:
     assert np.nanmin(table.robustness) == result.robustness
     assert table["u @ 0 s"].between(-1, 1).all() and table["u @ 10 s"].nunique() == table.bias.nunique() == 20
     assert table[table.status == "ok"].critical_time.notna().all()
-    assert load_run(tmp_path).frame().equals(table)
+    assert load_run(str(tmp_path)).frame().equals(table)
 
 
 def test_of_a_shared_search_each_requirement_has_its_own_rows(tmp_path: Path) -> None:
