@@ -152,8 +152,11 @@ def simulate(
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
     numbers = {name: finite(f"parameters.{name}", _plain(value)) for name, value in values.items()}
     for name, signal in signals.items():
-        if info[name].kind != "real" and signal.interpolation != "constant" and len(signal.values) > 1:
-            raise CandidateError(f"{name}: expected interpolation 'constant': it is no real number")
+        kind, interpolation = info[name].kind, signal.interpolation
+        if kind != "real" and interpolation != "constant" and len(signal.values) > 1:
+            raise CandidateError(
+                f"{name}: values of type {kind} cannot have {interpolation} interpolation; use 'constant'"
+            )
         _check_type(info[name], signal.values)
     for name, number in numbers.items():
         _check_type(info[name], (number,))

@@ -10,7 +10,7 @@ from falsifier.errors import CandidateError, JournalError, SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import simulate
 from falsifier.testing import lag_problem
-from tests.problems import easy, hard, impossible
+from tests.problems import easy, hard, impossible, unusable
 
 
 def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path) -> None:
@@ -83,3 +83,9 @@ def test_a_counterexample_file_is_taken_as_it_is(tmp_path: Path) -> None:
     violation = simulate(problem, {"u": Signal((0.0,), (1.0,), "linear")})
     file = save(to_store(confirm(problem, violation)), tmp_path / "counterexample.json")
     assert known_inputs(file, problem).candidate.signals["u"].values == (1.0,)
+
+
+def test_a_run_of_which_nothing_was_judged_has_no_nearest_miss(tmp_path: Path) -> None:
+    falsify(unusable(), "uniform", budget=2, directory=tmp_path)
+    with pytest.raises(SpecError, match=r"could be judged by .*; falsifier coverage .* says why"):
+        nearest_miss(tmp_path)
