@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.campaigns.directory import run_directory
-from falsifier.errors import FalsifierError
+from falsifier.errors import FalsifierError, JournalError
 from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import STOP
@@ -39,8 +39,12 @@ Tick = Callable[[], bool]
 
 
 def run_task(task: RunTask) -> None:
-    """Carry out one run, or resume it; what comes of it stands in its journal."""
-    carry_out(
+    """Carry out one run, or resume it; what comes of it stands in its journal.
+
+    Raises:
+        JournalError: if that cannot be written.
+    """
+    results = carry_out(
         task.request,
         [task.problem],
         run_directory(task.campaign, task.name),
@@ -49,6 +53,9 @@ def run_task(task: RunTask) -> None:
         resume=True,
         patience=PATIENCE,
     )
+    for result in results:
+        if result.unrecorded and not result.falsified:
+            raise JournalError(result.unrecorded)
 
 
 class Schedule:

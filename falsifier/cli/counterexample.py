@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,10 @@ from falsifier.cli.files import (
     check_ending,
     check_out,
     checked_picture,
+    draw,
     draw_evaluation,
     made_folder,
+    written,
 )
 from falsifier.cli.options import (
     PATH,
@@ -114,7 +117,8 @@ def explain(
         lines, content = _map(case, run, rights, budget or MAP_BUDGET, out)
     else:
         lines, content = _explain(case, run, rights)
-    say(as_shown("\n".join(lines), content, as_json=as_json))
+    only_drawn = all(name.endswith(".png") for name in content.get("files", ()))
+    conclude(as_shown("\n".join(lines), content, as_json=as_json), 3 if shrunk and only_drawn else 0)
 
 
 @command()
@@ -216,15 +220,15 @@ def _shrink(
         confirmation = confirm(problem, found) if found.violated else None
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
             confirmation = None  # else case.content says so
-        files = (
-            [write_csv(input_table(problem, found.candidate), file, problem.model)] if case.is_miss else []
-        )
+        table, data = input_table(problem, found.candidate), file.with_suffix(".json")
+        files = written(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
         if confirmation is not None:
-            files.append(save(case.content(confirmation), file.with_suffix(".json")))
+            files += written(data, partial(save, case.content(confirmation)))
             if found.trajectory is not None:  # for reports, which simulate nothing
-                found.trajectory.save(file.with_suffix(".npz"))
+                written(file.with_suffix(".npz"), found.trajectory.save)
         files += draw_evaluation(problem, found, file.with_suffix(".png"))
-        beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
+        with suppress(OSError):
+            beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
     content = {
         "violated": found.violated,
         "outcome": confirmation and confirmation.outcome,
@@ -251,7 +255,7 @@ def _shrink(
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
     if confirmation is not None and case.changes(problem):
         lines.append("  note           not of the run's FMU and spec: its reports show the original")
-    lines.append(f"  files          {', '.join(map(str, files))}")
+    lines += [f"  files          {', '.join(map(str, files))}"] if files else []
     return list(map(one_line, lines)), content
 
 
@@ -281,12 +285,12 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
 
 def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Path | None) -> Told:
     """Draw the robustness around it."""
-    from falsifier.views.plotting import plot_robustness_map, save_figure
+    from falsifier.views.plotting import plot_robustness_map
 
     picture = beside(case.file, "robustness-map.png") if out is None else checked_picture(out)
     with _loaded(case, rights) as problem:
         found = robustness_map(problem, case.simulated(problem), budget=budget)
-    save_figure(plot_robustness_map(found, problem.name), picture)
+    drawn = draw(lambda: plot_robustness_map(found, problem.name), picture)
     labels = (coordinate.label for coordinate in found.coordinates)
     content = {
         "original": found.original,
@@ -294,10 +298,10 @@ def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Pat
         "persistence": [{"size": size, "share": share} for size, share in found.persistence],
         "rank_correlations": dict(zip(labels, found.influences, strict=True)),
         "about": str(case.place),
-        "picture": str(picture),
+        "picture": next(map(str, drawn), None),
     }
-    told = f"{problem.name}: {found.text}"
-    return [*_about(case, problem, run), told, f"  picture        {picture}"], content
+    told = [f"{problem.name}: {found.text}", *(f"  picture        {file}" for file in drawn)]
+    return [*_about(case, problem, run), *told], content
 
 
 def _about(case: Case, problem: Problem, named: Path) -> list[str]:

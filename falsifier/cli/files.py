@@ -4,8 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
-from falsifier.errors import SpecError
+from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.record.files import can_be_a_folder
@@ -69,6 +70,32 @@ def in_existing_folder(path: Path) -> Path:
     return path
 
 
+def written(file: Path, write: Callable[[Path], object]) -> list[Path]:
+    """Write a file of what was computed; return its path.
+
+    No path if it cannot be written, which is said on stderr: the rest of a result is worth having.
+    """
+    try:
+        write(file)
+    except (OSError, FalsifierError) as error:
+        warn(f"falsifier: {file} cannot be written: {_why(error)}")
+        return []
+    return [file]
+
+
+def write_named(file: Path, text: str) -> None:
+    """Write a file that users have named, or a stream such as /dev/stdout, and say so on stderr.
+
+    Raises:
+        OSError: naming the file, of which nothing remains.
+    """
+    if file.is_file() or not file.exists():
+        write_whole(file.resolve(), text)  # a link is followed, not replaced
+    else:
+        file.write_text(text, encoding="utf-8")
+    warn(f"{file} written")
+
+
 def draw_evaluation(problem: Problem, evaluation: Evaluation, picture: Path) -> list[Path]:
     """Write the picture of an evaluation with its trajectory; see ``draw``."""
     from falsifier.views.plotting import plot_evaluation
@@ -86,6 +113,11 @@ def draw(plot: Callable[[], Any], picture: Path) -> list[Path]:
     try:
         save_figure(plot(), picture)
     except Exception as error:  # whatever a drawing library thinks of values and names that others chose
-        warn(f"falsifier: the picture {picture} cannot be drawn: {one_line(str(error))}")
+        warn(f"falsifier: the picture {picture} cannot be drawn: {_why(error)}")
         return []
     return [picture]
+
+
+def _why(error: Exception) -> str:
+    told = error.strerror if isinstance(error, OSError) else None
+    return one_line(told or str(error))

@@ -9,7 +9,14 @@ from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.analysis import load
 from falsifier.campaigns.archcomp import export
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import check_ending, check_out, checked_picture, draw, in_existing_folder
+from falsifier.cli.files import (
+    check_ending,
+    check_out,
+    checked_picture,
+    draw,
+    in_existing_folder,
+    write_named,
+)
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import as_shown, say
 from falsifier.core.files import file_name
@@ -72,14 +79,12 @@ def report(
     if arch_comp is not None:
         _write_arch_comp(first, arch_comp)
     if csv_file is not None:
-        csv_file.write_text(_evaluations_csv(directories), encoding="utf-8")
-        warn(f"{csv_file} written")
+        write_named(csv_file, _evaluations_csv(directories))
     made = markdown_report(*directories) if markdown else html_report(*directories)
     if path is None:
         say(made, nl=False)
     else:
-        path.write_text(made, encoding="utf-8")
-        warn(f"{path} written")
+        write_named(path, made)
 
 
 @command()
@@ -113,8 +118,7 @@ def _write_arch_comp(directory: Path, path: Path) -> None:
         own = path if len(exported) == 1 else path.with_stem(f"{path.stem}-{file_name(label)}")
         if own.exists():
             check_out(own, begins=_ARCH_COMP)
-        own.write_text(text, encoding="utf-8")
-        warn(f"{own} written")
+        write_named(own, text)
 
 
 def _evaluations_csv(directories: Iterable[Path]) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -27,7 +28,7 @@ from falsifier.cli.options import (
 )
 from falsifier.cli.output import as_shown, conclude
 from falsifier.core.files import file_name
-from falsifier.errors import FalsifierError, JournalError
+from falsifier.errors import JournalError
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # imported where used, so that --help prints at once
@@ -209,7 +210,7 @@ def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
 
 def _write_counterexamples(result: "Result", directory: Path) -> None:
     """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
-    from falsifier.cli.files import draw_evaluation
+    from falsifier.cli.files import draw_evaluation, written
     from falsifier.counterexamples.store import save, to_store
     from falsifier.views.text import counterexample_name
 
@@ -220,11 +221,9 @@ def _write_counterexamples(result: "Result", directory: Path) -> None:
         for i, fragile in enumerate(result.fragile, start=1)
     }
     for file, confirmation in found.items():
-        try:
-            data = save(to_store(confirmation), directory / file)
-            draw_evaluation(confirmation.problem, confirmation.evaluation, data.with_suffix(".png"))
-        except (OSError, FalsifierError) as error:
-            warn(f"falsifier: {directory / file} cannot be written: {error}")
+        if written(directory / file, partial(save, to_store(confirmation))):
+            picture = (directory / file).with_suffix(".png")
+            draw_evaluation(confirmation.problem, confirmation.evaluation, picture)
 
 
 def _sources(source: "ProblemSource") -> "tuple[ProblemSource, ...]":

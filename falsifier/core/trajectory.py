@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import IO
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance
+from falsifier.core.files import write_whole
 from falsifier.errors import MonitorError, did_you_mean
 
 # Maximum number of distinct values, all integers, of a real signal that is taken for discrete.
@@ -91,7 +93,12 @@ class Trajectory:
         return {name: float(column[k]) for name, column in self.columns.items()}
 
     def save(self, place: Path | IO[bytes]) -> None:
-        """Write the trajectory, without its log, to a numpy archive (``.npz``)."""
+        """Write the trajectory, without its log, to a numpy archive (``.npz``), whole or not at all."""
+        if isinstance(place, Path):
+            buffer = BytesIO()
+            self.save(buffer)
+            write_whole(place, buffer.getvalue())
+            return
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
         stacked = (

@@ -105,7 +105,12 @@ def _is_locked_for_reading(path: Path) -> bool:
 
 
 def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
-    """Write a trajectory to a run directory and force it to disk; return its name for the record."""
+    """Write a trajectory to a run directory and force it to disk; return its name for the record.
+
+    Raises:
+        OSError: if it cannot be written, or the folder of trajectories is gone.
+    """
+    (directory / TRAJECTORIES).stat()  # else a run directory that was moved would be made again
     buffer = BytesIO()
     trajectory.save(buffer)
     content = buffer.getvalue()

@@ -76,7 +76,8 @@ class Journal:
         remove_partial(directory, re.escape(manifest.MANIFEST))
         reader = JournalReader(directory)
         self.records = list(reader.new())
-        self._file = reader.path.open("ab", buffering=0)
+        self._path = reader.path
+        self._file = self._path.open("ab", buffering=0)
         self._file.truncate(reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
@@ -115,21 +116,24 @@ class Journal:
         """Append a record.
 
         Raises:
-            OSError: if it cannot be written; then nothing of it remains in the file.
+            OSError: if it cannot be written, then nothing of it remains in the file; or if the file is gone.
         """
         size = self._file.seek(0, os.SEEK_END)
+        is_due = isinstance(record, _AT_ONCE) or monotonic() - self._synced > _SYNC_PERIOD
+        if is_due:
+            self._path.stat()  # what is written to a file that was deleted or moved, nobody finds
         rest = memoryview(line_of(record, self._lines + 1))
         try:
             while rest:
                 rest = rest[self._file.write(rest) :]
-            if isinstance(record, _AT_ONCE) or monotonic() - self._synced > _SYNC_PERIOD:
+            if is_due:
                 os.fsync(self._file.fileno())
                 self._synced = monotonic()
         except BaseException as error:
             with suppress(OSError):
                 self._file.truncate(size)
             if isinstance(error, OSError) and error.errno is not None:
-                error.filename = str(self._file.name)
+                error.filename = str(self._path)
             raise
         self._lines += 1
 

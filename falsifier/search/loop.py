@@ -88,11 +88,20 @@ def search(
     except ChatError as error:
         status, reason = "failed", str(error)
         loop.count_lost(error)
+    except _CannotRecordError as error:
+        status, reason = "failed", f"the run cannot be recorded: {error}"
     except BaseException as error:
         with suppress(Exception):  # an error in a listener must not hide the first one
             loop.end("failed", f"{type(error).__name__}: {error}")
         raise
     return loop.end(status, reason)
+
+
+class _CannotRecordError(Exception):
+    """The machine refuses to record what happens; what has happened until then is the result."""
+
+    def __init__(self, error: OSError) -> None:
+        super().__init__(f"{error.filename}: {error.strerror}" if error.filename else str(error))
 
 
 # A candidate that is being simulated, or will be when it is waited for, and whose engine suggested it.
@@ -342,14 +351,17 @@ class _Loop:
         return self.spent
 
     def emit(self, event: Event) -> None:
-        for listener in self.listeners:
-            listener(event)
+        try:
+            for listener in self.listeners:
+                listener(event)
+        except OSError as error:
+            raise _CannotRecordError(error) from error
 
     def emit_last(self, event: Event) -> None:
         """Announce what ends the search: it counts even if the machine can no longer record it."""
         try:
             self.emit(event)
-        except OSError as error:
+        except _CannotRecordError as error:
             self.unrecorded = self.unrecorded or str(error)
 
     def end(self, status: ResultStatus, reason: str) -> list[Result]:

@@ -11,6 +11,7 @@ from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted
 from falsifier.counterexamples.store import file_of
+from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
@@ -30,10 +31,9 @@ def result_text(result: Result) -> str:
     head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
     head += f"{untested(result.findings)} ({seconds_text(result.spent)})"
     lines = [head, *fact_lines(result_facts(result))]
-    if result.directory is not None:
+    if result.directory is not None and result.directory.is_dir():
         lines.append(f"  files          {result.directory}")
-        if result.counterexample is not None:
-            lines.append(f"  picture        {_picture(result)}")
+        lines += [f"  picture        {picture}" for picture in _pictures(result)]
         if _can_continue(result):
             lines.append(_continue_line(result.directory))
         elif result.status == "not falsified" and result.best is not None:
@@ -87,7 +87,7 @@ def results_text(results: Sequence[Result]) -> str:
     for result in results:
         shown, found = result.shown, result.counterexample
         robustness = "" if shown is None else f", robustness {signed(shown.robustness)}"
-        where = "" if found is None else f", {_picture(result)}"
+        where = "".join(f", {picture}" for picture in _pictures(result))
         lines.append(
             f"{result.problem.name:{width}}  {result.status} after "
             f"{result.spent.simulations_text}{untested(result.findings)}{robustness}{where}"
@@ -111,7 +111,10 @@ def results_text(results: Sequence[Result]) -> str:
 
 def counterexample_name(result: Result) -> str:
     """File name of a result's counterexample; results that share a directory have one each."""
-    shared = result.directory is not None and manifest.read(result.directory).shared
+    try:
+        shared = result.directory is not None and manifest.read(result.directory).shared
+    except JournalError:  # the directory was moved while the run wrote to it
+        shared = True
     return file_of(result.problem.name, shared=shared)
 
 
@@ -218,8 +221,10 @@ def _continue_line(directory: Path) -> str:
     return f"to continue: falsifier resume {shlex.quote(str(directory))}"
 
 
-def _picture(result: Result) -> Path:
-    return (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
+def _pictures(result: Result) -> list[Path]:
+    """Return the picture of a counterexample, if it could be drawn."""
+    picture = (result.directory or Path()) / Path(counterexample_name(result)).with_suffix(".png")
+    return [picture] if result.falsified and result.directory and picture.exists() else []
 
 
 def llm_use(spent: Spent) -> str:

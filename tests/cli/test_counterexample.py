@@ -1,9 +1,11 @@
 import json
 import shutil
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from falsifier.cli import _carried_out
 from falsifier.core.files import bundled
 from tests.command import Done, falsifier
 from tests.pictures import CRITICAL, OUTPUT, colours
@@ -74,6 +76,26 @@ def test_explain_names_what_it_takes(folder: Path) -> None:
         assert part in done.out
     effects = run(folder, "explain", "run", "--json").json["effects"]
     assert {e["name"]: e["violated"] for e in effects} == {"throttle": False, "brake": False}
+
+
+def test_what_was_computed_is_shown_if_it_cannot_be_written(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(path: Path, content: object) -> Path:
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.chdir(folder)
+    places = ("counterexamples.store", "core.trajectory", "cli.simulate", "counterexamples.export.tables")
+    for where in places:
+        monkeypatch.setattr(import_module(f"falsifier.{where}"), "write_whole", full)
+    assert _carried_out(["explain", "run", "--shrink", "--out", "full.json", "--quiet"]) == 3
+    told = capsys.readouterr()
+    assert "full.json cannot be written: No space left on device" in told.err
+    assert "AT1: not shrunk with " in told.out and "throttle [%]" in told.out
+    assert _carried_out(["simulate", "AT1", "--set", "throttle=50", "--out", "full"]) == 0
+    told = capsys.readouterr()
+    assert "full/trajectory.csv cannot be written" in told.err
+    assert "not violated by these inputs" in told.out
 
 
 def test_export_writes_the_files_of_every_tool(folder: Path) -> None:

@@ -15,10 +15,10 @@ import pytest
 from falsifier.campaigns.analysis import load
 from falsifier.cli import run as command
 from falsifier.record.journal import Journal
-from falsifier.record.run import falsify
-from falsifier.search.events import Confirmed, Event, RunEnded
+from falsifier.record.run import falsify, resume
+from falsifier.search.events import Confirmed, Evaluated, Event, RunEnded
 from tests.command import ROOT
-from tests.problems import easy
+from tests.problems import easy, impossible
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
@@ -132,6 +132,38 @@ def test_a_picture_that_cannot_be_drawn_is_a_message(
     assert end.value.code == 1
     assert "cannot be drawn: no font" in capsys.readouterr().err
     assert (tmp_path / "run" / "counterexample.json").is_file()
+
+
+@pytest.mark.parametrize("moved", [False, True])
+def test_a_search_that_cannot_be_recorded_any_more_shows_its_best(
+    moved: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    record = Journal.__call__
+    place = tmp_path / "run"
+
+    def until(journal: Journal, event: Event) -> None:
+        if isinstance(event, Evaluated) and event.index == 2:
+            if moved:
+                journal.directory.rename(tmp_path / "moved")
+            else:
+                raise OSError(28, "No space left on device", f"{place}/journal.jsonl")
+        record(journal, event)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "__call__", until)
+        (result,) = falsify([impossible()], "corners", directory=place, budget=5)
+    assert result.best is not None and len(result.evaluations) == 3
+    with pytest.raises(SystemExit) as end:
+        command._finish([result], as_json=False)
+    assert end.value.code == 3
+    told = capsys.readouterr().out
+    assert f"failed: the run cannot be recorded: {place}/" in told
+    assert (f"to continue: falsifier resume {place}" in told) == place.exists() == (not moved)
+    (resumed,) = resume(tmp_path / "moved" if moved else place, problems=[impossible()])
+    assert resumed.status == "not falsified" and len(resumed.evaluations) == 5
 
 
 @pytest.mark.parametrize("last", [Confirmed, RunEnded])

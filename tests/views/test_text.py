@@ -74,6 +74,8 @@ def test_fragile_and_unconfirmed_violations_are_listed(found: Result) -> None:
 
 def test_several_results_are_a_line_each_with_notes_below(tmp_path: Path) -> None:
     results = falsify([impossible(), hard()], "corners", budget=5, directory=tmp_path)
+    assert "png" not in results_text(results), "no picture was drawn"
+    (tmp_path / "counterexample-HARD.png").touch()
     never, note, hard_line, broken, last = results_text(results).splitlines()
     assert never.startswith("NEVER  not falsified after 5")
     assert note.strip().startswith("note: Faster inputs were not tried")

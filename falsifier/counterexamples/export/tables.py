@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
 from falsifier.core.model import Model, Variable
 from falsifier.core.signals import Signal
@@ -97,8 +98,7 @@ def write_csv(table: InputTable, path: Path, model: Model) -> Path:
     lines = [",".join('"' + csv_cell(name).replace('"', '""') + '"' for name in columns)]
     cells = [np.stack(column, axis=1).tolist() for column in columns.values()]
     lines += [",".join(" ".join(map(repr, cell)) for cell in row) for row in zip(*cells, strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
+    return write_whole(path, "\n".join(lines) + "\n")
 
 
 def write_json(start: Mapping[str, float | str], path: Path, model: Model) -> Path:
