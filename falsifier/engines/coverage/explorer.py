@@ -21,8 +21,8 @@ from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
-# Probabilities of what follows a mark: a new end, a span of the same or another program; else a small change.
-_NEW_END, _REPEATED = 0.6, 0.2
+# Probability that what follows a mark is a span of the same or another program; else it is a new end.
+_REPEATED = 0.25
 # Proposals, then random points, among which one that was not simulated is looked for.
 _IDEAS, _DRAWS = 10, 100
 
@@ -34,7 +34,7 @@ class Explorer:
     """
 
     def __init__(self, problem: Problem, layout: Layout, *, repeats: bool) -> None:
-        self._new_end = _NEW_END if repeats else _NEW_END + _REPEATED
+        self._repeated = _REPEATED if repeats else 0.0
         self._marker = Marker(problem)
         self.programs = Programs(layout)
         self._interval = problem.experiment.output_interval
@@ -86,18 +86,15 @@ class Explorer:
             )
         reached = self._reached[mark]
         reached.tries += 1
-        kind = rng.random()
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"
-        if kind < self._new_end:
-            point = programs.another_end(rng, reached.point, reached.time)
-            return Proposal(point, f"{where}, continued differently")
-        if kind < _NEW_END + _REPEATED:
+        if rng.random() < self._repeated:
             other = self._choose(rng) or mark
             source = self._reached[other]
             span = (float(rng.uniform(0.0, source.time)), source.time)
             point = programs.repeated(rng, reached.point, reached.time, source.point, span)
             return Proposal(point, f"{where}, followed by what made {describe(other)}")
-        return Proposal(programs.moved(rng, reached.point), f"{where}, slightly changed")
+        point = programs.another_end(rng, reached.point, reached.time)
+        return Proposal(point, f"{where}, continued differently")
 
     def _choose(self, rng: np.random.Generator) -> Mark | None:
         """Draw a signal, then one of its marks; rare ones from which little was tried are more likely."""

@@ -19,9 +19,8 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 from falsifier.stl.formula import Predicate
 
-# Probabilities of a small change, of the same done again, and of a new end from an earlier time; else it ends
-# differently from then.
-_SLIGHT, _AGAIN, _EARLIER = 0.1, 0.5, 0.1
+# Probabilities of the same done again, and of a new end from an earlier time; else one from then.
+_AGAIN, _EARLIER = 0.6, 0.1
 # Of what is done again, the share without a stretch before it, and that with all that led there; the shortest
 # span otherwise, as a share of the time until then.
 _SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
@@ -77,12 +76,10 @@ class Ladder:
         reached.tries += 1
         where = f"the input that made {what} at {reached.time:.3g} s"
         kind = rng.random()
-        if kind < _SLIGHT:
-            return Proposal(programs.moved(rng, reached.point), f"{where}, slightly changed")
-        if kind < _SLIGHT + _AGAIN:
+        if kind < _AGAIN:
             return Proposal(self._again(rng, reached), f"{where}, done again and again")
         # Now and then from an earlier time: it may have been too late.
-        time = reached.time * (rng.random() if kind < _SLIGHT + _AGAIN + _EARLIER else 1.0)
+        time = reached.time * (rng.random() if kind < _AGAIN + _EARLIER else 1.0)
         return Proposal(programs.another_end(rng, reached.point, time), f"{where}, continued differently")
 
     def _deciding(self, verdict: Verdict) -> tuple[str, float] | None:

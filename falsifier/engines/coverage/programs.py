@@ -156,33 +156,6 @@ class Programs:
             values[first : first + moved] = values[stop:].copy()
         return result, time - cut
 
-    def moved(self, rng: np.random.Generator, point: Array) -> Array:
-        """Return the program with one switch of one input moved, one piece dropped or one value changed."""
-        point = self._parameters(rng, point)
-        if not self._times:
-            return point
-        j = int(rng.integers(len(self._times)))
-        group = self._groups[j]
-        values = point[group]
-        switches = np.flatnonzero(np.diff(values)) + 1
-        kind = rng.random()
-        if not len(switches) or kind < 0.3:
-            edges = np.concatenate([[0], switches, [len(values)]])
-            k = int(rng.integers(len(edges) - 1))
-            values[edges[k] : edges[k + 1]] = self._level(rng, j, float(values[edges[k]]))
-        elif kind < 0.8:
-            at = int(rng.choice(switches))
-            shift = int(np.ceil(np.exp(rng.uniform(0.0, np.log(max(len(values) / 4, 2))))))
-            if rng.random() < 0.5:
-                values[max(0, at - shift) : at] = values[at]
-            else:
-                values[at : at + shift] = values[at - 1]
-        else:
-            at = int(rng.choice(switches))
-            later = switches[switches > at]
-            values[at : int(later[0]) if len(later) else len(values)] = values[at - 1]
-        return point
-
     def _parameters(self, rng: np.random.Generator, point: Array) -> Array:
         point = point.copy()
         for j in range(len(self._times), len(self._groups)):

@@ -159,7 +159,7 @@ def test_discrete_inputs_take_their_values_only() -> None:
     programs = Programs(layout)
     point = programs.fresh(drawn(1))
     for seed in range(50):
-        point = programs.moved(drawn(seed), programs.another_end(drawn(seed), point, 2.0))
+        point = programs.another_end(drawn(seed), point, 2.0)
         assert point * 5 == pytest.approx(np.round(point * 5))
 
 
