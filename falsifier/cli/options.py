@@ -124,7 +124,9 @@ def policy_options(command: Function) -> Function:
     )
 
 
-_CHANGES = ("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "allow", "deny")
+_CHANGES = (
+    *("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "omit", "allow", "deny"),
+)
 
 
 def changes_in(options: dict[str, Any]) -> "ModelChanges":
@@ -199,6 +201,12 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
             metavar="SECONDS",
             help="Maximum wall-clock time of one simulation; default: the spec's, or 60 for each tenth of "
             "the simulated time.",
+        ),
+        click.option(
+            "--omit",
+            multiple=True,
+            metavar="OUTPUT",
+            help="Output not to record, such as one that becomes NaN and that no formula names. Repeatable.",
         ),
         policy_options,
     )

@@ -383,7 +383,9 @@ class FunctionModel:
         """Nothing to release: a function opens no processes or files."""
 
 
-def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]]) -> None:
+def check_finite(
+    model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]], *, hint: str = ""
+) -> None:
     """Reject outputs that contain NaN or inf.
 
     Raises:
@@ -394,5 +396,5 @@ def check_finite(model: str, times: NDArray[np.float64], columns: Mapping[str, N
         if not finite.all():
             k = int(np.argmin(finite))
             raise SimulationError(
-                f"{model}: output {name!r} is {column[k]} at t = {times[k]:g} s", time=float(times[k])
+                f"{model}: output {name!r} is {column[k]} at t = {times[k]:g} s{hint}", time=float(times[k])
             )

@@ -16,7 +16,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import Experiment, Model
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import FalsifierError, SpecError
+from falsifier.errors import FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate_any
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
@@ -191,7 +191,15 @@ def step_convergence(
         SimulationError: if one of the simulations fails.
     """
     coarse = model.simulate(signals, {}, experiment)
-    fine = model.simulate(signals, {}, replace(experiment, step_size=experiment.step / 2))
+    try:
+        fine = model.simulate(signals, {}, replace(experiment, step_size=experiment.step / 2))
+    except SimulationError as error:
+        raise SimulationError(
+            f"the step of {experiment.step:g} s works, but cannot be compared with half of it: {error}",
+            status=error.status,
+            time=error.time,
+            log=error.log,
+        ) from None
     moved = {}
     for name in coarse.names:
         distance = np.abs(fine[name] - coarse[name])

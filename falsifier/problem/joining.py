@@ -93,11 +93,13 @@ def join(
         formula = formula_of(section, info, experiment, key=key)
         known = {*space.names, *fixed, *(v.name for v in info.inputs if v.start_number is not None)}
         experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
+        omitted = dict.fromkeys((*spec.model.omit, *(n for each in layers for n in each.omit)), "model.omit")
+        omitted |= dict.fromkeys(changes.omit, setting("omit"))
         return Joined(
             model,
             Requirement(name, formula, section.description),
             space,
-            _recording(experiment, info, [*spec.model.record, *formula.signals], known),
+            _recording(experiment, info, [*spec.model.record, *formula.signals], known, omitted),
             fixed,
             (*info.notes, *_notes(grid, model, space, experiment)),
         )
@@ -220,12 +222,22 @@ def rights_notes(model: Model) -> Iterator[str]:
 
 
 def _recording(
-    experiment: Experiment, info: ModelInfo, extra: Iterable[str], known: Collection[str]
+    experiment: Experiment,
+    info: ModelInfo,
+    extra: Iterable[str],
+    known: Collection[str],
+    omitted: Mapping[str, str],
 ) -> Experiment:
-    """Return the experiment that records all outputs and those extra variables whose values are unknown."""
+    """Return the experiment that records all outputs and those extra variables whose values are unknown.
+
+    Omitted outputs, with the key that omits them, are recorded only if they are extra ones, too.
+    """
     outputs = [v.name for v in info.outputs if v.kind != "string"]
     if not outputs and len(info.observables) <= _MAX_RECORDED:
         outputs = [v.name for v in info.observables if v.kind != "string"]
+    if unknown := next((name for name in omitted if name not in outputs), None):
+        raise SpecError(f"no output {unknown!r}; {did_you_mean(unknown, outputs)}", key=omitted[unknown])
+    outputs = [name for name in outputs if name not in omitted]
     for name in extra:
         if name not in info:
             names = [v.name for v in info.variables]

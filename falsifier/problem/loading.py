@@ -105,6 +105,7 @@ def load_problem(
     time_limit: float | None = None,
     interface: Interface | None = None,
     context: Sequence[str] = (),
+    omit: Sequence[str] = (),
     allow: Sequence[str] = (),
     deny: Sequence[str] = (),
 ) -> Problem:
@@ -125,6 +126,7 @@ def load_problem(
         time_limit: maximum wall-clock time of one simulation in s.
         interface: interface with which the FMU is simulated.
         context: files that a language model may read, ``fmu`` or ``none``; see ProblemSource.
+        omit: outputs not to record, such as one that becomes NaN and that no formula names.
         allow: what the FMU may do beyond what the spec allows: ``write:PATH``, ``read:PATH``, ``programs``.
         deny: what it may not do: ``network``.
 
@@ -139,6 +141,7 @@ def load_problem(
         output_interval=output_interval,
         time_limit=time_limit,
         interface=interface,
+        omit=omit,
         allow=allow,
         deny=deny,
     )

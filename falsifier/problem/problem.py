@@ -88,6 +88,7 @@ class Problem:
         time_limit: float | None = None,
         interface: Interface | None = None,
         context: Sequence[str] = (),
+        omit: Sequence[str] = (),
         allow: Sequence[str] = (),
         deny: Sequence[str] = (),
     ) -> "Problem":
@@ -110,6 +111,7 @@ class Problem:
             interface: interface of the FMU; default: co-simulation if the FMU offers it. The components of a
                 system have interfaces of their own.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
+            omit: outputs not to record, such as one that becomes NaN and that no formula names.
             allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file
                 or folder that may hold keys), ``programs`` (execute programs).
             deny: what it may not do: ``network`` (open connections).
@@ -133,6 +135,7 @@ class Problem:
             tolerance=tolerance,
             time_limit=time_limit,
             interface=interface,
+            omit=omit,
             allow=allow,
             deny=deny,
         )

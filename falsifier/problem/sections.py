@@ -156,6 +156,7 @@ class ModelSection(Strict):
     )
     logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
+    omit: tuple[str, ...] = Field((), description="Outputs not to record, such as one that becomes NaN.")
     allow: tuple[str, ...] = Field(
         (),
         description="What the FMU may do beyond changing its own folders: write:PATH, read:PATH (a file or "
@@ -246,6 +247,7 @@ class ModelChanges(Strict):
     tolerance: Seconds | None = None
     time_limit: Seconds | None = None
     logging: bool | None = None
+    omit: tuple[str, ...] = ()
     allow: tuple[str, ...] = ()
     deny: tuple[str, ...] = ()
     inputs: Inputs = Field(default_factory=dict)

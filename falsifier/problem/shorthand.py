@@ -44,6 +44,7 @@ def changes_from(
     *,
     inputs: Mapping[str, InputChoice] | None = None,
     parameters: Mapping[str, ParameterChoice] | None = None,
+    omit: Iterable[str] = (),
     allow: Iterable[str] = (),
     deny: Iterable[str] = (),
     **experiment: float | Interface | None,
@@ -68,7 +69,8 @@ def changes_from(
         raise SpecError(f"{both[0]}: {why}; drop one of them")
     data["inputs"] = {name: _input_section(name, _from_numpy(c)) for name, c in inputs.items()}
     data["parameters"] = {name: _parameter_section(name, _from_numpy(c)) for name, c in parameters.items()}
-    data |= {name: words for name, words in given_rights(allow, deny).items() if words}
+    listed = {"omit": texts("omit", omit), **given_rights(allow, deny)}
+    data |= {name: words for name, words in listed.items() if words}
     try:
         return ModelChanges.model_validate(data)
     except ValidationError as error:
@@ -132,6 +134,7 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     for field in ("interface", "stop_time", "output_interval", "time_limit"):
         if (value := getattr(changes, field)) is not None:
             options.append((f"--{field.replace('_', '-')}", str(value)))
+    options += [("--omit", name) for name in changes.omit]
     options += [("--allow", word) for word in changes.allow]
     return options + [("--deny", word) for word in changes.deny]
 

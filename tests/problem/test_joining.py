@@ -133,6 +133,19 @@ def test_signals_to_record_must_be_there() -> None:
         join(parse_spec(spec, file="my.toml"), "R", path=FILE)
 
 
+def test_outputs_may_be_left_out_unless_the_formula_names_them() -> None:
+    def recorded(*omit: str) -> set[str]:
+        problem = Problem.from_fmu(fixture("Echo_2"), "G[0,1] (out_Real <= 1)", omit=omit)
+        return set(problem.experiment.outputs)
+
+    assert recorded() - recorded("out_Integer", "out_Real") == {"out_Integer"}
+    with pytest.raises(SpecError, match=r"omit: no output 'out_Int'; did you mean 'out_Integer'"):
+        recorded("out_Int")
+    spec = SPEC | {"model": SPEC["model"] | {"omit": ["sped"]}}
+    with pytest.raises(SpecError, match=r"model\.omit: no output 'sped'"):
+        join(parse_spec(spec, file="my.toml"), "R", path=FILE)
+
+
 def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(
     tmp_path: Path,
 ) -> None:

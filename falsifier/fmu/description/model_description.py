@@ -156,7 +156,7 @@ def _parse(root: Element, version: str) -> Description:
         stop_time=_positive(experiment, "stopTime"),
         step_size=_positive(experiment, "stepSize"),
         tolerance=_positive(experiment, "tolerance"),
-        variables=variables,
+        variables=tuple(map(_without_impossible_limits, variables)),
         notes=_notes(root, variables, experiment, tool=tool, needs_tool=needs_tool),
     )
     return Description(
@@ -233,10 +233,14 @@ def _notes(
     return tuple(said)
 
 
+def _without_impossible_limits(v: Variable) -> Variable:
+    return v if v.low is None or v.high is None or v.low <= v.high else replace(v, low=None, high=None)
+
+
 def _doubt(v: Variable) -> str:
     """Say what of a variable's limits and start value cannot be meant; empty if nothing is wrong."""
     if v.low is not None and v.high is not None and v.low > v.high:
-        return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}"
+        return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}, so both are ignored"
     if (start := v.start_number) is None:
         return ""
     if not isfinite(start):

@@ -12,12 +12,13 @@ _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
 _OF_ALL = (Where.UNSETTLED, Where.NOT_CONVERGED, Where.TIMEOUT)
 _BEFORE = "at {reached}, before the stop time {stop}"
 _EVENT = f"the event iteration {{returned}} {_BEFORE}"
+_FIRST_STEP = "the first step, of {step} s, {returned}; an FMU of one step only needs it as step_size"
 _TEXTS: Mapping[int, str] = {
     Where.SETTING: f"setting the inputs {{returned}} {_BEFORE}",
     Where.STEPPING: f"the step {{returned}} {_BEFORE}",
     Where.GETTING: f"reading the outputs {{returned}} {_BEFORE}",
     Where.EVENT: _EVENT,
-    Where.TERMINATED: f"the FMU terminated the simulation {_BEFORE}",
+    Where.TERMINATED: f"the FMU terminated the simulation {_BEFORE}; a stop_time before that judges the rest",
     Where.STUCK: f"the FMU makes no progress: its events never end {_BEFORE}",
     Where.TOO_SMALL: (
         "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast "
@@ -59,11 +60,15 @@ def failure(
     words = reply.text.split()
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
-    said = _TEXTS.get(reply.where, _EVENT).format(
+    text = _TEXTS.get(reply.where, _EVENT)
+    if reply.where == Where.STEPPING and reply.time == 0.0:
+        text = _FIRST_STEP
+    said = text.format(
         text=reply.text,
         returned=f"returned {_status_name(reply.status)}",
         reached=f"t = {reply.time:g} s",
         stop=f"{plan.stop_time:g} s",
+        step=f"{plan.times[1] / plan.every:.6g}",
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),

@@ -136,7 +136,7 @@ def test_times_of_the_default_experiment_that_no_simulation_can_use_are_named() 
 @pytest.mark.parametrize(
     ("attributes", "said"),
     [
-        ('min="2" max="1" start="1.5"', "min = 2 of 'p' is greater than max = 1"),
+        ('min="2" max="1" start="1.5"', "min = 2 of 'p' is greater than max = 1, so both are ignored"),
         ('start="NaN"', "start of 'p' is nan"),
         ('min="0" max="1" start="5"', "start = 5 exceeds the model's limits for 'p', [0, 1]"),
         ('min="0" max="1" start="1"', ""),
@@ -147,4 +147,7 @@ def test_limits_and_start_values_that_cannot_be_meant_are_noted(attributes: str,
         <Real {attributes}/></ScalarVariable>"""
     text = ROLES.replace('"p"', '"q"').replace("<ModelVariables>", f"<ModelVariables>{variable}")
     expected = (f"the description contradicts itself: {said}",) if said else ()
-    assert described(text).info.notes == expected
+    info = described(text).info
+    assert info.notes == expected
+    low, high = info["p"].limits
+    assert low is None or high is None or low < high
