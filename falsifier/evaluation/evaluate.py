@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
-from os import PathLike, fspath
+from os import PathLike
+from pathlib import Path
 from time import perf_counter
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,9 +21,9 @@ from falsifier.errors import (
     ModelError,
     MonitorError,
     SimulationError,
-    SpecError,
     did_you_mean,
 )
+from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem
 from falsifier.stl import Formula, Monitor
@@ -106,15 +107,15 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
 
 def simulate(
     problem: Problem,
-    inputs: Mapping[str, Signal | float] | None = None,
+    inputs: Mapping[str, Signal | float] | Candidate | str | PathLike[str] | None = None,
     parameters: Mapping[str, float] | None = None,
 ) -> Evaluation:
     """Simulate given inputs and evaluate the requirement; the ranges of the search space do not apply.
 
     Args:
         problem: the model to simulate and the requirement to evaluate.
-        inputs: a signal, or a number for a constant one, by input name; other inputs keep the problem's fixed
-            values or the model's start values.
+        inputs: a signal, or a number for a constant one, by input name; or a CSV file of inputs; or a
+            candidate with its parameters. Other inputs keep the problem's fixed or the model's start values.
         parameters: values by name; other parameters keep the problem's or the model's values.
 
     Raises:
@@ -128,13 +129,12 @@ def simulate(
     """
     check_problem(problem)
     info = problem.info
-    driven = {} if inputs is None else inputs
+    driven: Any = {} if inputs is None else inputs
     values = {} if parameters is None else parameters
     if isinstance(driven, str | PathLike):
-        raise SpecError(
-            f"inputs: expected signals or numbers by name, got the path {fspath(driven)!r}; of a CSV file: "
-            f"falsifier.evaluation.input_file.read_inputs(Path({fspath(driven)!r}), problem.info).signals"
-        )
+        driven = read_inputs(Path(driven), info).signals
+    if isinstance(driven, Candidate):
+        driven, values = driven.signals, {**driven.parameters, **values}
     instance("inputs", driven, Mapping, "signals or numbers by name, such as {'u': 1.0}")
     instance("parameters", values, Mapping, "numbers by name, such as {'p': 1.5}")
     known = [v.name for v in info.inputs]

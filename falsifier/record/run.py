@@ -35,7 +35,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Steps
 
-Falsifiable = Problem | ProblemSource | str
+Falsifiable = Problem | ProblemSource | str | Path
 LLM = LLMSettings | Chat | str
 
 # Minimum time in s between two looks for a stop file.
@@ -323,7 +323,7 @@ def _problem(given: Falsifiable) -> Problem:
         return given
     if not isinstance(given, Falsifiable):
         raise SpecError(f"expected a Problem or a target such as 'AT1', got {type(given).__name__}")
-    return load_source(ProblemSource(target=given) if isinstance(given, str) else given)
+    return load_source(given if isinstance(given, ProblemSource) else ProblemSource(target=str(given)))
 
 
 def _check_engine(engine: object) -> None:

@@ -1,6 +1,8 @@
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
@@ -143,10 +145,7 @@ def test_only_what_is_searched_is_evaluated(candidate: Candidate, message: str) 
     ("inputs", "message"),
     [
         ({1: 100}, "the model has no input 1; known: u"),
-        (
-            "u3.csv",
-            r"got the path 'u3.csv'; of a CSV file: .*read_inputs\(Path\('u3.csv'\), problem.info\)",
-        ),
+        ("u3.csv", "u3.csv: cannot be read: No such file"),
         ({"u": [0, 1]}, r"inputs.u: expected a finite number or a Signal\(times, values\), got \[0, 1\]"),
         ({"u": None}, "inputs.u: .*got None"),
         ({"u": float("nan")}, "inputs.u: .*got nan"),
@@ -157,6 +156,24 @@ def test_only_what_is_searched_is_evaluated(candidate: Candidate, message: str) 
 def test_what_is_no_signal_is_named(inputs: Any, message: str) -> None:
     with pytest.raises(FalsifierError, match=message):
         simulate(lag_problem(), inputs)
+
+
+def test_files_candidates_and_arrays_are_inputs(tmp_path: Path) -> None:
+    problem = lag_problem(parameters=[START])
+    file = tmp_path / "u.csv"
+    file.write_text("time,u\n0,0\n10,1\n")
+    signal = Signal(np.array([0.0, 10.0]), np.array([0.0, 1.0]), "linear")  # type: ignore[arg-type]
+    candidate = Candidate({"u": signal}, {"x0": 0.5})
+    found = [
+        simulate(problem, str(file), {"x0": 0.5}),
+        simulate(problem, file, {"x0": 0.5}),
+        simulate(problem, {"u": signal}, {"x0": 0.5}),
+        simulate(problem, candidate),
+        simulate(problem, candidate, {"x0": 0.0}),
+    ]
+    *same, other = [evaluation.robustness for evaluation in found]
+    assert len(set(same)) == 1 and other not in same
+    assert hash(signal) == hash(Signal((0.0, 10.0), (0.0, 1.0), "linear"))
 
 
 def test_numbers_as_text_are_no_parameters() -> None:

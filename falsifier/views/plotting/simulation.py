@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from falsifier.analyses.coverage import labels_of
+from falsifier.core.arguments import instance
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import with_unit
 from falsifier.evaluation.confirm import Confirmation
@@ -56,8 +57,10 @@ def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
     """Plot a result, a counterexample or a trajectory.
 
     Raises:
+        SpecError: for anything else.
         ValueError: for a result in which every simulation failed.
     """
+    instance("shown", shown, (Result, Confirmation, Trajectory), "a result, counterexample or trajectory")
     if isinstance(shown, Trajectory):
         return plot_trajectory(shown)
     evaluation = shown.shown if isinstance(shown, Result) else shown.evaluation
