@@ -280,9 +280,13 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                     f"{did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
-            if isinstance(section.value, str) and variable.kind != "string":
+            if isinstance(section.value, str) and section.value in variable.literals:
+                stated["value"] = variable.literals[section.value]
+            elif isinstance(section.value, str) and variable.kind != "string":
+                items = f" or one of {', '.join(variable.literals)}" if variable.literals else ""
                 raise SpecError(
-                    f"expected a number, got {section.value!r}; to search a range: {searching(kind, name)}"
+                    f"expected a number{items}, got {section.value!r}; to search a range: "
+                    f"{searching(kind, name)}"
                 )
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)

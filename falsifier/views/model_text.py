@@ -72,7 +72,7 @@ def _cells(v: Variable) -> tuple[str, ...]:
     low, high = _number(v.low), _number(v.high)
     if v.causality == "input" and v.kind == "real":
         low, high = low or "unbounded", high or "unbounded"
-    description = " ".join(v.description.split())
+    description = " ".join([*v.description.split(), *([f"({v.items_text})"] if v.items_text else [])])
     return (v.name, v.kind, unit, low, high, _number(v.start), description)
 
 

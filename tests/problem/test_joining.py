@@ -8,6 +8,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
+from falsifier.fmu import read_info
 from falsifier.problem.joining import Joined, join, join_formula
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import RequirementSection
@@ -144,6 +145,19 @@ def test_outputs_may_be_left_out_unless_the_formula_names_them() -> None:
     spec = SPEC | {"model": SPEC["model"] | {"omit": ["sped"]}}
     with pytest.raises(SpecError, match=r"model\.omit: no output 'sped'"):
         join(parse_spec(spec, file="my.toml"), "R", path=FILE)
+
+
+def test_items_of_enumerations_may_be_named() -> None:
+    def kept(said: str) -> list[tuple[str, float]]:
+        changes = changes_from_options(values=[f"in_Enumeration={said}"])
+        stated = RequirementSection(formula="G[0,1] (out_Real <= 1)")
+        joined = join_formula(fixture("Echo_2"), stated, changes=changes)
+        return list(joined.parameters.items())
+
+    (first, number), *_ = read_info(fixture("Echo_2"))["in_Enumeration"].literals.items()
+    assert kept(first) == kept(str(number)) == [("in_Enumeration", number)]
+    with pytest.raises(SpecError, match=f"expected a number or one of {first}, .*, got 'nothing'"):
+        kept("nothing")
 
 
 def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(
