@@ -134,6 +134,7 @@ def margin(
         complete = state.narrowed()
     except KeyboardInterrupt:
         interrupted = True
+        state.judge_all()  # what the search that was stopped has simulated counts, too
     falsified = None if state.reached < 0 else thresholds[state.reached]
     unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
     searches, simulations = tuple(state.searches), len(state.history)
@@ -213,7 +214,7 @@ class _Bisection:
             self.reached = max(self.reached, k)
         else:
             self.in_vain.add(k)
-        self._judge_all()
+        self.judge_all()
         self.searched(*self.searches[-1], len(self.history))
 
     def _at(self, k: int) -> Problem:
@@ -225,7 +226,7 @@ class _Bisection:
         problem = self._at(k)
         return [judge(problem, evaluation) for evaluation in self.history]
 
-    def _judge_all(self) -> None:
+    def judge_all(self) -> None:
         """Look for a harder threshold that something simulated already violates, if that is confirmed."""
         known = range(max(self.reached, 0), len(self.thresholds))
         count = bisect_left(known, 1, key=lambda k: not any(e.violated for e in self._judged(k)))

@@ -94,7 +94,11 @@ Searcher = str | LLMSettings | tuple[str, LLMSettings]
 
 
 def cross(
-    problems: Iterable[ProblemSource], searchers: Iterable[Searcher], *, seeds: Iterable[int], budget: Budget
+    problems: Iterable[ProblemSource | str],
+    searchers: Iterable[Searcher],
+    *,
+    seeds: Iterable[int],
+    budget: Budget,
 ) -> tuple[RunRequest, ...]:
     """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
@@ -110,9 +114,9 @@ def cross(
         llm = searcher if isinstance(searcher, LLMSettings) else None
         if isinstance(searcher, tuple):
             engine, llm = searcher
-        used = problem
-        if problem.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
-            used = problem.model_copy(update={"parameterization": "fixed"})
+        used = ProblemSource(target=problem) if isinstance(problem, str) else problem
+        if used.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
+            used = used.model_copy(update={"parameterization": "fixed"})
         run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=budget, keep="best")
         runs[run_name(run)] = run
     return tuple(runs.values())

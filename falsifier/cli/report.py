@@ -122,16 +122,17 @@ def _write_arch_comp(directory: Path, path: Path) -> None:
 
 
 def _evaluations_csv(directories: Iterable[Path]) -> str:
-    """Return a row per evaluation: requirement, method and seed of its run, then what Run.columns gives.
+    """Return a row per evaluation: what identifies its run, then what Run.columns gives.
 
     What a run did not search has no value in its rows.
     """
     runs = [(run, run.columns()) for directory in directories for run in load(directory)]
     names = dict.fromkeys(name for _, columns in runs for name in columns)
-    table: Columns = {name: [] for name in ("requirement", "method", "seed", *names)}
+    table: Columns = {name: [] for name in ("directory", "requirement", "method", "seed", *names)}
     for run, columns in runs:
         count = len(columns["simulation"])
         about = {"requirement": run.requirement, "method": run.method.label, "seed": run.seed}
+        about["directory"] = str(run.directory)
         for name, values in table.items():
             values += [about[name]] * count if name in about else columns.get(name, [None] * count)
     return csv_text([table, *zip(*table.values(), strict=True)])

@@ -149,5 +149,14 @@ def digits(value: float) -> int:
     return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
 
 
+def shortest(value: float) -> str:
+    """Return the shortest text of a number that has its value.
+
+    >>> shortest(1.1), shortest(2.0)
+    ('1.1', '2')
+    """
+    return repr(float(value)).removesuffix(".0")
+
+
 def _writable(text: str) -> str:
     return _UNWRITABLE.sub(_REPLACEMENT, text)

@@ -351,7 +351,7 @@ class FunctionModel:
         others = {name: value for name, value in parameters.items() if name not in inputs}
         try:
             outputs = self.function(times, inputs, others)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise SimulationError(f"{self.info.name}: {type(error).__name__}: {error}") from error
         if not isinstance(outputs, Mapping):
             raise SimulationError(

@@ -143,7 +143,7 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     """
     check_evaluation(problem, evaluation)
     if evaluation.trajectory is None:
-        raise SpecError("a failed simulation cannot be explained: pass an evaluation with a trajectory")
+        raise SpecError("no trajectory to explain: pass an evaluation that has one, such as a result's best")
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
     effects = tuple(_effects(problem, evaluation.candidate))
     return Explanation(problem, evaluation, diagnosis, effects)

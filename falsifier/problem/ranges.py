@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from falsifier.core.literals import shortest
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, ValueKind
 from falsifier.errors import SpecError, did_you_mean, in_section, naming
@@ -169,7 +170,7 @@ def string_values(
 ) -> tuple[tuple[str, str], ...]:
     """Return the values of string parameters; files are named relative to the spec's folder."""
     return tuple(
-        (name, named_file(v, folder) if isinstance(v := section.value, str) else f"{v:.17g}")
+        (name, named_file(v, folder) if isinstance(v := section.value, str) else shortest(v))
         for name, section in parameters.items()
         if section.value is not None and info[name].kind == "string"
     )

@@ -124,5 +124,5 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if listing.startswith("known") and not near.startswith("known"):
         listing = f"{near.split('?')[0]}? K{listing[1:]}"
     if name.startswith("der("):
-        listing += "; without a signal that is the rate, use the template ramp_limit with over and range"
+        listing += "; without a signal that is the rate, use the template ramp_limit and state over and range"
     return f"unknown signal {name!r}; {listing}"

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
+from falsifier.core.literals import shortest
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
@@ -141,11 +142,11 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
 
 def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:
     if section.value is not None:
-        value = section.value if isinstance(section.value, str) else f"{section.value:.17g}"
+        value = section.value if isinstance(section.value, str) else shortest(section.value)
         return "--set", f"{name}={value}"
     if section.range is None:
         return "--search", name
-    said = [f"{v:.17g}" for v in section.range]
+    said = list(map(shortest, section.range))
     if isinstance(section, InputSection) and section.control_points is not None:
         said += [str(section.control_points), *([section.interpolation] if section.interpolation else [])]
     return "--search", f"{name}={':'.join(said)}"

@@ -14,7 +14,7 @@ from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, field_validator
+from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
@@ -86,6 +86,17 @@ class Spec(Strict):
         min_length=1, description="What to falsify, as [requirements.NAME]."
     )
     profiles: dict[str, ProfileSection] = Field(default_factory=dict)
+
+    @field_validator("profiles")
+    @classmethod
+    def _are_required(
+        cls, found: dict[str, ProfileSection], stated: ValidationInfo
+    ) -> dict[str, ProfileSection]:
+        known = stated.data.get("requirements", {})
+        for profile, section in found.items():
+            if unknown := next((name for name in section.requirements if name not in known), None):
+                raise ValueError(f"{profile}: no requirement {unknown!r}; {did_you_mean(unknown, known)}")
+        return found
 
     @property
     def is_system(self) -> bool:

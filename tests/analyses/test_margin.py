@@ -1,8 +1,12 @@
+from typing import Any
+
 import pytest
 
 from falsifier.analyses.margin import Margin, margin
 from falsifier.errors import SimulationError, SpecError
 from falsifier.problem.problem import Problem
+from falsifier.search.events import Evaluated, Event
+from falsifier.search.loop import search
 from falsifier.testing import BIAS, lag_problem
 from tests.problems import never, straight
 
@@ -124,3 +128,17 @@ def test_what_is_known_when_the_user_stops_is_the_answer() -> None:
     assert found.unfalsified is not None and found.falsified is not None
     assert found.falsified < 1.0 < found.unfalsified
     assert found.text.endswith("stopped by the user")
+
+
+def test_what_a_stopped_search_has_simulated_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(event: Event) -> None:
+        if isinstance(event, Evaluated) and event.index == 5:
+            raise KeyboardInterrupt
+
+    def stopped(*given: Any, listeners: list[Any]) -> Any:
+        return search(*given, listeners=[*listeners, stop])
+
+    monkeypatch.setattr("falsifier.analyses.margin.search", stopped)
+    found = margin(lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60)
+    assert (found.interrupted, found.searches, found.simulations) == (True, (), 6)
+    assert found.falsified is not None and 0.0 < found.falsified < 1.0

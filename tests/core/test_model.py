@@ -1,4 +1,5 @@
 import math
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -58,6 +59,7 @@ def test_an_input_without_a_signal_is_constant(given: dict[str, float], level: f
     [
         (divide, ("level",), "tank: output 'level' is inf at t = 0.5 s"),
         (lambda *_: 1 / 0, ("level",), "tank: ZeroDivisionError: division by zero"),
+        (lambda *_: sys.exit("no licence"), ("level",), "tank: SystemExit: no licence"),
         (lambda times, *_: {"level": times[:-1]}, ("level",), r"'level' has shape \(10,\), expected \(11,\)"),
         (lambda *_: None, ("level",), "the function returned NoneType; expected a dictionary"),
         (lambda *_: (1.0, 2.0), ("level",), "the function returned tuple; expected a dictionary"),

@@ -154,7 +154,7 @@ def test_a_template_becomes_the_formula_of_its_simulation() -> None:
         (str(AT), "rise signal=sped reference=80 time=10", r"stl: unknown signal 'sped'"),
         (str(AT), "stays_within signal=speed", r"^stl: expected low, high or both"),
         ("AT1", f"{RISE} stop_time=10", r"^stl: stop_time: it changes .*\(stop_time, "),
-        ("AT1", "ramp_limit signal=speed limit=9", r"unknown signal 'der\(speed\)'.*with over and range"),
+        ("AT1", "ramp_limit signal=speed limit=9", r"unknown signal 'der\(speed\)'.*state over and range"),
         ("AT1", "not speed=9", r"equality is =="),
         ("python:tests.problems:easy", RISE, "made in Python"),
     ],

@@ -64,6 +64,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
             r"parameters\.p\.control_points: only inputs have control_points: write \[inputs\.p\] if",
         ),
         ("parameters.p", {"range": [0, 1], "foo": 3}, r"parameters\.p\.foo: unknown key; known: range"),
+        ("profiles.p.requirements.X.stop_time", 1, r"profiles: p: no requirement 'X'; known: "),
         ("profiles.p.inputs.u.hodl", 1, r"profiles\.p\.inputs\.u\.hodl: unknown key; did you mean 'hold'"),
     ],
 )

@@ -225,5 +225,7 @@ def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
         ("--variant", llm.variant),
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
         ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
+        ("--llm-option", None if llm.timeout is None else f"timeout={llm.timeout:g}"),
+        ("--llm-option", None if llm.cache else "cache=no"),
         ("--anonymous", True if llm.anonymous else None),
     ]

@@ -64,12 +64,18 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
     model = LLMSettings(
-        name="openai/gpt-5-mini", effort="high", variant="MP4", price=(0.25, 2), anonymous=True
+        name="openai/gpt-5-mini",
+        effort="high",
+        variant="MP4",
+        price=(0.25, 2),
+        anonymous=True,
+        timeout=30,
+        cache=False,
     )
     asked = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model, budget=Budget(None, 9.0))
     assert run_command(asked) == (
-        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 --anonymous "
-        "--seconds 9.0 --seed 0"
+        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 "
+        "--llm-option timeout=30 --llm-option cache=no --anonymous --seconds 9.0 --seed 0"
     )
 
 
