@@ -30,8 +30,10 @@ The code is divided into fifteen packages. Each imports only from itself and fro
 In addition, ``errors`` contains the exceptions and ``testing`` contract tests for engines of your own.
 """
 
+import re
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
@@ -140,54 +142,19 @@ if TYPE_CHECKING:
         parse as parse,
     )
     from falsifier.views import plotting as plotting
-    from falsifier.views.plotting import Figure as Figure, plot as plot
+    from falsifier.views.plotting import plot as plot
     from falsifier.views.progress import progress as progress
 
-# Where the public names are found.
-_NAMES = {
-    "falsifier.analyses.assess": "Assurance Searched assess",
-    "falsifier.analyses.coverage": "Coverage coverage",
-    "falsifier.analyses.formalize": "Difference Formalized Reading formalize",
-    "falsifier.analyses.lint": "LintFinding lint",
-    "falsifier.analyses.margin": "Margin margin",
-    "falsifier.campaigns": "CampaignRequest Method analysis cross resume_campaign run_campaign suite",
-    "falsifier.core.candidate": "Candidate",
-    "falsifier.core.model": "Experiment FunctionModel Model ModelInfo Variable",
-    "falsifier.core.signals": "Signal",
-    "falsifier.core.space": "Freedom InputRange ParameterRange SearchSpace",
-    "falsifier.core.trajectory": "Trajectory",
-    "falsifier.counterexamples.explain": "Explanation explain",
-    "falsifier.counterexamples.robustness_map": "RobustnessMap robustness_map",
-    "falsifier.counterexamples.shrink": "Shrunk shrink",
-    "falsifier.counterexamples.store": "Replayed StoredCounterexample load_counterexample replay",
-    "falsifier.engines": "DEFAULT_ENGINE ENGINES make_engine",
-    "falsifier.engines.briefing": "preview",
-    "falsifier.engines.llm": "LLMEngine",
-    "falsifier.engines.protocol": "AsksLLM Engine",
-    "falsifier.errors": "FalsifierError",
-    "falsifier.evaluation.confirm": "Confirmation confirm",
-    "falsifier.evaluation.evaluate": "Evaluation evaluate monitor_for simulate",
-    "falsifier.fmu": "Component Connection Coupling FmuModel Frame System read_info read_package",
-    "falsifier.llm.client": "connect",
-    "falsifier.llm.messages": "Chat Exchange",
-    "falsifier.llm.prompts": "VARIANTS",
-    "falsifier.llm.scripted": "ScriptedChat",
-    "falsifier.problem.loading": "load_problem load_problems",
-    "falsifier.problem.problem": "Problem",
-    "falsifier.problem.requirement": "Requirement",
-    "falsifier.problem.source": "ProblemSource",
-    "falsifier.record.run": "falsify resume",
-    "falsifier.search": "events",
-    "falsifier.search.budget": "Budget Spent",
-    "falsifier.search.events": "Event Listener",
-    "falsifier.search.request": "LLMSettings",
-    "falsifier.search.result": "Result",
-    "falsifier.stl": "Breach Diagnosis Formula Monitor Verdict parse",
-    "falsifier.views": "plotting",
-    "falsifier.views.plotting": "plot",
-    "falsifier.views.progress": "progress",
+    Figure = plotting.Figure  # for annotations only
+
+# Where the public names are found, as type checkers read it above.
+_PLACES = {
+    name: module
+    for module, names in re.findall(
+        r"^ {4}from (falsifier\S+) import (\([^)]*\)|.+)", Path(__file__).read_text(encoding="utf-8"), re.M
+    )
+    for name in re.findall(r"(\w+) as \1", names)
 }
-_PLACES = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 if "IPython" in sys.modules:  # lets it show the values of this package as tables and figures
     import_module("falsifier.views.notebook").register()
