@@ -31,7 +31,7 @@ from falsifier.cli.options import (
     requirement_option,
     run_argument,
 )
-from falsifier.cli.output import as_shown, conclude, say
+from falsifier.cli.output import INTERRUPTED, as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
@@ -118,7 +118,8 @@ def explain(
     else:
         lines, content = _explain(case, run, rights)
     only_drawn = all(name.endswith(".png") for name in content.get("files", ()))
-    conclude(as_shown("\n".join(lines), content, as_json=as_json), 3 if shrunk and only_drawn else 0)
+    code = INTERRUPTED if content.get("interrupted") else 3 if shrunk and only_drawn else 0
+    conclude(as_shown("\n".join(lines), content, as_json=as_json), code)
 
 
 @command()
@@ -295,6 +296,7 @@ def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Pat
     content = {
         "original": found.original,
         "smallest": found.smallest,
+        "interrupted": found.interrupted,
         "persistence": [{"size": size, "share": share} for size, share in found.persistence],
         "rank_correlations": dict(zip(labels, found.influences, strict=True)),
         "about": str(case.place),

@@ -5,6 +5,7 @@ interpolation are not. The size of a change is the largest share of a range by w
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isqrt
 
@@ -74,7 +75,8 @@ class RobustnessMap:
         axes: indices of the two coordinates with the largest; one if there is only one.
         grid: values of these coordinates, one array each.
         surface: robustness over the grid, with the other coordinates unchanged, shape
-            (len(grid[1]), len(grid[0])), or (1, len(grid[0])) with one axis.
+            (len(grid[1]), len(grid[0])), or (1, len(grid[0])) with one axis; NaN if it was not simulated.
+        interrupted: whether the user stopped it before all was simulated.
     """
 
     original: float
@@ -87,13 +89,16 @@ class RobustnessMap:
     axes: tuple[int, ...]
     grid: tuple[NDArray[np.float64], ...]
     surface: NDArray[np.float64]
+    interrupted: bool = False
 
     @property
     def persistence(self) -> tuple[tuple[float, float], ...]:
         """Pairs of a size and the share of the changes up to that size that still violate."""
         sizes = [shell * self.radius for shell in _SHELLS]
         within = [self.robustness[self.sizes <= size * (1 + 1e-9)] for size in sizes]
-        return tuple((size, float((r < 0).mean())) for size, r in zip(sizes, within, strict=True) if r.size)
+        most = self.sizes.max(initial=0.0)  # larger ones were not tried if the user stopped it
+        tried = zip((0.0, *sizes), sizes, within, strict=False)
+        return tuple((size, float((r < 0).mean())) for below, size, r in tried if r.size and most > below)
 
     @property
     def smallest(self) -> float | None:
@@ -110,7 +115,7 @@ class RobustnessMap:
             shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
             shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
             return f"{shares} ({changes} of all inputs at once). {self._followed}"
-        tried = f"{changes} of up to {_percent(self.radius)} of the range"
+        tried = f"{changes} of up to {_percent(self.persistence[-1][0])} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
         least = "" if self.smallest is None else f"; the smallest robustness is {signed(self.smallest)}"
@@ -119,16 +124,17 @@ class RobustnessMap:
     @property
     def _followed(self) -> str:
         """What was measured, so that it is not taken for what resetting one input alone would do."""
+        end = " Stopped by the user." if self.interrupted else ""
         if not any(self.influences):
-            return "None of these changes moved the robustness."
+            return f"None of these changes moved the robustness.{end}"
         most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
-        return f"Over these changes the robustness follows {listed(most)} most (rank correlation)."
+        return f"Over these changes the robustness follows {listed(most)} most (rank correlation).{end}"
 
 
 def robustness_map(
     problem: Problem, evaluation: Evaluation, *, radius: float = 0.05, budget: int = BUDGET, seed: int = 0
 ) -> RobustnessMap:
-    """Simulate around a counterexample or a near miss.
+    """Simulate around a counterexample or a near miss; Ctrl-C ends it early, with what is simulated by then.
 
     Args:
         problem: the problem with the requirement.
@@ -160,7 +166,10 @@ def robustness_map(
     below, above = np.maximum(start - shell, low), np.minimum(start + shell, high)
     values = below + unit * (above - below)
     sizes = np.abs((values - start) / (high - low)).max(axis=1)
-    robustness = np.array([_robustness(problem, candidate, coordinates, row) for row in values])
+    robustness = np.array(_simulated(problem, candidate, coordinates, values))
+    if not robustness.size:
+        raise KeyboardInterrupt
+    values, sizes = values[: robustness.size], sizes[: robustness.size]
     influences = _influences(values, robustness)
     axes = tuple(int(i) for i in np.argsort(-np.abs(influences), kind="stable")[:2])
     grid = tuple(
@@ -169,7 +178,10 @@ def robustness_map(
     rows = np.tile(start, (points ** len(axes), 1))
     # The second axis first, so that the first one varies along the rows of the surface.
     rows[:, axes[::-1]] = np.stack(np.meshgrid(*grid[::-1], indexing="ij"), axis=-1).reshape(-1, len(axes))
-    surface = [_robustness(problem, candidate, coordinates, row) for row in rows]
+    rows = rows if robustness.size == samples else rows[:0]
+    surface = np.full(points ** len(axes), np.nan)
+    found = _simulated(problem, candidate, coordinates, rows)
+    surface[: len(found)] = found
     return RobustnessMap(
         evaluation.robustness,
         coordinates,
@@ -180,7 +192,8 @@ def robustness_map(
         tuple(influences.tolist()),
         axes,
         grid,
-        np.array(surface).reshape(-1, points),
+        surface.reshape(-1, points),
+        interrupted=len(found) < len(surface),
     )
 
 
@@ -202,6 +215,17 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
             yield Coordinate(r.name, (first, end), time, signal.values[first], r.low, r.high, r.unit)
     for p in problem.space.parameters:
         yield Coordinate(p.name, None, None, candidate.parameters[p.name], p.low, p.high, p.unit)
+
+
+def _simulated(
+    problem: Problem, candidate: Candidate, coordinates: Sequence[Coordinate], rows: NDArray[np.float64]
+) -> list[float]:
+    """Return the robustness for each row of values; until Ctrl-C, for those that were simulated."""
+    found: list[float] = []
+    with suppress(KeyboardInterrupt):
+        for row in rows:
+            found.append(_robustness(problem, candidate, coordinates, row))
+    return found
 
 
 def _robustness(

@@ -6,12 +6,13 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
-from falsifier.counterexamples.robustness_map import robustness_map
+from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import on_limit
 from falsifier.testing import lag_problem
+from falsifier.views.plotting import plot_robustness_map, png
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -45,7 +46,7 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
 
 def test_a_margin_of_nothing_is_shown_as_everywhere_else() -> None:
     found = robustness_map(problem(), at(problem(), 0.54, 0.0), budget=20)
-    on = replace(found, original=on_limit("<="), robustness=np.full(20, on_limit("<=")))
+    on = replace(found, original=on_limit("<="), robustness=np.full_like(found.robustness, on_limit("<=")))
     assert "the smallest robustness is +0, without a change it is +0." in on.text
 
 
@@ -69,6 +70,32 @@ def test_each_stretch_moves_alone() -> None:
     found = robustness_map(free, evaluate(free, Candidate({"u": signal})), budget=30)
     assert [(c.time, c.value) for c in found.coordinates] == [(0.0, 1.0), (2.0, 0.0), (6.0, 1.0)]
     assert found.axes[0] == 2  # what comes last decides x(10)
+
+
+def test_what_was_simulated_before_the_user_stopped_it_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(after: int) -> RobustnessMap:
+        def limited(problem: Problem, candidate: Candidate) -> Evaluation:
+            nonlocal after
+            if not after:
+                raise KeyboardInterrupt
+            after -= 1
+            return evaluate(problem, candidate)
+
+        monkeypatch.setattr("falsifier.counterexamples.robustness_map.evaluate", limited)
+        return robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.1, budget=200)
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped(0)
+    early, late, whole = stopped(20), stopped(150), stopped(200)
+    assert (early.interrupted, late.interrupted, whole.interrupted) == (True, True, False)
+    assert len(early.robustness) == len(early.values) == 20 and np.isnan(early.surface).all()
+    assert [size for size, _ in early.persistence] == [0.0125], "larger changes come later"
+    assert early.text.endswith("Stopped by the user.")
+    assert len(late.persistence) == 4 and late.surface.shape == whole.surface.shape
+    known = np.isfinite(late.surface)
+    assert 0 < known.sum() < known.size
+    np.testing.assert_array_equal(late.surface[known], whole.surface[known])
+    assert png(plot_robustness_map(early, "early"), dpi=50)
 
 
 def test_settings_are_checked() -> None:

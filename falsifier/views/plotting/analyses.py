@@ -161,7 +161,8 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     from matplotlib.colors import TwoSlopeNorm
 
     first, second = (found.coordinates[i] for i in found.axes)
-    low, high = float(np.nanmin(found.surface)), float(np.nanmax(found.surface))
+    known = found.surface[np.isfinite(found.surface)]
+    low, high = (float(end(known, initial=found.original)) for end in (np.min, np.max))
     # Red, for violations, begins at 0 and is seen however small they are.
     largest = max(-low, high) or 1.0
     norm = TwoSlopeNorm(0.0, low if low < 0 else -largest, high if high > 0 else largest)
