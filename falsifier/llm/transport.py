@@ -40,6 +40,7 @@ _TOO_LONG = f"the reply has more than {_MOST_BYTES >> 20} MiB"
 
 # Maximum number of characters of a reply that an error repeats.
 _LONGEST_BEGINNING = 80
+_WITHIN = "the connection was cut within the reply"
 _CUT = "the server or a proxy before it ended it; its log says why"
 _ADDRESS = "check host, port and http or https in the server's address"
 _NO_LLM = f"that is no server of a language model; {_ADDRESS}"
@@ -64,7 +65,7 @@ _FAULTS = (
     (("receive buffer too long",), "the reply has headers of more than 100 kB", _NO_LLM),
     (("illegal chunk", "transfer-encoding"), "the reply is no valid HTTP", _CUT),
     (("illegal", "protocol"), "the server does not answer in HTTP", _NO_LLM),
-    (("without sending complete", "incomplete"), "the connection was cut within the reply", _CUT),
+    (("without sending complete", "incomplete"), _WITHIN, _CUT),
     (("reset by peer", "broken pipe"), "the connection was cut", _CUT),
 )
 
@@ -191,7 +192,9 @@ class _Call:
         except httpx.TimeoutException:
             raise
         except httpx.TransportError as error:
-            self.fault = BrokenReplyError(self.refusal or _fault_of(error))
+            text = self.refusal or _fault_of(error)
+            kind = UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError
+            self.fault = kind(text)
             raise
 
 

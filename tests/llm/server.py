@@ -31,6 +31,8 @@ class Step:
         }
     )
     hang_up: bool = False
+    # It closes the connection within its answer.
+    cut: bool = False
     # It never answers: the client must give up.
     silent: bool = False
 
@@ -84,7 +86,8 @@ class Server:
                 with suppress(BrokenPipeError, ConnectionResetError):
                     self.send_response(step.status)
                     self.send_header("content-type", "application/json")
-                    self.send_header("content-length", str(len(payload)))
+                    self.send_header("content-length", str(len(payload) + 1000 * step.cut))
+                    self.close_connection = step.cut
                     for name, value in step.headers.items():
                         self.send_header(name, value)
                     self.end_headers()

@@ -236,10 +236,15 @@ def test_counts_of_the_wrong_form_are_counted_here(
 
 
 @pytest.mark.parametrize(
-    ("raw", "count"), [('{"choices": []}', 1), ('{"id": "1"}', 1), ('{"error": "x"}', 0), ("<p>x</p>", 0)]
+    ("raw", "count"),
+    [
+        *(('{"choices": []}', 1), ('{"id": "1"}', 1), ('{"error": "x"}', 0), ("<p>x</p>", 0)),
+        ('{"choices": [', 1),
+    ],
 )
 def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:
-    with serving(Step(raw=raw)) as server, pytest.raises(TransientChatError) as caught:
+    step = Step(raw=raw, cut=not raw.endswith((">", "}")))
+    with serving(step) as server, pytest.raises(TransientChatError) as caught:
         LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)
     lost = caught.value.lost or Usage()
     assert lost.without_reply == count and bool(lost.prompt_tokens) == bool(lost.cost) == bool(count)
