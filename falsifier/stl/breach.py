@@ -15,23 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.stl import formula as stl
 from falsifier.stl.diagnosis import number, seconds, valued
 from falsifier.stl.expression import Expression, Number, unit_of
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Flag,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    negated,
-)
 from falsifier.stl.lexer import name_text
 from falsifier.stl.program import CompiledPart, Floats
 
@@ -115,19 +101,19 @@ class _Demand(NamedTuple):
 
     @classmethod
     def of(cls, part: CompiledPart, *, wanted: bool) -> "_Demand":
-        while isinstance(part.formula, Not):
+        while isinstance(part.formula, stl.Not):
             part, wanted = part.children[0], not wanted
         return cls(part, wanted)
 
     @property
-    def formula(self) -> Formula:
+    def formula(self) -> stl.Formula:
         return self.part.formula
 
     @property
     def text(self) -> str:
-        if isinstance(self.formula, Flag):
+        if isinstance(self.formula, stl.Flag):
             return f"{'' if self.wanted else 'not '}{self.formula.left}"
-        return self.part.text if self.wanted else str(negated(self.formula))
+        return self.part.text if self.wanted else str(stl.negated(self.formula))
 
     @property
     def opposite(self) -> "_Demand":
@@ -137,9 +123,9 @@ class _Demand(NamedTuple):
     def operands(self) -> list["_Demand"]:
         """The operands, with what is demanded of them; of a chain of one connective all at once."""
         formula, found = self.formula, [_Demand.of(child, wanted=self.wanted) for child in self.part.children]
-        if isinstance(formula, Implies):
+        if isinstance(formula, stl.Implies):
             return [found[0].opposite, found[1]]
-        if isinstance(formula, And | Or):
+        if isinstance(formula, stl.And | stl.Or):
             chains = (
                 each.operands
                 if type(each.formula) is type(formula) and each.wanted is self.wanted
@@ -151,16 +137,16 @@ class _Demand(NamedTuple):
 
     @property
     def is_throughout(self) -> bool:
-        return isinstance(self.formula, Always if self.wanted else Eventually)
+        return isinstance(self.formula, stl.Always if self.wanted else stl.Eventually)
 
     @property
     def is_sometime(self) -> bool:
-        return isinstance(self.formula, Eventually if self.wanted else Always)
+        return isinstance(self.formula, stl.Eventually if self.wanted else stl.Always)
 
     @property
     def is_choice(self) -> bool:
         """Whether one of the operands would have been enough."""
-        return isinstance(self.formula, Or | Implies) if self.wanted else isinstance(self.formula, And)
+        return isinstance(self.formula, stl.Or | stl.Implies if self.wanted else stl.And)
 
     def margins(self, buffer: Floats, span: Span) -> Floats:
         """By how much it is met at the samples of a span."""
@@ -200,19 +186,21 @@ class _Search:
         window = demand.part.window_at(spot.sample) or here
         operands = demand.operands
         match demand.formula:
-            case Predicate():
+            case stl.Predicate():
                 yield self._compared(demand, spot)
-            case Next():
+            case stl.Next():
                 yield from self.at(operands[0], self._moved(spot, spot.sample + 1))
-            case Until() if demand.wanted:
+            case stl.Until() if demand.wanted:
                 yield from self._until(operands[0], operands[1], window, spot)
-            case Until():
+            case stl.Until():
                 left, right = operands
                 met = self._first(right.opposite, window)
                 yield from self.at(right, self._moved(spot.under(left.opposite), met))
-            case Implies() if demand.wanted:  # apart from other choices, as the consequence may be negated
+            case stl.Implies() if (
+                demand.wanted
+            ):  # apart from other choices, as the consequence may be negated
                 yield from self.at(operands[1], spot.under(operands[0].opposite))
-            case Iff():
+            case stl.Iff():
                 yield from self._unequal(demand, spot)
             case _ if demand.is_throughout:
                 yield from self._throughout(operands[0], window, spot)
@@ -240,7 +228,7 @@ class _Search:
 
     def _never(self, demand: _Demand, window: Span, spot: _Spot) -> Iterator[Shortfall]:
         """Why a demand was met at no sample of a window."""
-        if isinstance(demand.formula, Predicate):
+        if isinstance(demand.formula, stl.Predicate):
             yield self._compared(demand, self._settled(spot), window)
         elif demand.is_sometime:
             yield from self._never(demand.operands[0], _inner(demand.part, window), spot)
@@ -277,7 +265,7 @@ class _Search:
     def _compared(self, demand: _Demand, spot: _Spot, window: Span | None = None) -> Shortfall:
         """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
         predicate = demand.formula
-        assert isinstance(predicate, Predicate)
+        assert isinstance(predicate, stl.Predicate)
         (first, last), several = (window, False) if window else self._stretch(spot)
         margins = demand.margins(self.buffer, (first, last))
         sample = first + int(margins.argmax() if window else margins.argmin())
@@ -285,7 +273,7 @@ class _Search:
         quantity, other = compared_sides(predicate)
         value, limit = (float(side.evaluate(values)) for side in (quantity, other))
         unit = unit_of(quantity, units) or unit_of(other, units)
-        is_truth = isinstance(predicate, Flag) and not unit and value in (0.0, 1.0)
+        is_truth = isinstance(predicate, stl.Flag) and not unit and value in (0.0, 1.0)
         reading = valued(quantity, values, value - limit, unit)
         if is_truth:
             reading = f"{quantity} was {'true' if value else 'false'}"
@@ -360,7 +348,7 @@ def _inner(part: CompiledPart, window: Span) -> Span:
     return first, last
 
 
-def compared_sides(predicate: Predicate) -> tuple[Expression, Expression]:
+def compared_sides(predicate: stl.Predicate) -> tuple[Expression, Expression]:
     """Return the quantity of a comparison, then the side that it is compared with."""
     if isinstance(predicate.left, Number):
         return predicate.right, predicate.left

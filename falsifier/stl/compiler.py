@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from falsifier.errors import FormulaError
+from falsifier.stl import formula as stl
 from falsifier.stl import program as op
 from falsifier.stl.expression import (
     FUNCTIONS_OF,
@@ -22,23 +23,6 @@ from falsifier.stl.expression import (
     Negative,
     number_text,
 )
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Node,
-    Not,
-    Or,
-    Predicate,
-    Temporal,
-    Until,
-    Window,
-    parts_of,
-)
 from falsifier.stl.margins import on_limit
 from falsifier.stl.program import CompiledPart, Location, Program
 
@@ -46,10 +30,14 @@ _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Of numbers that are all floating-point, power is the faster one.
 _ARITHMETIC = OPERATORS | {"^": np.power}
 _NEGATION = op.scaled(-1.0)
-_CONNECTIVES: dict[type[Formula], op.Function] = {Not: _NEGATION, And: np.minimum, Or: np.maximum}
+_CONNECTIVES: dict[type[stl.Formula], op.Function] = {
+    stl.Not: _NEGATION,
+    stl.And: np.minimum,
+    stl.Or: np.maximum,
+}
 
 
-def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 0) -> Program:
+def compile_formula(formula: stl.Formula, *, step: float, samples: int, last: int = 0) -> Program:
     """Compile a formula for trajectories on one time grid.
 
     The sampling step is in s; the robustness is needed at the samples from 0 to ``last``.
@@ -71,7 +59,7 @@ def compile_formula(formula: Formula, *, step: float, samples: int, last: int = 
     )
 
 
-def window_samples(window: Window, step: float) -> tuple[int, int]:
+def window_samples(window: stl.Window, step: float) -> tuple[int, int]:
     """Return the bounds of a window in samples; FormulaError if a bound is not a multiple of the step."""
     start, end = round(window.start / step), round(window.end / step)
     for bound, nearest in ((window.start, start), (window.end, end)):
@@ -86,43 +74,43 @@ def window_samples(window: Window, step: float) -> tuple[int, int]:
 
 @dataclass(slots=True)
 class _Compiler:
-    formula: Formula
+    formula: stl.Formula
     step: float
     samples: int
-    needs: dict[Node, tuple[int, int]] = field(default_factory=dict)
-    locations: dict[Node, Location] = field(default_factory=dict)
+    needs: dict[stl.Node, tuple[int, int]] = field(default_factory=dict)
+    locations: dict[stl.Node, Location] = field(default_factory=dict)
     steps: list[op.Operation] = field(default_factory=list)
-    checked: dict[int, tuple[Predicate, Location]] = field(default_factory=dict)
+    checked: dict[int, tuple[stl.Predicate, Location]] = field(default_factory=dict)
     size: int = 0
 
     # -- at which samples each part is needed ------------------------------------------------------------
 
-    def demand(self, node: Node, first: int, last: int) -> None:
+    def demand(self, node: stl.Node, first: int, last: int) -> None:
         """Record that a part, and everything below it, is needed at the samples from first to last."""
         if last >= self.samples:
             self._fail_past_end(node, last)
         seen = self.needs.get(node, (first, last))
         self.needs[node] = (min(seen[0], first), max(seen[1], last))
-        if isinstance(node, Next):
+        if isinstance(node, stl.Next):
             first, last = first + 1, last + 1
-        elif isinstance(node, Temporal) and node.window is None:
+        elif isinstance(node, stl.Temporal) and node.window is None:
             last = self.samples - 1
-        elif isinstance(node, Temporal) and node.window:
+        elif isinstance(node, stl.Temporal) and node.window:
             # First, so that no bound after the end of the trajectory is suggested as the nearest multiple.
             beyond = last + round(node.window.end / self.step)
             if beyond >= self.samples:
                 self._fail_past_end(node, beyond)
             start, end = window_samples(node.window, self.step)
-            first, last = first if isinstance(node, Until) else first + start, last + end
-        for part in parts_of(node):
+            first, last = first if isinstance(node, stl.Until) else first + start, last + end
+        for part in stl.parts_of(node):
             self.demand(part, first, last)
 
-    def _fail_past_end(self, node: Node, last: int) -> None:
+    def _fail_past_end(self, node: stl.Node, last: int) -> None:
         end = (self.samples - 1) * self.step
-        window = node.window if isinstance(node, Formula) else None
+        window = node.window if isinstance(node, stl.Formula) else None
         what = f"the window {window} of {node}" if window else f"{node}"
         hint = "shorten the windows or simulate longer"
-        if any(isinstance(f, Temporal) and f.window is None for f in self.formula.walk()):
+        if any(isinstance(f, stl.Temporal) and f.window is None for f in self.formula.walk()):
             hint += "; an operator without a window extends to the stop time: give it one that ends earlier"
         raise FormulaError(
             f"{what} needs values up to {number_text(round(last * self.step, 9))} s, but the trajectory ends "
@@ -131,7 +119,7 @@ class _Compiler:
 
     # -- the steps ---------------------------------------------------------------------------------------
 
-    def location(self, node: Node) -> Location:
+    def location(self, node: stl.Node) -> Location:
         """Emit the steps of a part, only once, and return the location of its values."""
         if node not in self.locations:
             first, last = self.needs[node]
@@ -199,7 +187,7 @@ class _Compiler:
             )
         return self._emit(_ARITHMETIC[operator], first, last, self.location(left), self.location(right))
 
-    def _predicate(self, node: Predicate, first: int, last: int) -> Location:
+    def _predicate(self, node: stl.Predicate, first: int, last: int) -> Location:
         left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
         margin = self._expression(Arithmetic("-", left, right), first, last)
         if node.operator in ("==", "!="):
@@ -210,20 +198,20 @@ class _Compiler:
         self.steps.append(op.checking(slice(margin.at(first), margin.at(last + 1)), on_limit(node.operator)))
         return margin
 
-    def _formula(self, node: Formula, first: int, last: int) -> Location:
-        if isinstance(node, Predicate):
+    def _formula(self, node: stl.Formula, first: int, last: int) -> Location:
+        if isinstance(node, stl.Predicate):
             return self._predicate(node, first, last)
         parts = [self.location(child) for child in node.children]
         match node:
-            case Next():
+            case stl.Next():
                 return parts[0].later(1)
-            case Always() | Eventually():
+            case stl.Always() | stl.Eventually():
                 return self._window(node, parts[0], first, last)
-            case Until():
+            case stl.Until():
                 return self._until(node, parts[0], parts[1], first, last)
-            case Implies():
+            case stl.Implies():
                 return self._implication(parts[0], parts[1], first, last)
-            case Iff():
+            case stl.Iff():
                 forth = self._implication(parts[0], parts[1], first, last)
                 back = self._implication(parts[1], parts[0], first, last)
                 return self._emit(np.minimum, first, last, forth, back)
@@ -232,14 +220,14 @@ class _Compiler:
     def _implication(self, left: Location, right: Location, first: int, last: int) -> Location:
         return self._emit(np.maximum, first, last, self._emit(_NEGATION, first, last, left), right)
 
-    def _window(self, node: Always | Eventually, below: Location, first: int, last: int) -> Location:
-        extreme, end = np.minimum if isinstance(node, Always) else np.maximum, self.samples - 1
+    def _window(self, node: stl.Always | stl.Eventually, below: Location, first: int, last: int) -> Location:
+        extreme, end = np.minimum if isinstance(node, stl.Always) else np.maximum, self.samples - 1
         if node.window is None and first < last:
             return self._emit(op.rest(extreme), first, end, below)
         ahead = window_samples(node.window, self.step) if node.window else (0, end - first)
         return self._emit(op.window(extreme), first, last, below, ahead=ahead)
 
-    def _until(self, node: Until, left: Location, right: Location, first: int, last: int) -> Location:
+    def _until(self, node: stl.Until, left: Location, right: Location, first: int, last: int) -> Location:
         """Emit ``l U[a,b] r`` as ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, in samples.
 
         The three parts together are equivalent to the bounded until, and each takes linear time. The
@@ -259,10 +247,10 @@ class _Compiler:
             result = self._emit(np.minimum, first, last, before, result)
         return result
 
-    def part(self, node: Formula) -> CompiledPart:
+    def part(self, node: stl.Formula) -> CompiledPart:
         """Return a sub-formula with its location and all parts below it."""
         window: tuple[int, int | None] | None = None
-        if isinstance(node, Temporal):
+        if isinstance(node, stl.Temporal):
             window = window_samples(node.window, self.step) if node.window else (0, None)
         children = tuple(self.part(child) for child in node.children)
         return CompiledPart(node, str(node), self.locations[node], window, self.samples, children)

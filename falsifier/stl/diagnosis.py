@@ -13,20 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.stl import formula as stl
 from falsifier.stl.expression import Expression, Number
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Flag,
-    Formula,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-)
 from falsifier.stl.margins import is_on_limit
 from falsifier.stl.program import CompiledPart, Floats
 
@@ -58,15 +46,15 @@ def path_to_decider(part: CompiledPart, buffer: Floats) -> list[Waypoint]:
 def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
     kind, children, sample = type(here.part.formula), here.part.children, here.sample
     first, last = here.window or (sample, sample)
-    if kind is Not:
+    if kind is stl.Not:
         return children[0], sample
-    if kind is Next:
+    if kind is stl.Next:
         return children[0], sample + 1
-    if kind is Always:
+    if kind is stl.Always:
         return children[0], first + int(children[0].over(buffer, first, last).argmin())
-    if kind is Eventually:
+    if kind is stl.Eventually:
         return children[0], first + int(children[0].over(buffer, first, last).argmax())
-    if kind is Until:
+    if kind is stl.Until:
         left, right = children
         lefts, rights = left.over(buffer, sample, last), right.over(buffer, first, last)
         lowest = np.minimum.accumulate(lefts)[first - sample :]
@@ -75,11 +63,11 @@ def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
             return left, sample + int(lefts[: first - sample + best + 1].argmin())
         return right, first + best
     one, other = (child.at(buffer, sample) for child in children)
-    if kind is And:
+    if kind is stl.And:
         is_right = one > other
-    elif kind is Or:
+    elif kind is stl.Or:
         is_right = one < other
-    elif kind is Implies or max(-one, other) <= max(-other, one):
+    elif kind is stl.Implies or max(-one, other) <= max(-other, one):
         is_right = -one < other
     else:  # of an equivalence the implication backwards
         is_right = -other >= one
@@ -98,7 +86,7 @@ class Step:
         text: what happened here, in words; empty within a chain of ``and`` or ``or``.
     """
 
-    formula: Formula
+    formula: stl.Formula
     time: float
     value: float
     window: tuple[float, float] | None
@@ -117,7 +105,7 @@ class VacuousImplication:
         only: whether the implication held only for that reason, because its consequence failed at some time.
     """
 
-    implication: Implies
+    implication: stl.Implies
     window: tuple[float, float]
     nearest: float
     margin: float
@@ -172,18 +160,18 @@ def diagnose(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Diag
     times = trajectory.times
     path = path_to_decider(root, buffer)
     steps = []
-    chain: list[Formula] = []
+    chain: list[stl.Formula] = []
     for here, following in zip(path, [*path[1:], path[-1]], strict=True):
         formula, time, decider = here.part.formula, float(times[here.sample]), following.part.formula
         window = here.window and (float(times[here.window[0]]), float(times[here.window[1]]))
         chain = chain or links(formula)
         text = ""
-        if isinstance(formula, Predicate):
+        if isinstance(formula, stl.Predicate):
             text = _comparison(formula, here.value, trajectory.at(time))
-        elif not isinstance(formula, And | Or) or len(chain) <= 2:
+        elif not isinstance(formula, stl.And | stl.Or) or len(chain) <= 2:
             text = _words(formula, decider, window, float(times[following.sample]), here.value)
         elif type(decider) is not type(formula):  # the end of a chain
-            name, number = "and" if isinstance(formula, And) else "or", chain.index(decider) + 1
+            name, number = "and" if isinstance(formula, stl.And) else "or", chain.index(decider) + 1
             text = f"part {number} of {len(chain)} joined by '{name}' decided"
         if type(decider) is not type(formula) or len(chain) <= 2:
             chain = []
@@ -195,7 +183,7 @@ def diagnose(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Diag
 
 
 def _vacuity(part: CompiledPart, buffer: Floats, times: Floats) -> VacuousImplication | None:
-    if not isinstance(part.formula, Implies):
+    if not isinstance(part.formula, stl.Implies):
         return None
     first, last = part.location.first, part.location.last
     lefts, rights = (child.over(buffer, first, last) for child in part.children)
@@ -208,39 +196,39 @@ def _vacuity(part: CompiledPart, buffer: Floats, times: Floats) -> VacuousImplic
     )
 
 
-def links(formula: Formula) -> list[Formula]:
+def links(formula: stl.Formula) -> list[stl.Formula]:
     """Parts of a chain of the same connective, from left to right."""
     parts = (links(child) if type(child) is type(formula) else [child] for child in formula.children)
     return [part for found in parts for part in found]
 
 
 def _words(
-    formula: Formula, decider: Formula, window: tuple[float, float] | None, time: float, value: float
+    formula: stl.Formula, decider: stl.Formula, window: tuple[float, float] | None, time: float, value: float
 ) -> str:
     """Say what happened at an operator."""
     side = "left" if formula.children and decider is formula.children[0] else "right"
     match formula:
-        case Always():
+        case stl.Always():
             return f"G {_over(window)} was lowest at {seconds(time)}"
-        case Eventually():
+        case stl.Eventually():
             return f"F {_over(window)} was highest at {seconds(time)}"
-        case Until():
+        case stl.Until():
             return f"U {_over(window)} was decided by its {side} side at {seconds(time)}"
-        case Implies() if side == "left":
+        case stl.Implies() if side == "left":
             return "the condition of -> decided"
-        case Implies():
+        case stl.Implies():
             return f"the consequence of -> {'decided' if value >= 0 else 'failed'}"
-        case Next():
+        case stl.Next():
             return f"the next recorded time is {seconds(time)}"
-        case Not():
+        case stl.Not():
             return f"'not' {'holds' if value >= 0 else 'fails'}"
-    name = "and" if isinstance(formula, And) else "or" if isinstance(formula, Or) else "<->"
+    name = "and" if isinstance(formula, stl.And) else "or" if isinstance(formula, stl.Or) else "<->"
     return f"the {side} side of '{name}' decided"
 
 
-def _comparison(predicate: Predicate, value: float, values: dict[str, float]) -> str:
+def _comparison(predicate: stl.Predicate, value: float, values: dict[str, float]) -> str:
     """State how both sides compare, whether that satisfies the predicate or not: the path may negate it."""
-    if isinstance(predicate, Flag) and abs(value) == _OF_TRUTH:
+    if isinstance(predicate, stl.Flag) and abs(value) == _OF_TRUTH:
         return f"{predicate} is {'true' if value > 0 else 'false'}"
     left, right = (valued(side, values, value) for side in predicate.sides)
     if is_on_limit(value):

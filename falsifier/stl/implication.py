@@ -2,30 +2,15 @@
 
 from functools import lru_cache
 
+from falsifier.stl import formula as stl
 from falsifier.stl.expression import Expression, Number
-from falsifier.stl.formula import (
-    MIRRORED,
-    OPPOSITE,
-    Always,
-    And,
-    Comparison,
-    Eventually,
-    Formula,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-)
 
 # Comparisons that bound an expression from one side.
 _BOUNDING = ("<", "<=", ">", ">=")
 
 
 @lru_cache(maxsize=10_000)  # the same parts are compared again and again
-def implies(first: Formula, second: Formula) -> bool:
+def implies(first: stl.Formula, second: stl.Formula) -> bool:
     """Whether every trajectory that satisfies the first formula certainly satisfies the second.
 
     >>> from falsifier.stl import parse
@@ -38,59 +23,59 @@ def implies(first: Formula, second: Formula) -> bool:
     return _by_parts(first, second) or _by_operator(first, second)
 
 
-def _by_parts(first: Formula, second: Formula) -> bool:
+def _by_parts(first: stl.Formula, second: stl.Formula) -> bool:
     """Compare a whole formula with the operands of the other."""
-    if isinstance(second, And):
+    if isinstance(second, stl.And):
         return implies(first, second.left) and implies(first, second.right)
-    if isinstance(first, Or):
+    if isinstance(first, stl.Or):
         return implies(first.left, second) and implies(first.right, second)
-    if isinstance(first, And) and (implies(first.left, second) or implies(first.right, second)):
+    if isinstance(first, stl.And) and (implies(first.left, second) or implies(first.right, second)):
         return True
-    if isinstance(second, Or):
+    if isinstance(second, stl.Or):
         return implies(first, second.left) or implies(first, second.right)
-    if isinstance(second, Implies):
-        return implies(first, second.right) or implies(first, Not(second.left))
+    if isinstance(second, stl.Implies):
+        return implies(first, second.right) or implies(first, stl.Not(second.left))
     return False
 
 
-def _by_operator(first: Formula, second: Formula) -> bool:
+def _by_operator(first: stl.Formula, second: stl.Formula) -> bool:
     match first, second:
-        case Predicate(), Predicate():
+        case stl.Predicate(), stl.Predicate():
             return _stricter(first, second)
-        case Not(a), Not(b):
+        case stl.Not(a), stl.Not(b):
             return implies(b, a)
-        case Implies(a, b), Implies(c, d):
+        case stl.Implies(a, b), stl.Implies(c, d):
             return implies(c, a) and implies(b, d)
-        case Always(a, outer), Always(b, inner):
+        case stl.Always(a, outer), stl.Always(b, inner):
             return _covers(outer, inner) and implies(a, b)
-        case Eventually(a, inner), Eventually(b, outer):
+        case stl.Eventually(a, inner), stl.Eventually(b, outer):
             return _covers(outer, inner) and implies(a, b)
-        case Always(a, outer), Eventually(b, inner):
+        case stl.Always(a, outer), stl.Eventually(b, inner):
             return _meet(outer, inner) and implies(a, b)
-        case Until(a, b, inner), Until(c, d, outer):
+        case stl.Until(a, b, inner), stl.Until(c, d, outer):
             return _covers(outer, inner) and implies(a, c) and implies(b, d)
-        case Until(_, b, inner), Eventually(d, outer):
+        case stl.Until(_, b, inner), stl.Eventually(d, outer):
             return _covers(outer, inner) and implies(b, d)
-        case Next(a), Next(b):
+        case stl.Next(a), stl.Next(b):
             return implies(a, b)
     return False
 
 
-def _plain(formula: Formula) -> Formula:
+def _plain(formula: stl.Formula) -> stl.Formula:
     """Return a formula without a negation in front that can be avoided or moved inwards."""
     match formula:
-        case Not(Not(operand)):
+        case stl.Not(stl.Not(operand)):
             return _plain(operand)
-        case Not(Predicate(operator, left, right)) if operator in _BOUNDING:
-            return Predicate(OPPOSITE[operator], left, right)
-        case Not(Always(operand, window)):
-            return Eventually(Not(operand), window)
-        case Not(Eventually(operand, window)):
-            return Always(Not(operand), window)
+        case stl.Not(stl.Predicate(operator, left, right)) if operator in _BOUNDING:
+            return stl.Predicate(stl.OPPOSITE[operator], left, right)
+        case stl.Not(stl.Always(operand, window)):
+            return stl.Eventually(stl.Not(operand), window)
+        case stl.Not(stl.Eventually(operand, window)):
+            return stl.Always(stl.Not(operand), window)
     return formula
 
 
-def _stricter(first: Predicate, second: Predicate) -> bool:
+def _stricter(first: stl.Predicate, second: stl.Predicate) -> bool:
     """Whether one comparison of an expression with a number follows from another."""
     a, b = _bounded(first), _bounded(second)
     if a is None or b is None or a[0] != b[0]:
@@ -103,23 +88,23 @@ def _stricter(first: Predicate, second: Predicate) -> bool:
     return low < high if one[0] == "<" else low > high
 
 
-def _bounded(predicate: Predicate) -> tuple[Expression, Comparison, float] | None:
+def _bounded(predicate: stl.Predicate) -> tuple[Expression, stl.Comparison, float] | None:
     if predicate.operator not in _BOUNDING:
         return None
     if isinstance(predicate.right, Number):
         return predicate.left, predicate.operator, predicate.right.value
     if isinstance(predicate.left, Number):
-        return predicate.right, MIRRORED[predicate.operator], predicate.left.value
+        return predicate.right, stl.MIRRORED[predicate.operator], predicate.left.value
     return None
 
 
-def _covers(outer: Window | None, inner: Window | None) -> bool:
+def _covers(outer: stl.Window | None, inner: stl.Window | None) -> bool:
     if outer is None or inner is None:
         return outer is None
     return outer.start <= inner.start and inner.end <= outer.end
 
 
-def _meet(one: Window | None, other: Window | None) -> bool:
+def _meet(one: stl.Window | None, other: stl.Window | None) -> bool:
     if one is None or other is None:
         return True
     return max(one.start, other.start) <= min(one.end, other.end)

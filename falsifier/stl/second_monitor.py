@@ -27,26 +27,13 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
+from falsifier.stl import formula as stl
 from falsifier.stl.compiler import window_samples
 from falsifier.stl.expression import Expression, Number, number_text
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-)
 from falsifier.stl.margins import ON_LIMIT
 
 
-def robustness(formula: Formula, trajectory: Trajectory) -> float:
+def robustness(formula: stl.Formula, trajectory: Trajectory) -> float:
     """Return the robustness at time 0 computed by rtamt; exactly on the limit, its sign says what is true.
 
     Raises:
@@ -72,38 +59,40 @@ class _Translation:
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
 
-    def text(self, f: Formula, *, at_start: bool = False) -> str:
+    def text(self, f: stl.Formula, *, at_start: bool = False) -> str:
         """Return the text of a formula, in parentheses; ``at_start``: only its value at time 0 counts."""
         match f:
-            case Predicate() if self.of_truth:
+            case stl.Predicate() if self.of_truth:
                 return f"({self.truth(f)} >= 0)"
-            case Predicate("!=", left, right):
+            case stl.Predicate("!=", left, right):
                 return f"(not ({self.side(left)} == {self.side(right)}))"
-            case Predicate(operator, left, right):
+            case stl.Predicate(operator, left, right):
                 return f"({self.side(left)} {operator} {self.side(right)})"
-            case Not(operand):
+            case stl.Not(operand):
                 return f"(not {self.text(operand, at_start=at_start)})"
-            case Iff(left, right):
-                return self.text(And(Implies(left, right), Implies(right, left)), at_start=at_start)
-            case And(left, right) | Or(left, right) | Implies(left, right):
+            case stl.Iff(left, right):
+                return self.text(
+                    stl.And(stl.Implies(left, right), stl.Implies(right, left)), at_start=at_start
+                )
+            case stl.And(left, right) | stl.Or(left, right) | stl.Implies(left, right):
                 return (
                     f"({self.text(left, at_start=at_start)} {f.sign} {self.text(right, at_start=at_start)})"
                 )
-            case Always(operand, window) if window is not None and at_start:
+            case stl.Always(operand, window) if window is not None and at_start:
                 return f"(always ((0 >= {self.inside(window)}) or {self.text(operand)}))"
-            case Eventually(operand, window) if window is not None and at_start:
+            case stl.Eventually(operand, window) if window is not None and at_start:
                 return f"(eventually (({self.inside(window)} >= 0) and {self.text(operand)}))"
-            case Next(operand) | Always(operand) | Eventually(operand):
-                name = {Next: "next", Always: "always", Eventually: "eventually"}[type(f)]
+            case stl.Next(operand) | stl.Always(operand) | stl.Eventually(operand):
+                name = {stl.Next: "next", stl.Always: "always", stl.Eventually: "eventually"}[type(f)]
                 bounds = "[{},{}]".format(*self.samples(f.window)) if f.window else ""
                 return f"({name}{bounds} {self.text(operand)})"
-            case Until(left, right, window):
+            case stl.Until(left, right, window):
                 return self.until(left, right, window)
         raise TypeError(f"not a formula: {f!r}")
 
-    def until(self, left: Formula, right: Formula, window: Window | None) -> str:
+    def until(self, left: stl.Formula, right: stl.Formula, window: stl.Window | None) -> str:
         """Return the text of an until whose left operand includes the last sample."""
-        text, both = self.text(left), self.text(And(left, right))
+        text, both = self.text(left), self.text(stl.And(left, right))
         until = f"({text} until {both})"
         if window is None:
             return until
@@ -111,7 +100,7 @@ class _Translation:
         within = f"((eventually[{start},{end}] {both}) and (eventually[{start},{start}] {until}))"
         return f"((always[0,{start - 1}] {text}) and {within})" if start else within
 
-    def samples(self, window: Window) -> tuple[int, int]:
+    def samples(self, window: stl.Window) -> tuple[int, int]:
         return window_samples(window, self.trajectory.step or 1.0)
 
     def column(self, values: list[float]) -> str:
@@ -120,7 +109,7 @@ class _Translation:
         self.columns[alias] = values
         return alias
 
-    def inside(self, window: Window) -> str:
+    def inside(self, window: stl.Window) -> str:
         """Return the alias of a column that is infinite in a window and minus infinite outside."""
         start, end = self.samples(window)
         return self.column([inf if start <= k <= end else -inf for k in range(len(self.trajectory))])
@@ -138,13 +127,13 @@ class _Translation:
             self.aliases[expression] = self.column(values.tolist())
         return self.aliases[expression]
 
-    def truth(self, predicate: Predicate) -> str:
+    def truth(self, predicate: stl.Predicate) -> str:
         """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""
         true = np.broadcast_to(predicate.holds(self.trajectory.columns), self.trajectory.times.shape)
         return self.column(np.where(true, 1.0, -1.0).tolist())
 
 
-def _evaluate(formula: Formula, translation: _Translation) -> float:
+def _evaluate(formula: stl.Formula, translation: _Translation) -> float:
     text = translation.text(formula, at_start=True)
     length = len(translation.trajectory)
     columns = translation.columns or {"v0": [0.0] * length}

@@ -16,21 +16,8 @@ from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.layout import Array, TimeGrid, learnable
 from falsifier.stl import Monitor, Verdict
+from falsifier.stl import formula as stl
 from falsifier.stl.expression import Name, Number
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Formula,
-    Iff,
-    Implies,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-    replaced,
-)
 
 Margins = list[Array]
 
@@ -47,7 +34,7 @@ class PredictedCost:
     space: SearchSpace  # the search space, for the ranges of inputs in the formula
     grid: TimeGrid  # the grid of the predictions
     outputs: tuple[str, ...]  # names of the predicted outputs
-    predicates: tuple[Predicate, ...]  # distinct predicates of the formula
+    predicates: tuple[stl.Predicate, ...]  # distinct predicates of the formula
     discrete: tuple[bool, ...]  # whether each predicate compares only signals with few values
     scales: tuple[float, ...]  # scale of each predicate's margin
     # Values of signals that the formula names and no candidate varies: inputs kept constant.
@@ -57,7 +44,7 @@ class PredictedCost:
     @classmethod
     def of(
         cls,
-        formula: Formula,
+        formula: stl.Formula,
         space: SearchSpace,
         grid: TimeGrid,
         outputs: Sequence[str],
@@ -69,7 +56,7 @@ class PredictedCost:
         predicates = formula.predicates
         # Over the predicates' margins, with windows that count cells.
         parts: dict[object, object] = {p: _signal(i) for i, p in enumerate(predicates)}
-        on_grid = replaced(formula, parts | {w: _in_cells(w, grid.step) for w in formula.windows})
+        on_grid = stl.replaced(formula, parts | {w: _in_cells(w, grid.step) for w in formula.windows})
         # Rounded windows may end beyond the grid; the last values then continue.
         samples = max(grid.cells, round(on_grid.horizon(1.0))) + 1
         return cls(
@@ -134,27 +121,27 @@ class PredictedCost:
         }
 
 
-def needs_several(formula: Formula, *, negated: bool = False) -> bool:
+def needs_several(formula: stl.Formula, *, negated: bool = False) -> bool:
     """Return whether a violation requires several conditions at once: the normal form has a disjunction."""
     match formula:
-        case Not(operand):
+        case stl.Not(operand):
             return needs_several(operand, negated=not negated)
-        case Until() | Iff():
+        case stl.Until() | stl.Iff():
             return True
-        case And(left, right) if not negated:
+        case stl.And(left, right) if not negated:
             return needs_several(left) or needs_several(right)
-        case Or(left, right) | Implies(left, right) if negated:
-            turned = isinstance(formula, Implies)
+        case stl.Or(left, right) | stl.Implies(left, right) if negated:
+            turned = isinstance(formula, stl.Implies)
             return needs_several(left, negated=not turned) or needs_several(right, negated=True)
-        case And() | Or() | Implies():
+        case stl.And() | stl.Or() | stl.Implies():
             return True
     return any(needs_several(child, negated=negated) for child in formula.children)
 
 
-def inner_windows(formula: Formula, *, nested: bool = False) -> list[float]:
+def inner_windows(formula: stl.Formula, *, nested: bool = False) -> list[float]:
     """Return the lengths in s of the windows below another temporal operator."""
     lengths = []
-    if isinstance(formula, (Always, Eventually, Until)):
+    if isinstance(formula, (stl.Always, stl.Eventually, stl.Until)):
         if nested and formula.window is not None:
             lengths.append(formula.window.end - formula.window.start)
         nested = True
@@ -163,12 +150,12 @@ def inner_windows(formula: Formula, *, nested: bool = False) -> list[float]:
     return lengths
 
 
-def _signal(index: int) -> Predicate:
-    return Predicate(">", Name(f"p{index}"), Number(0.0))
+def _signal(index: int) -> stl.Predicate:
+    return stl.Predicate(">", Name(f"p{index}"), Number(0.0))
 
 
-def _in_cells(window: Window, step: float) -> Window:
+def _in_cells(window: stl.Window, step: float) -> stl.Window:
     if 0 < window.end < step:
-        return Window(1.0, 1.0)  # a window shorter than a cell is approximated by the next grid point
+        return stl.Window(1.0, 1.0)  # a window shorter than a cell is approximated by the next grid point
     first = ceil(window.start / step - _ROUNDING)
-    return Window(float(first), float(max(first, floor(window.end / step + _ROUNDING))))
+    return stl.Window(float(first), float(max(first, floor(window.end / step + _ROUNDING))))
