@@ -81,13 +81,13 @@ class Run(Summary):
         return as_frame(self.columns())
 
 
-def load(directory: Path) -> list[Run]:
+def load(directory: str | Path) -> list[Run]:
     """Load all runs of a campaign, of a run directory, or of a folder of run directories.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.
     """
-    places = run_directories(directory)
+    places = run_directories(Path(directory))
     runs = [run for place in places for run in RunFollower(place, unread_runs(place)).look()]
     formulas: dict[str, list[str]] = {}
     for run in runs:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from pydantic import Field, ValidationError
 
 from falsifier import __version__
-from falsifier.core.arguments import path_of
+from falsifier.core.arguments import instance, path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
 from falsifier.errors import (
@@ -291,6 +291,7 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
     Raises:
         SimulationError: if the simulation fails.
     """
+    instance("stored", stored, StoredCounterexample, "a counterexample as load_counterexample returns it")
     changes = "".join(f"; {change}" for change in changes_since(stored.origin, problem))
     try:
         candidate = problem.space.admit(Candidate.from_json(stored.candidate))
