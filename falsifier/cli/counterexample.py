@@ -18,7 +18,7 @@ from falsifier.cli.files import (
     draw,
     draw_evaluation,
     made_folder,
-    written,
+    saved,
 )
 from falsifier.cli.options import (
     PATH,
@@ -222,11 +222,11 @@ def _shrink(
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
             confirmation = None  # else case.content says so
         table, data = input_table(problem, found.candidate), file.with_suffix(".json")
-        files = written(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
+        files = saved(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
         if confirmation is not None:
-            files += written(data, partial(save, case.content(confirmation)))
+            files += saved(data, partial(save, case.content(confirmation)))
             if found.trajectory is not None:  # for reports, which simulate nothing
-                written(file.with_suffix(".npz"), found.trajectory.save)
+                saved(file.with_suffix(".npz"), found.trajectory.save)
         files += draw_evaluation(problem, found, file.with_suffix(".png"))
         with suppress(OSError):
             beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input

@@ -70,7 +70,7 @@ def in_existing_folder(path: Path) -> Path:
     return path
 
 
-def written(file: Path, write: Callable[[Path], object]) -> list[Path]:
+def saved(file: Path, write: Callable[[Path], object]) -> list[Path]:
     """Write a file of what was computed; return its path.
 
     No path if it cannot be written, which is said on stderr: the rest of a result is worth having.

@@ -210,7 +210,7 @@ def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
 
 def _write_counterexamples(result: "Result", directory: Path) -> None:
     """Write the files of what was found; one that cannot be written is reported and costs nothing else."""
-    from falsifier.cli.files import draw_evaluation, written
+    from falsifier.cli.files import draw_evaluation, saved
     from falsifier.counterexamples.store import save, to_store
     from falsifier.views.text import counterexample_name
 
@@ -221,7 +221,7 @@ def _write_counterexamples(result: "Result", directory: Path) -> None:
         for i, fragile in enumerate(result.fragile, start=1)
     }
     for file, confirmation in found.items():
-        if written(directory / file, partial(save, to_store(confirmation))):
+        if saved(directory / file, partial(save, to_store(confirmation))):
             picture = (directory / file).with_suffix(".png")
             draw_evaluation(confirmation.problem, confirmation.evaluation, picture)
 

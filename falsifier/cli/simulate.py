@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.cli.command import command
-from falsifier.cli.files import draw_evaluation, made_folder, written
+from falsifier.cli.files import draw_evaluation, made_folder, saved
 from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
 from falsifier.cli.output import as_shown, conclude
 from falsifier.core.candidate import Candidate
@@ -142,7 +142,7 @@ def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path
     rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
     outputs, inputs = [["time", *trajectory.names], *rows], input_table(problem, evaluation.candidate)
     return [
-        *written(out / "trajectory.csv", lambda file: write_whole(file, csv_text(outputs))),
-        *written(out / "input.csv", lambda file: write_csv(inputs, file, problem.model)),
+        *saved(out / "trajectory.csv", lambda file: write_whole(file, csv_text(outputs))),
+        *saved(out / "input.csv", lambda file: write_csv(inputs, file, problem.model)),
         *draw_evaluation(drawn, evaluation, out / "trajectory.png"),
     ]
