@@ -5,28 +5,51 @@ use the fixture ``falsifier_check``. This module is outside the package, because
 every start and the package takes time to import.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Iterator
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from falsifier.counterexamples.regression import Checked
+    from falsifier.counterexamples.regression import Checked, Database
     from falsifier.problem.problem import Problem
 
 _DEFAULT_BUDGET = 100
 _DEFAULT_DATABASE = "counterexamples"
-_OPTIONS = ("budget", "engine", "seed")
+_OPTIONS = ("budget", "engine", "seed", "strict", "database")
+_NUMBERS = ("budget", "seed")
+# Files of other tools, whatever they contain.
+_FOREIGN = frozenset(
+    f"{name}.toml"
+    for name in (
+        *("pyproject", "pytest", ".pytest", "tox", "ruff", ".ruff", "uv", "pixi", "hatch", "poetry"),
+        *("Cargo", "Project", "Manifest", "JuliaProject", "JuliaManifest", "netlify"),
+    )
+)
+# What may be keys and tables of a file that is no valid TOML.
+_WORDS = re.compile(r"^[\s\[]*[\"']?([\w-]+)", re.MULTILINE)
+# How similar a key must be to the name of a table to be a misspelling of it: modle is.
+_NEAR = 0.8
 
 
 class UntestedWarning(UserWarning):
     """A requirement was not violated, but a part of it was not tested."""
 
 
+class UncollectedWarning(UserWarning):
+    """A TOML file may be meant as a spec and is not collected."""
+
+
+class UnusedCounterexampleWarning(UserWarning):
+    """A stored counterexample tests nothing any more."""
+
+
 class UntestedError(AssertionError):
-    """The same with --falsifier-strict; reported by its message alone."""
+    """The same where that is an error; reported by its message alone."""
 
 
 class FalsifiedError(AssertionError):
@@ -60,33 +83,116 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default=None,
         help="fail if a part of a requirement was not tested, such as a condition that never held",
     )
-    parser.addini("falsifier_strict", "same as --falsifier-strict", type="bool")
-    for name in (*_OPTIONS, "database"):
-        parser.addini(f"falsifier_{name}", f"same as --falsifier-{name}")
+    for name in _OPTIONS:
+        kind: Any = "bool" if name == "strict" else None
+        parser.addini(f"falsifier_{name}", f"same as --falsifier-{name}", type=kind)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Register the marker."""
+    """Register the marker, and check the ini file.
+
+    Raises:
+        pytest.UsageError: naming the key that is wrong.
+    """
+    names = "=, ".join(_OPTIONS)
     config.addinivalue_line(
-        "markers",
-        "falsifier(budget=, engine=, seed=): how to check a requirement; set on all collected requirements",
+        "markers", f"falsifier({names}=): how to check a requirement; set on all collected requirements"
     )
+    for name in _OPTIONS:
+        _setting(config, name)
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
-    """Collect spec files if --falsifier is given; other TOML files are left to other plugins."""
+    """Collect spec files if --falsifier is given; TOML files of other tools are left to other plugins.
+
+    What is given by its name is meant as a spec; of other files, what has requirements.
+    """
     if not parent.config.getoption("falsifier") or file_path.suffix != ".toml":
         return None
+    if not parent.session.isinitpath(file_path):
+        if file_path.name in _FOREIGN:
+            return None
+        tables, fault = _tables(file_path)
+        if "requirements" not in tables:
+            if tables or fault:
+                why = fault or f"it has tables of a spec ({', '.join(tables)}), but no [requirements.NAME]"
+                text = (
+                    f"{_short(file_path)} is not collected: {why}. If it is a spec, correct it; if not, "
+                    f"--ignore={_short(file_path)} leaves it out"
+                )
+                _warn(UncollectedWarning, file_path, text)
+            return None
+    return SpecFile.from_parent(parent, path=file_path)
+
+
+def _tables(file: Path) -> tuple[list[str], str]:
+    """Return which tables of a spec a TOML file has, also misspelt, and why it cannot be read, if so."""
     import tomllib
+    from difflib import get_close_matches
+
+    from falsifier.core.literals import one_line
+    from falsifier.problem.spec import Spec
+
+    content, fault = b"", ""
+    try:
+        content = file.read_bytes()
+        data = tomllib.loads(content.decode("utf-8-sig"))
+        keys = [key for key, value in data.items() if isinstance(value, dict)]
+    # ValueError: also not UTF-8, and integers of any length; RecursionError: nested without end.
+    except (OSError, ValueError, RecursionError) as error:
+        fault = one_line(f"it cannot be read as TOML ({error})")
+        keys = _WORDS.findall(content.decode("utf-8-sig", "replace"))
+    known = list(Spec.model_fields)
+    near = (get_close_matches(key.lower(), known, 1, _NEAR) for key in dict.fromkeys(keys))
+    return list(dict.fromkeys(name for names in near for name in names)), fault
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Warn of stored counterexamples that are never replayed, because their requirement has another name."""
+    if not session.config.getoption("falsifier"):
+        return
+    from falsifier.core.files import file_name
+    from falsifier.counterexamples.regression import Database
+    from falsifier.errors import SpecError
+    from falsifier.problem.spec import read_spec
+
+    folder = _database(session.config, None)
+    for place in sorted(path for path in folder.rglob("*.toml") if path.is_dir()):
+        spec = Database(folder).spec_of(place)
+        try:
+            read = {file_name(name) for name in read_spec(spec).requirements} if spec.is_file() else set()
+        except SpecError:  # which the collection of this spec tells
+            continue
+        for path in sorted(place.glob("*/*.json")):
+            name = path.parent.name
+            if name in read or _is_of_a_test(path):
+                continue
+            said, now = f"has no requirement {name!r}", place / "NEW-NAME"
+            if not spec.is_file():
+                said, now = "does not exist", folder / "PATH" / "OF" / "SPEC.toml" / name
+            text = (
+                f"{_short(path)} is not replayed, because {_short(spec)} {said}. If it was renamed or moved, "
+                f"move the file to {_short(now)}; otherwise delete it"
+            )
+            _warn(UnusedCounterexampleWarning, path, text)
+
+
+def _is_of_a_test(file: Path) -> bool:
+    """Whether a counterexample is of a requirement that an ordinary test may state of a spec's model."""
+    from falsifier.counterexamples.store import load_counterexample
+    from falsifier.errors import SpecError
 
     try:
-        content = tomllib.loads(file_path.read_text(encoding="utf-8"))
-    # Also not UTF-8, integers of any length, nested without end, unreadable.
-    except (ValueError, RecursionError, OSError):
-        return None
-    if not {"model", "requirements"} <= content.keys():
-        return None
-    return SpecFile.from_parent(parent, path=file_path)
+        source = load_counterexample(file).problem
+    except SpecError:
+        return False
+    return source is None or source.stl is not None
+
+
+def _warn(kind: type[Warning], file: Path, text: str, line: int = 1) -> None:
+    from falsifier.core.literals import printable
+
+    warnings.warn_explicit(printable(text), kind, filename=printable(str(file)), lineno=line)
 
 
 class SpecFile(pytest.File):
@@ -136,74 +242,116 @@ class RequirementItem(pytest.Item):
 
 @pytest.fixture
 def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
-    """Fixture: ``falsifier_check(problem, budget=..., engine=..., seed=...)`` fails if a violation is found.
+    """Fixture: ``falsifier_check(problem, budget=..., engine=...)`` fails if a violation is found.
 
-    The problem is a ``Problem``, or a target of ``falsifier run``: ``"AT1"``, ``"my.toml:REQ"``.
+    The problem is a ``Problem``, or a target of ``falsifier run``: ``"AT1"``, ``"my.toml:REQ"``. The options
+    are those of the marker: budget, engine, seed, strict, database.
     """
 
-    def check(problem: "Problem | str", **options: Any) -> "Checked":
+    def check(problem: "Problem | str | PathLike[str]", **options: Any) -> "Checked":
         __tracebackhide__ = True
-        unknown = options.keys() - set(_OPTIONS)
-        if unknown:
-            raise TypeError(
-                f"falsifier_check: unknown arguments {', '.join(sorted(unknown))}; expected some of "
-                f"{', '.join(_OPTIONS)}"
-            )
+        _check_names("falsifier_check", options)
         return _check(request.node, problem, options)
 
     return check
 
 
-def _check(item: pytest.Item, problem: "Problem | str", stated: dict[str, Any]) -> "Checked":
+def _check_names(what: str, options: dict[str, Any]) -> None:
+    __tracebackhide__ = True
+    if unknown := options.keys() - set(_OPTIONS):
+        raise TypeError(
+            f"{what}: unknown arguments {', '.join(sorted(unknown))}; expected some of {', '.join(_OPTIONS)}"
+        )
+
+
+def _marked(item: pytest.Item) -> dict[str, Any]:
+    """Options of the item's markers; the nearest one counts."""
+    __tracebackhide__ = True
+    options: dict[str, Any] = {}
+    for marker in reversed(list(item.iter_markers("falsifier"))):
+        if marker.args:
+            raise TypeError(
+                f"pytest.mark.falsifier: got {marker.args[0]!r} without a name; write it as one of "
+                f"{'=, '.join(_OPTIONS)}="
+            )
+        _check_names("pytest.mark.falsifier", dict(marker.kwargs))
+        options |= marker.kwargs
+    return options
+
+
+def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: dict[str, Any]) -> "Checked":
     """Check a problem and fail if its requirement is violated."""
     __tracebackhide__ = True
+    from falsifier.core.arguments import instance
     from falsifier.counterexamples.regression import Database, check
     from falsifier.problem.loading import load_problem
+    from falsifier.problem.problem import Problem
 
-    config = item.config
-    marker = item.get_closest_marker("falsifier")
-    options = {
-        **{name: _setting(config, name) for name in _OPTIONS},
-        **(marker.kwargs if marker else {}),
-        **stated,
-    }
-    loaded = load_problem(problem) if isinstance(problem, str) else problem
-    folder = config.rootpath / (_setting(config, "database") or _DEFAULT_DATABASE)
+    options = {name: _setting(item.config, name) for name in _OPTIONS} | _marked(item) | stated
+    instance("strict", options["strict"], (bool, type(None)), "True or False")
+    target = "a Problem, or the name of one as for falsifier run, such as 'specs/car.toml:no_speeding'"
+    instance("falsifier_check", problem, (Problem, str, PathLike), target)
+    database = Database(_database(item.config, options["database"]))
+    loaded = problem if isinstance(problem, Problem) else load_problem(problem)
     try:
         checked = check(
             loaded,
             engine=options["engine"],
-            budget=int(_DEFAULT_BUDGET if options["budget"] is None else options["budget"]),
-            seed=int(options["seed"] or 0),
-            database=Database(folder),
+            budget=_DEFAULT_BUDGET if options["budget"] is None else options["budget"],
+            seed=0 if options["seed"] is None else options["seed"],
+            database=database,
         )
+        for file, replayed in checked.replayed.items():
+            if replayed.status == "does not fit":
+                text = (
+                    f"{_short(file)} tests nothing. {replayed.text}. Undo what has changed, or delete "
+                    "the file; a search may find another one"
+                )
+                _warn(UnusedCounterexampleWarning, file, text)
         if checked.counterexample is not None:
-            raise FalsifiedError(_message(item, checked))
+            raise FalsifiedError(_message(item, checked, database))
     finally:
         loaded.model.close()
-    _tell_untested(item, checked)
+    _tell_untested(item, checked, strict=bool(options["strict"]))
     return checked
 
 
-def _tell_untested(item: pytest.Item, checked: "Checked") -> None:
-    """Warn of parts of the requirement that no simulation tested; fail if --falsifier-strict is given."""
+def _tell_untested(item: pytest.Item, checked: "Checked", *, strict: bool) -> None:
+    """Warn of parts of the requirement that no simulation tested, or fail."""
     __tracebackhide__ = True
     found = [f.text for f in checked.result.findings if f.vacuous] if checked.result else []
     text = "\n".join((f"{checked.problem.name} is not violated, but not all of it was tested", *found))
-    if found and _setting(item.config, "strict"):
+    if found and strict:
         raise UntestedError(text)
     if found:
         _, line, _ = item.reportinfo()
-        warnings.warn_explicit(text, UntestedWarning, filename=str(item.path), lineno=(line or 0) + 1)
+        _warn(UntestedWarning, item.path, text, (line or 0) + 1)
 
 
 def _setting(config: pytest.Config, name: str) -> Any:
     """Value from the command line, otherwise from the ini file, otherwise None."""
-    stated = config.getoption(f"falsifier_{name}")
-    return stated if stated is not None else config.getini(f"falsifier_{name}") or None
+    key = f"falsifier_{name}"
+    stated = config.getoption(key)
+    if stated is not None:
+        return stated
+    try:
+        found = config.getini(key) or None
+    except (ValueError, TypeError, pytest.UsageError) as error:
+        raise pytest.UsageError(f"{key}: {error}") from None
+    try:
+        return int(found) if found is not None and name in _NUMBERS else found
+    except ValueError:
+        raise pytest.UsageError(f"{key}: expected a whole number, got {found!r}") from None
 
 
-def _message(item: pytest.Item, checked: "Checked") -> str:
+def _database(config: pytest.Config, stated: Any) -> Path:
+    """Folder of stored counterexamples."""
+    from falsifier.core.arguments import path_of
+
+    return config.rootpath / path_of("database", stated or _setting(config, "database") or _DEFAULT_DATABASE)
+
+
+def _message(item: pytest.Item, checked: "Checked", database: "Database") -> str:
     """The counterexample, its picture, the command that replays it, and the explanation."""
     from falsifier.core.files import file_name
     from falsifier.core.words import candidate_facts
@@ -216,9 +364,12 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
     # With -p no:cacheprovider pytest has no cache, and its configuration not even the attribute.
     cache = getattr(item.config, "cache", None)
     kept = item.config.rootpath if checked.file is None else checked.file.parent
-    pictures = cache.mkdir("falsifier") if cache else kept
-    picture = pictures / f"{file_name(problem.name)}.png"
-    save_figure(plot_evaluation(problem, found.evaluation), picture)
+    try:
+        picture = (cache.mkdir("falsifier") if cache else kept) / f"{file_name(item.nodeid)}.png"
+        save_figure(plot_evaluation(problem, found.evaluation), picture)
+        drawn = str(_short(picture))
+    except OSError as error:
+        drawn = f"cannot be written: {error.strerror}"
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"
     lines = [
         f"{problem.name} is violated by a {how}",
@@ -226,21 +377,25 @@ def _message(item: pytest.Item, checked: "Checked") -> str:
         f"  requirement    {problem.requirement.formula}",
         f"  confirmed      {found.reason}",
         *fact_lines(candidate_facts(found.evaluation.candidate, problem.space)),
-        f"  picture        {_short(picture)}",
+        f"  picture        {drawn}",
     ]
     if checked.file is not None:
         lines.append(f"  stored         {_short(checked.file)}")
-        lines.append(f"  replay with    {_command(item, checked)}")
+        lines.append(f"  replay with    {_command(item, checked.file, database)}")
+    if checked.not_stored:
+        lines.append(f"  not stored     {checked.not_stored}")
     return "\n".join([*lines, "", explain(problem, found.evaluation).text])
 
 
-def _command(item: pytest.Item, checked: "Checked") -> str:
-    """Command that replays the counterexample; if the problem was made in Python, the test itself."""
+def _command(item: pytest.Item, file: Path, database: "Database") -> str:
+    """Command that replays the counterexample; the test itself if its file cannot load this problem."""
     from falsifier.counterexamples.store import load_counterexample
 
-    assert checked.file is not None
-    loadable = load_counterexample(checked.file).problem is not None
-    return f"falsifier replay {_short(checked.file)}" if loadable else f"pytest '{item.nodeid}'"
+    stored = load_counterexample(file)
+    # A file that was moved here loads what it was found for.
+    if stored.problem is not None and database.place(stored.requirement, stored.problem) == file.parent:
+        return f"falsifier replay {_short(file)}"
+    return f"pytest {'--falsifier ' if isinstance(item, RequirementItem) else ''}'{item.nodeid}'"
 
 
 def _short(path: Path) -> Path:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -67,16 +68,16 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
         "brake [ft.lbf] constant 0",
         "  what broke     speed <= ",
         "With throttle at rest (0 %) alone: +",
-        "replay with    falsifier replay counterexamples/car.fast/",
+        "replay with    falsifier replay counterexamples/specs/car.toml/fast/",
     ):
         assert part in first.out
     pictures = [line.split()[-1] for line in first.out.splitlines() if line.startswith("  picture ")]
     assert {OUTPUT, INPUT, CRITICAL} <= colours(repository / pictures[0])
     stored = list((repository / "counterexamples").rglob("*.json"))
-    assert [p.parent.name for p in stored] == ["car.fast"]
-    assert json.loads(stored[0].read_text())["problem"]["target"] == "../../specs/car.toml:fast"
+    assert [p.parent for p in stored] == [repository / "counterexamples/specs/car.toml/fast"]
+    assert json.loads(stored[0].read_text())["problem"]["target"] == "../../../../specs/car.toml:fast"
     second = run_pytest(repository, "--falsifier", "specs", "-k", "fast", "-p", "no:cacheprovider")
-    assert f"picture        {stored[0].parent.relative_to(repository)}/fast.png" in second.out
+    assert f"picture        {stored[0].parent.relative_to(repository)}/specs-car.toml-fast" in second.out
     assert "fast is violated by a stored counterexample" in second.out
     assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").code == 5
 
@@ -90,10 +91,44 @@ def test_a_broken_spec_is_an_error_that_names_the_key(repository: Path) -> None:
     assert "Traceback" not in done.out
 
 
+def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_alone(
+    repository: Path, tmp_path: Path
+) -> None:
+    system = SPEC[SPEC.index("[inputs.throttle]") :].replace("[inputs", "[connections]\n[inputs", 1)
+    files = {
+        "system.toml": f'[components.car]\nfmu = "AT.fmu"\n{system}',
+        "conflict.toml": f"{SPEC}<<<<<<< HEAD\n",
+        "modle.toml": SPEC.replace("[model]", "[modle]"),
+        "requirement.toml": SPEC.replace("[requirements.", "[requirement."),
+        "broken.toml": "[model\nfmu=",
+        "unfinished.toml": "[model]\nfmu = 'AT.fmu'\n[inputs.u]\n",
+        "foreign.toml": "[tool]\nname = 'other'\nrequirements = ['numpy']\n",
+        "Cargo.toml": "[tool.other]\n[requirements.R]\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    done = run_pytest(tmp_path, "--falsifier", "--co", "--continue-on-collection-errors")
+    assert done.code == 1 and "3 errors" in done.out, done.out
+    for part in (
+        "<SpecFile system.toml>",
+        "conflict.toml: not valid TOML: Invalid statement",
+        "modle.toml: modle: unknown key; did you mean 'model'",
+        "requirement.toml: requirement: unknown key; did you mean 'requirements'",
+        "broken.toml is not collected: it cannot be read as TOML (Expected ']'",
+        "unfinished.toml is not collected: it has tables of a spec (model, inputs), but no [requirements",
+    ):
+        assert part in done.out
+    assert "foreign.toml" not in done.out and "Cargo.toml" not in done.out
+    for name in ("foreign.toml", "Cargo.toml", "broken.toml"):  # given by its name, each is a spec
+        done = run_pytest(tmp_path, "--falsifier", name)
+        assert done.code == 2 and f"ERROR collecting {name}" in done.out, done.out
+
+
 def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
     (repository / "tests" / "test_lag.py").write_text(
         """
 import pytest
+from falsifier.errors import SpecError
 from falsifier.testing import lag_problem
 
 def test_holds(falsifier_check):
@@ -113,10 +148,36 @@ def test_by_name(falsifier_check):
 def test_typo(falsifier_check):
     with pytest.raises(TypeError, match="unknown .*bugdet"):
         falsifier_check(lag_problem(), bugdet=3)
+
+def test_no_problem(falsifier_check):
+    with pytest.raises(SpecError, match="expected a Problem, or .* got 42"):
+        falsifier_check(42)
+
+@pytest.mark.falsifier(strict=True, engine="sobol", database="elsewhere")
+class TestMarked:
+    @pytest.mark.falsifier(budget=2)
+    def test_strict(self, falsifier_check):
+        with pytest.raises(AssertionError, match="not all of it was tested"):
+            falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"))
+        falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), strict=False)
+
+    @pytest.mark.falsifier(budgets=2)
+    def test_unknown(self, falsifier_check):
+        with pytest.raises(TypeError, match="unknown .*budgets; expected .* budget, engine, seed, strict"):
+            falsifier_check(lag_problem())
+
+    @pytest.mark.falsifier(5)
+    def test_without_a_name(self, falsifier_check):
+        with pytest.raises(TypeError, match="got 5 without a name; .*budget="):
+            falsifier_check(lag_problem())
+
+    def test_database(self, falsifier_check):
+        with pytest.raises(AssertionError, match="stored +elsewhere/LAG/"):
+            falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
 """
     )
     done = run_pytest(repository, "tests")
-    assert "1 failed, 4 passed" in done.out, done.out
+    assert "1 failed, 9 passed" in done.out, done.out
     assert "LAG is violated by a counterexample found by a search" in done.out
     assert "replay with    pytest 'tests/test_lag.py::test_violated'" in done.out
     assert "pytest_falsifier.py" not in done.out
@@ -135,6 +196,73 @@ def test_importing_the_plugin_loads_nothing_else() -> None:
         check=True,
     )
     assert done.stdout.split() == ["pytest_falsifier"]
+
+
+def test_specs_of_one_name_have_their_own_counterexamples_and_what_is_unused_is_told(
+    repository: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(repository / "fmus", tmp_path / "fmus")
+    for folder, limit in (("a", 120), ("b", 119), ("c", 500)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "car.toml").write_text(SPEC.replace("<= 120", f"<= {limit}"))
+    settings = ("falsifier_engine=corners", "falsifier_budget=10")
+    options = ("--falsifier", "-o", settings[0], "-o", settings[1], "-k", "not impossible")
+    first = run_pytest(tmp_path, *options)
+    assert "2 failed, 1 passed" in first.out and "stored counterexample" not in first.out, first.out
+    stored = sorted((tmp_path / "counterexamples").rglob("*.json"))
+    assert [p.parent.relative_to(tmp_path / "counterexamples").as_posix() for p in stored] == [
+        "a/car.toml/fast",
+        "b/car.toml/fast",
+    ]
+    pictures = {line.split()[-1] for line in first.out.splitlines() if line.startswith("  picture ")}
+    assert len(pictures) == 2
+
+    spec = tmp_path / "a" / "car.toml"
+    spec.write_text(spec.read_text().replace("fast", "slow").replace("120", "500"))
+    (tmp_path / "b").rename(tmp_path / "d")
+    done = run_pytest(tmp_path, *options, "a")
+    assert "1 passed" in done.out, done.out
+    for part in (
+        f"car.toml/fast/{stored[0].name} is not replayed, because a/car.toml has no requirement 'fast'. If "
+        "it was renamed or moved, move the file to counterexamples/a/car.toml/NEW-NAME; otherwise delete it",
+        f"car.toml/fast/{stored[1].name} is not replayed, because b/car.toml does not exist.",
+    ):
+        assert part in done.out
+
+    stored[0].parent.rename(stored[0].parent.with_name("slow"))
+    spec.write_text(spec.read_text().replace("500", "120"))
+    done = run_pytest(tmp_path, *options, "a")
+    assert "a/car.toml has no" not in done.out and "violated by a stored counterexample" in done.out, done.out
+    assert "replay with    pytest --falsifier 'a/car.toml::slow'" in done.out
+    spec.write_text(spec.read_text().replace("[inputs.throttle]", "[inputs.throttle]\nrange = [0, 50]"))
+    done = run_pytest(tmp_path, *options, "a")
+    assert f"slow/{stored[0].name} tests nothing. slow: the counterexample does not fit" in done.out, done.out
+    assert "100 is outside its range [0, 50]" in done.out and "or delete the file" in done.out
+
+
+def test_a_counterexample_that_cannot_be_stored_or_drawn_is_shown(repository: Path) -> None:
+    (repository / "file").write_text("no folder")
+    options = ("--falsifier", "--falsifier-database", "file", "-o", "cache_dir=file", "-k", "fast")
+    done = run_pytest(repository, "specs", *options)
+    assert done.code == 1 and "throttle [%] constant 100" in done.out, done.out
+    assert f"not stored     {repository / 'file'}/specs/car.toml/fast: Not a directory" in done.out
+    assert "picture        cannot be written: " in done.out and "Traceback" not in done.out
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("budget", "abc", "a whole number, got 'abc'"),
+        ("seed", "x", "a whole number, got 'x'"),
+        ("strict", "x", "x"),
+    ],
+)
+def test_a_wrong_ini_value_is_a_usage_error_that_names_the_key(
+    repository: Path, key: str, value: str, said: str
+) -> None:
+    done = run_pytest(repository, "specs", "-o", f"falsifier_{key}={value}")
+    assert done.code == 4 and "Traceback" not in done.err
+    assert re.search(f"ERROR: falsifier_{key}: .*{said}", done.err), done.err
 
 
 HOSTILE = """
@@ -174,11 +302,10 @@ def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None
 
 
 def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
-    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+    request: pytest.FixtureRequest,
 ) -> None:
     checked = check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), engine="sobol", budget=2)
     with pytest.warns(UntestedWarning, match="The condition x >= 2 never held in 2 simulations"):
-        _tell_untested(request.node, checked)
-    monkeypatch.setattr(request.config.option, "falsifier_strict", True)
+        _tell_untested(request.node, checked, strict=False)
     with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
-        _tell_untested(request.node, checked)
+        _tell_untested(request.node, checked, strict=True)

@@ -2,16 +2,17 @@
 
 ::
 
-    counterexamples/AT.AT1/5f2c01ab.json      requirement AT1 of AT.toml
+    counterexamples/specs/car.toml/fast/5f2c01ab.json      requirement fast of specs/car.toml
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
+from os.path import relpath
 from pathlib import Path
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import file_name
+from falsifier.core.files import bundled, file_name
 from falsifier.counterexamples.shrink import shrink
 from falsifier.counterexamples.store import (
     Replayed,
@@ -25,6 +26,7 @@ from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.loading import spec_file
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
@@ -40,16 +42,27 @@ class Database:
     def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
         """Write a counterexample; one with the same candidate is overwritten."""
         key = repr(Candidate.from_json(stored.candidate).key)
-        return save(stored, self._place(problem) / f"{sha256(key.encode()).hexdigest()[:8]}.json")
+        return save(
+            stored, self.place(problem.name, problem.source) / f"{sha256(key.encode()).hexdigest()[:8]}.json"
+        )
 
     def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
         """Yield the stored counterexamples of a problem, by file name."""
-        for path in sorted(self._place(problem).glob("*.json")):
+        for path in sorted(self.place(problem.name, problem.source).glob("*.json")):
             yield path, load_counterexample(path)
 
-    def _place(self, problem: Problem) -> Path:
-        spec = None if problem.source is None else spec_file(problem.source)
-        return self.folder / file_name(f"{spec.stem}.{problem.name}" if spec else problem.name)
+    def place(self, name: str, source: ProblemSource | None) -> Path:
+        """Folder of a requirement: that of its spec or FMU mirrors the path from beside the database."""
+        file = source and (source.parts.file or spec_file(source))
+        parts = Path(relpath(Path(file).resolve(), self.folder.resolve().parent)).parts if file else ()
+        if file and Path(file).resolve().parent == bundled("specs"):  # elsewhere on every machine
+            parts = (Path(file).stem,)
+        return self.folder.joinpath(*("_up" if part == ".." else part for part in parts), file_name(name))
+
+    def spec_of(self, place: Path) -> Path:
+        """Path of the spec to which a folder of requirements' folders belongs."""
+        parts = place.relative_to(self.folder).parts
+        return self.folder.resolve().parent.joinpath(*(".." if part == "_up" else part for part in parts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,9 +72,9 @@ class Checked:
     problem: Problem  # what was checked
     counterexample: Confirmation | None  # a confirmed violation, or None
     file: Path | None  # where it is stored, or None
-    # Results of the stored counterexamples, up to the first that still violates.
-    replayed: tuple[Replayed, ...]
+    replayed: Mapping[Path, Replayed]  # stored ones by file, up to the first that still violates
     result: Result | None  # result of the search; None if a stored counterexample still violates
+    not_stored: str = ""  # why it could not be stored
 
 
 def check(
@@ -85,20 +98,22 @@ def check(
         SimulationError: if a stored counterexample cannot be simulated, or every simulation of the search
             fails.
     """
-    replayed: list[Replayed] = []
+    replayed: dict[Path, Replayed] = {}
     for path, stored in database.fetch(problem) if database else ():
-        again = replay(stored, problem)
-        replayed.append(again)
+        replayed[path] = again = replay(stored, problem)
         if again.status == "violates":
-            return Checked(problem, again.confirmation, path, tuple(replayed), None)
+            return Checked(problem, again.confirmation, path, replayed, None)
     result = falsify(problem, engine, budget=budget, seed=seed)
     if result.status == "failed":
         raise SimulationError(f"{problem.name}: {result.reason}")
     found = result.counterexample and _smallest(
         problem, result.counterexample, result.spent.simulations, budget
     )
-    file = database.save(problem, to_store(found)) if database and found else None
-    return Checked(problem, found, file, tuple(replayed), result)
+    try:
+        file = database.save(problem, to_store(found)) if database and found else None
+    except OSError as error:  # what was found is worth more than its file
+        return Checked(problem, found, None, replayed, result, f"{error.filename}: {error.strerror}")
+    return Checked(problem, found, file, replayed, result)
 
 
 def _smallest(problem: Problem, found: Confirmation, spent: int, budget: Budget | int) -> Confirmation:

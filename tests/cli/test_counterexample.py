@@ -58,7 +58,7 @@ def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     assert done.json["at_most"] == pytest.approx(-0.2133 / 2, abs=1e-3)
     assert [str(Path(f).parent) for f in done.json["files"]] == ["run", "run"]
     kept = run(folder, "export", "run/shrunk.json", "--store", "kept")
-    assert kept.code == 0 and kept.out.startswith("kept/AT.AT1/") and kept.out.count("\n") == 1
+    assert kept.code == 0 and kept.out.startswith("kept/AT/AT1/") and kept.out.count("\n") == 1
     assert (folder / "run" / "counterexample.json").exists()
     assert run(folder, "replay", kept.out.strip()).code == 1
 

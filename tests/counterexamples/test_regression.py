@@ -23,11 +23,11 @@ def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Pat
     second = check(problem, engine="uniform", budget=100, database=database)
     assert second.result is None
     assert second.file == first.file
-    assert [r.status for r in second.replayed] == ["violates"]
+    assert [r.status for r in second.replayed.values()] == ["violates"]
     mended = replace(problem, parameters={"gain": 0.4})
     third = check(mended, engine="uniform", budget=5, database=database)
     assert (third.counterexample, third.file) == (None, None)
-    assert [r.status for r in third.replayed] == ["does not violate"]
+    assert [r.status for r in third.replayed.values()] == ["does not violate"]
     assert third.result is not None
     assert third.result.spent.simulations == 5
 

@@ -60,7 +60,7 @@ def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
     problem = load_problem("my.toml:R", parameters={"finalDrive": 3.225})
     database = Database(Path("counterexamples"))
     path = database.save(problem, to_store(violation(problem)))
-    assert json.loads(path.read_text())["problem"]["target"] == "../../my.toml:R"
+    assert json.loads(path.read_text())["problem"]["target"] == "../../../my.toml:R"
     monkeypatch.chdir(tmp_path)
     folder.rename(tmp_path / "moved")
     stored = load_counterexample(tmp_path / "moved" / path)
@@ -183,16 +183,21 @@ def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
         counterexample_case(path).problem()
 
 
-def test_databases_keep_requirements_of_one_name_apart(tmp_path: Path) -> None:
-    database = Database(tmp_path)
-    one = replace(lag_problem(), source=ProblemSource(target="a/one.toml:LAG"))
-    other = replace(lag_problem(), source=ProblemSource(target="a/other.toml:LAG"))
+def test_databases_keep_requirements_of_one_name_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    database = Database(Path("kept"))
     found = to_store(violation(lag_problem()))
-    path = database.save(one, found)
-    assert path.parent.name == "one.LAG"
-    assert [p for p, _ in database.fetch(one)] == [path]
-    assert list(database.fetch(other)) == []
-    assert list(database.fetch(lag_problem())) == []
+    targets = ("a/car.toml:LAG", "b/car.toml:LAG", "../car.toml:LAG", "a/car.fmu", "NN:LAG")
+    problems = [replace(lag_problem(), source=ProblemSource(target=target)) for target in targets]
+    paths = [database.save(problem, found) for problem in (*problems, lag_problem())]
+    folders = ["a/car.toml/LAG", "b/car.toml/LAG", "_up/car.toml/LAG", "a/car.fmu/LAG", "NN/LAG", "LAG"]
+    assert [path.parent.as_posix() for path in paths] == [f"kept/{folder}" for folder in folders]
+    assert [[p for p, _ in database.fetch(problem)] for problem in problems] == [[p] for p in paths[:-1]]
+    assert database.spec_of(Path("kept/_up/car.toml")).resolve() == tmp_path.parent / "car.toml"
+    other = replace(lag_problem(), source=ProblemSource(target=str(tmp_path / "a" / "car.toml:LAG")))
+    assert [p for p, _ in Database(tmp_path / "kept").fetch(other)] == [tmp_path / paths[0]]
 
 
 def test_rights_move_with_the_file(folder: Path, tmp_path: Path) -> None:
