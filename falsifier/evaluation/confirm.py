@@ -194,12 +194,8 @@ def step_convergence(
     try:
         fine = model.simulate(signals, {}, replace(experiment, step_size=experiment.step / 2))
     except SimulationError as error:
-        raise SimulationError(
-            f"the step of {experiment.step:g} s works, but cannot be compared with half of it: {error}",
-            status=error.status,
-            time=error.time,
-            log=error.log,
-        ) from None
+        why = f"the step of {experiment.step:g} s works, but cannot be compared with half of it: {error}"
+        raise SimulationError(why, status=error.status, time=error.time, log=error.log) from None
     moved = {}
     for name in coarse.names:
         distance = np.abs(fine[name] - coarse[name])

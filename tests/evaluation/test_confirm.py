@@ -1,11 +1,13 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from falsifier.core.model import Experiment
+from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
-from falsifier.errors import MonitorError, SpecError
+from falsifier.errors import MonitorError, SimulationError, SpecError
 from falsifier.evaluation.confirm import (
     Movement,
     confirm,
@@ -167,3 +169,17 @@ def test_the_step_that_a_coupling_needs_is_found() -> None:
     moved = step_convergence(model, replace(experiment, step_size=found), {})
     assert moved["plant.y"].relative <= 0.01
     assert sufficient_step(model, experiment, {}, share=0.01, halvings=0) is None
+
+
+def test_a_model_of_one_step_is_not_compared_with_half_of_it() -> None:
+    class OneStep:
+        def simulate(self, *given: Any) -> Trajectory:
+            experiment = given[2]
+            if experiment.step < 0.1:
+                raise SimulationError("refused", time=0.0)
+            return Trajectory(experiment.times, {"x": experiment.times})
+
+    model: Any = OneStep()
+    with pytest.raises(SimulationError, match=r"^the step of 0.1 s works, .* half of it: refused$") as caught:
+        step_convergence(model, Experiment(1.0, 0.1, ("x",)), {})
+    assert caught.value.time == 0.0
