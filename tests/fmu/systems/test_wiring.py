@@ -186,3 +186,10 @@ PLAN = make_plan(
 def test_nonsense_is_no_defect(where: int, text: str, component: int) -> None:
     error = failure(MODEL.network, PLAN, Reply(where, 1 << 31, text, 0.5, component=component), "", ("slow",))
     assert isinstance(error, SimulationError | ModelError) and str(error)
+
+
+def test_a_refused_first_step_tells_its_size() -> None:
+    error = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", ())
+    assert "the first step, of " in str(error) and "needs it as step_size" in str(error)
+    later = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.5, component=0), "", ())
+    assert "the step returned error at t = 0.5 s" in str(later)
