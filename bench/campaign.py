@@ -132,7 +132,7 @@ def long_journal(run: Path, place: Path) -> tuple[float, int]:
     pairs = [record for record in read_journal(run) if record.kind != "ended"]
     with (place / "journal.jsonl").open("wb") as file:
         for i in range(2 * LONG_JOURNAL):
-            file.write(line_of(pairs[i % len(pairs)], i + 1))
+            file.write(line_of(pairs[i % len(pairs)], i + 1, pairs[0].run))
     started = perf_counter()
     count = len(load_run(place).robustness)
     return perf_counter() - started, count
@@ -161,7 +161,8 @@ def make_run(request: RunRequest, place: Path) -> None:
     problem = load_source(request.problems[0])
     place.mkdir(parents=True)
     (place / "trajectories").mkdir()
-    write(place, describe(request, [problem], "uniform"))
+    described = describe(request, [problem], "uniform")
+    write(place, described)
     low, high = problem.space.bounds.T
     candidate = problem.space.decode(low + (high - low) * ((request.seed + 1) / 11))
     evaluation = evaluate(problem, candidate)
@@ -206,7 +207,7 @@ def make_run(request: RunRequest, place: Path) -> None:
         )
     )
     records.append(EndedRecord(status="falsified", reason="", spent=Spent(BUDGET)))
-    lines = (line_of(record, number) for number, record in enumerate(records, 1))
+    lines = (line_of(record, number, described.run) for number, record in enumerate(records, 1))
     (place / "journal.jsonl").write_bytes(b"".join(lines))
 
 

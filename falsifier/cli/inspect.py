@@ -14,6 +14,7 @@ from falsifier.cli.files import in_existing_folder
 from falsifier.cli.options import PATH, changes_in, json_option, out_option, policy_options
 from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
+from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
@@ -229,4 +230,4 @@ def _bundled_fmu(name: Path) -> Path:
 
 def _relative(fmu: Path, spec: Path) -> Path:
     """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
-    return Path(relpath(fmu.resolve(), spec.resolve().parent))
+    return Path(utf_8(relpath(fmu.resolve(), spec.resolve().parent)))

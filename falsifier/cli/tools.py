@@ -21,7 +21,7 @@ from falsifier.counterexamples.store import load_counterexample
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
-from falsifier.record.journal import holds_run
+from falsifier.record.journal import holds_run, simulated
 from falsifier.record.journal import repair as repair_run
 from falsifier.record.manifest import Manifest
 from falsifier.record.records import RECORDS
@@ -43,7 +43,10 @@ def repair(*, directory: Path) -> None:
     findings = _repair_campaign(directory) if is_campaign(directory) else _repair_run(directory)
     for finding in findings:
         say(finding)
-    say("repaired" if findings else f"{directory}: nothing is damaged")
+    held = None if is_campaign(directory) else simulated(directory)
+    intact = "the journal contains no simulation" if held == 0 else "nothing is damaged"
+    intact += f"; {counted(held, 'simulation')} recorded" if held else ""
+    say("repaired" if findings else f"{directory}: {intact}")
 
 
 def _repair_campaign(directory: Path) -> list[str]:

@@ -54,6 +54,16 @@ def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> 
     return Path(given)
 
 
+def utf_8(path: str) -> str:
+    """Return a text with a path; SpecError if that is not of UTF-8, in which everything is recorded."""
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        shown = path.encode("utf-8", "backslashreplace").decode().replace("\\udc", "\\x")
+        raise SpecError(f"{shown}: the name is not valid UTF-8; rename the file or folder") from None
+    return path
+
+
 def list_of(name: str, given: Iterable[T], kind: Any, expected: str) -> tuple[T, ...]:
     """Return what is in a list that a user gave, all of one kind."""
     found = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else None

@@ -1,9 +1,11 @@
 """What is known of a run or file: a counterexample, the nearest miss, or inputs to start a search from."""
 
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from falsifier.core.arguments import utf_8
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import Fitted, fit
 from falsifier.core.words import counted
@@ -29,7 +31,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.journal import holds_run, read_journal, recorded_evaluations, simulated
 from falsifier.record.manifest import Manifest, Origin
 from falsifier.stl.margins import margin_words, signed
 
@@ -196,10 +198,10 @@ def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
     judged = _judged(directory, name)
     misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
     if not judged:
-        raise SpecError(
-            f"{directory}: no simulation of this run could be judged by {name}; falsifier coverage "
-            f"{directory} says why"
-        )
+        place = shlex.quote(str(directory))
+        why = f"no simulation of this run could be judged by {name}; falsifier coverage {place} says why"
+        empty = f"its journal contains no simulation; to simulate: falsifier resume {place}"
+        raise SpecError(f"{directory}: {why if simulated(directory) else empty}")
     if not misses:
         raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
     robustness, candidate = min(misses, key=lambda pair: pair[0])
@@ -239,7 +241,7 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
     else:
         found = recorded_inputs(place, problem.name)
     try:
-        return fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {place}"))
+        return fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {utf_8(str(place))}"))
     except CandidateError as error:
         raise CandidateError(f"{place}: {error}") from None
 

@@ -24,7 +24,7 @@ from falsifier.counterexamples.store import (
 )
 from falsifier.errors import SimulationError
 from falsifier.evaluation.confirm import Confirmation, confirm
-from falsifier.problem.loading import spec_file
+from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
@@ -53,7 +53,8 @@ class Database:
 
     def place(self, name: str, source: ProblemSource | None) -> Path:
         """Folder of a requirement: that of its spec or FMU mirrors the path from beside the database."""
-        file = source and (source.parts.file or spec_file(source))
+        stated = None if source is None or source.parts.kind == "python" else source
+        file = stated and (stated.parts.file or source_file(stated))
         parts = Path(relpath(Path(file).resolve(), self.folder.resolve().parent)).parts if file else ()
         if file and Path(file).resolve().parent == bundled("specs"):  # elsewhere on every machine
             parts = (Path(file).stem,)

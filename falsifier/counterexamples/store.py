@@ -29,7 +29,7 @@ from falsifier.errors import (
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import fmu_files, resolved
-from falsifier.problem.loading import reloadable, spec_file
+from falsifier.problem.loading import reloadable, source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -320,7 +320,7 @@ def changes_since(then: Origin, problem: Problem) -> Iterator[str]:
         several = len(fmu_files(problem.model)) > 1
         yield f"{'an FMU of the system' if several else 'the FMU'} has changed since it was stored"
     if then.spec_sha256 is not None and now.spec_sha256 != then.spec_sha256:
-        spec = problem.source and spec_file(problem.source)
+        spec = problem.source and source_file(problem.source)
         yield f"{spec.name if spec else 'the spec'} has changed since it was stored"
     if now.formula != then.formula:
         yield f"the requirement has changed from {then.formula} to {now.formula}"

@@ -6,6 +6,7 @@
 """
 
 import shlex
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
@@ -177,9 +178,13 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
     return [source.model_copy(update={"target": f"{spec}:{name}"}) for name in read_spec(path).requirements]
 
 
-def spec_file(source: ProblemSource) -> Path | None:
-    """Return the spec file or SSP package of a source; None for an FMU or a problem made in Python."""
-    if source.parts.kind in ("fmu", "python"):
+def source_file(source: ProblemSource) -> Path | None:
+    """Return the spec file, SSP package or imported module of a source; None for an FMU."""
+    if source.parts.kind == "python":
+        file = Path(getattr(sys.modules.get(source.target.split(":")[1]), "__file__", None) or "")
+        here = Path.cwd()  # seen from it, as specs are, so that a project can be moved
+        return (file.relative_to(here) if file.is_relative_to(here) else file) if file.is_file() else None
+    if source.parts.kind == "fmu":
         return Path(source.target) if is_package(source.target) else None
     return find_spec(source.target)[0]
 

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
+from falsifier.core.arguments import utf_8
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
 from falsifier.errors import did_you_mean, shown
@@ -25,6 +26,8 @@ def _plain(value: Any) -> Any:
     return _no_text(value)
 
 
+# A path, or a text with one: all that users name is recorded.
+Recordable = Annotated[str, AfterValidator(utf_8)]
 Number = Annotated[float, BeforeValidator(_no_text), Field(allow_inf_nan=False)]
 Bound = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
 Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
@@ -248,7 +251,7 @@ class ModelChanges(Strict):
     time_limit: Seconds | None = None
     logging: bool | None = None
     omit: tuple[str, ...] = ()
-    allow: tuple[str, ...] = ()
+    allow: tuple[Recordable, ...] = ()
     deny: tuple[str, ...] = ()
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_serial
 
 from falsifier.errors import SpecError, first_fault
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
-from falsifier.problem.sections import ModelChanges
+from falsifier.problem.sections import ModelChanges, Recordable
 
 # Name of the requirement that a formula makes if it is given without a name.
 STL_NAME = "stl"
@@ -66,14 +66,14 @@ class ProblemSource(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
-    target: str
+    target: Recordable
     stl: str | None = None
     stl_name: str = STL_NAME
     profile: str | None = None
     parameterization: Parameterization = "free"
     shortest_piece: float | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
-    context: tuple[str, ...] = ()
+    context: tuple[Recordable, ...] = ()
 
     @field_serializer("changes")
     def _stated_only(self, changes: ModelChanges) -> dict[str, Any]:

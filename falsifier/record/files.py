@@ -1,6 +1,7 @@
 """Files and folders of a run: sealed values, trajectories, locks, and what is set aside."""
 
 import errno
+import fcntl
 import logging
 import re
 from collections.abc import Iterator
@@ -82,20 +83,6 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
 
 def is_locked(path: Path) -> bool:
     """Whether a process holds a lock file that exists; also where it may be read only."""
-    try:
-        with locked(path, busy=""):
-            return False
-    except JournalError:
-        return True
-    except OSError:
-        return _is_locked_for_reading(path)
-
-
-def _is_locked_for_reading(path: Path) -> bool:
-    try:
-        import fcntl  # of POSIX only, as folders that cannot be written but read are
-    except ImportError:
-        return True
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

@@ -10,8 +10,9 @@
 
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
-a checksum, lines are numbered, and SUM in the name of a trajectory is that file's checksum: what was damaged
-is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops what is damaged.
+a checksum, lines are numbered and name their run, and SUM in the name of a trajectory is that file's
+checksum: damage is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops what is not
+intact.
 """
 
 import os
@@ -20,6 +21,7 @@ import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import cached_property
 from pathlib import Path
 from shutil import copy2
 from time import monotonic
@@ -74,14 +76,12 @@ class Journal:
         self._keep = keep
         remove_partial(directory / TRAJECTORIES, TRAJECTORY_NAMES)
         remove_partial(directory, re.escape(manifest.MANIFEST))
-        reader = JournalReader(directory)
-        self.records = list(reader.new())
-        self._path = reader.path
-        self._file = self._path.open("ab", buffering=0)
-        self._file.truncate(reader.offset)  # drops a line that a crash left incomplete
+        self._reader = JournalReader(directory)
+        self.records = list(self._reader.new())
+        self._file = self._reader.path.open("ab", buffering=0)
+        self._file.truncate(self._reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
-        self._lines = reader.line
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
@@ -121,8 +121,8 @@ class Journal:
         size = self._file.seek(0, os.SEEK_END)
         is_due = isinstance(record, _AT_ONCE) or monotonic() - self._synced > _SYNC_PERIOD
         if is_due:
-            self._path.stat()  # what is written to a file that was deleted or moved, nobody finds
-        rest = memoryview(line_of(record, self._lines + 1))
+            self._reader.path.stat()  # what is written to a file that was deleted or moved, nobody finds
+        rest = memoryview(line_of(record, self._reader.line + 1, self._reader.run or ""))
         try:
             while rest:
                 rest = rest[self._file.write(rest) :]
@@ -133,9 +133,9 @@ class Journal:
             with suppress(OSError):
                 self._file.truncate(size)
             if isinstance(error, OSError) and error.errno is not None:
-                error.filename = str(self._path)
+                error.filename = str(self._reader.path)
             raise
-        self._lines += 1
+        self._reader.line += 1
 
     def close(self) -> None:
         """Force everything to disk."""
@@ -217,17 +217,16 @@ def holds_run(directory: Path) -> bool:
         return (directory / manifest.MANIFEST).exists()
 
 
-def holds_lines(directory: Path) -> bool:
-    """Whether a directory contains a journal with at least one line."""
-    path = directory / JOURNAL
-    return path.exists() and path.stat().st_size > 0
+def simulated(directory: Path) -> int:
+    """Number of simulations that the journal of a run directory contains."""
+    return sum(isinstance(record, EvaluatedRecord) for record in read_journal(directory))
 
 
 def read_journal(directory: Path) -> list[Record]:
     """Read all complete records of a run directory in order; empty if there is no journal.
 
     Raises:
-        JournalError: if a line is invalid, unless it is an incomplete last line.
+        JournalError: if a line is invalid or of another run, unless it is an incomplete last line.
     """
     return list(JournalReader(directory).new())
 
@@ -240,6 +239,12 @@ class JournalReader:
         self.offset = 0
         self.line = 0
 
+    @cached_property
+    def run(self) -> str | None:
+        """Name of the run, which every line repeats; None without a manifest, which precedes lines."""
+        directory = self.path.parent
+        return manifest.read(directory).run if holds_run(directory) else None
+
     @property
     def shrank(self) -> bool:
         """Whether the file is shorter than what was read; then start again with a new reader."""
@@ -249,7 +254,7 @@ class JournalReader:
         """Yield the complete records written since the last call.
 
         Raises:
-            JournalError: if a line is invalid.
+            JournalError: if a line is invalid or of another run.
         """
         if not self.path.exists() or self.path.stat().st_size == self.offset:
             return
@@ -261,12 +266,12 @@ class JournalReader:
                 self.line += 1
                 try:
                     check_seal(line)
-                    record = parse_line(line, self.line)
+                    record = parse_line(line, self.line, self.run)
                 except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
                         f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
-                    ) from None
+                    ) from error
                 self.offset += len(line)
                 yield record
 
@@ -344,15 +349,15 @@ def repair(directory: Path) -> list[str]:
         try:
             for _ in reader.new():
                 pass
-        except JournalError:
+        except JournalError as error:
             path = reader.path
             lost = path.read_bytes()[reader.offset :].count(b"\n")
             copy = Path(copy2(path, free_name(path)))
             with path.open("r+b") as file:
                 file.truncate(reader.offset)
             found.append(
-                f"{path}: line {reader.line} is damaged: {counted(lost, 'line')} from there on dropped, the "
-                f"original is kept as {copy.name}; to resume the run repeats what is missing"
+                f"{path}: line {reader.line} is damaged: {error.__cause__}; {counted(lost, 'line')} from "
+                f"there on dropped, kept as {copy.name}; to resume the run repeats what is missing"
             )
         for path in sorted((directory / TRAJECTORIES).glob("*.npz")):
             if not is_intact(path, path.read_bytes()):

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
+from secrets import token_hex
 from typing import Any, NamedTuple
 
 from pydantic import Field
@@ -17,7 +18,7 @@ from falsifier.core.model import Variable
 from falsifier.core.space import ValueKind
 from falsifier.errors import JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
-from falsifier.problem.loading import spec_file
+from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization, ProblemSource
@@ -71,7 +72,7 @@ class Origin(NamedTuple):
 
     formula: str
     fmu_sha256: str | None  # one for all FMUs of a system; None if the model is neither
-    spec_sha256: str | None  # of the spec or SSP package; None if there is none
+    spec_sha256: str | None  # of the spec, SSP package or Python module; None if there is none
 
     @classmethod
     def of(cls, formula: str, hashes: Mapping[str, str]) -> "Origin":
@@ -94,6 +95,7 @@ class Surroundings(Strict):
 class Manifest(Surroundings):
     """Content of manifest.json: everything needed to repeat the run and to report on it."""
 
+    run: str = Field("", description="Random name of the run, which every line of its journal repeats.")
     request: RunRequest
     engine: str = Field(description="Name of the engine, even if it was made in Python.")
     requirements: tuple[RequirementRecord, ...] = Field(min_length=1)
@@ -114,7 +116,7 @@ class Manifest(Surroundings):
     stop_time: float = Field(description="End of each simulation in s.")
     allow: tuple[str, ...] = Field((), description="What the FMU was allowed beyond its own folders.")
     deny: tuple[str, ...] = Field((), description="What it was denied.")
-    hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec, by path.")
+    hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec or module, by path.")
     contexts: dict[str, Context] = Field(
         {}, description="What the language model was told of context files, by requirement."
     )
@@ -205,6 +207,7 @@ def describe(
     space = problem.space
     return Manifest(
         **environment(),
+        run=token_hex(4),
         request=request,
         engine=engine,
         requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
@@ -236,8 +239,8 @@ def environment() -> dict[str, Any]:
 
 
 def file_hashes(problem: Problem) -> dict[str, str]:
-    """SHA-256, by path, of what determines what is simulated: the FMUs, as they were loaded, and the spec."""
-    spec = None if problem.source is None else spec_file(problem.source)
+    """SHA-256, by path, of what determines what is simulated: FMUs as they were loaded, spec, or module."""
+    spec = None if problem.source is None else source_file(problem.source)
     # What is in a package was extracted to a folder of this process; the package's own hash covers it.
     fmus = {} if is_packaged(problem.model) else fmu_files(problem.model)
     specs = {spec: sha256(spec.read_bytes()).hexdigest()} if spec else {}

@@ -22,6 +22,7 @@ class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
+    run: str = Field("", description="Name of the run that wrote the line, as in its manifest.")
     sum: str = Field("", description="Checksum of the line up to here.")
 
 
@@ -119,22 +120,24 @@ Record = AskedRecord | EvaluatedRecord | ExchangeRecord | ConfirmedRecord | Ende
 RECORDS: TypeAdapter[Record] = TypeAdapter(Annotated[Record, Field(discriminator="kind")])
 
 
-def line_of(record: Record, number: int) -> bytes:
-    """Return the line of a journal with this number, from 1, with its checksum."""
-    numbered = record.model_copy(update={"line": number})
+def line_of(record: Record, number: int, run: str = "") -> bytes:
+    """Return the line of a run's journal with this number, from 1, with its checksum."""
+    numbered = record.model_copy(update={"line": number, "run": run})
     return seal(numbered.model_dump_json(exclude={"sum"})).encode()
 
 
-def parse_line(line: bytes, number: int) -> Record:
-    """Return the record of a line whose checksum is right, and which must have this number.
+def parse_line(line: bytes, number: int, run: str | None = None) -> Record:
+    """Return the record of a line whose checksum is right, and which must have this number and run, if known.
 
     Raises:
-        ValueError: if it is none, or has another number; the message says which.
+        ValueError: if it is none, or has another number or run; the message says which.
     """
     try:
         record = RECORDS.validate_json(line)
     except ValidationError as error:
         raise ValueError(error.errors()[0]["msg"]) from None
+    if run not in (None, record.run):
+        raise ValueError("it was written by another run than the one that manifest.json describes")
     if record.line != number:
         raise ValueError(f"expected line {number}, found line {record.line}: lines are missing or doubled")
     return record

@@ -22,8 +22,8 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.files import CAMPAIGN
-from falsifier.record.journal import STOP, holds_lines, holds_run, open_journal, read_journal
-from falsifier.record.records import EndedRecord, EvaluatedRecord
+from falsifier.record.journal import JOURNAL, STOP, holds_run, open_journal, simulated
+from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
@@ -274,7 +274,8 @@ def carry_out(
             )
         if directory is not None and (directory / CAMPAIGN).exists():
             raise JournalError(f"{directory} already contains a campaign: choose another directory")
-        if directory is not None and not begun and holds_lines(directory):
+        left = directory / JOURNAL if directory is not None and not begun else None
+        if left is not None and left.exists() and left.stat().st_size:
             raise JournalError(
                 f"{directory} contains a journal without its manifest, so its run is unknown: "
                 "choose another directory, or delete it"
@@ -353,8 +354,7 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
     """The limits of a run that is continued with others; what it has spent stays spent."""
     if not isinstance(given, Budget):
         given = replace(budget, simulations=whole("budget", given, least=1))
-    records = read_journal(place)
-    spent = sum(isinstance(record, EvaluatedRecord) for record in records)
+    spent = simulated(place)
     if given.simulations is not None and given.simulations < spent:
         raise SpecError(
             f"{place}: this run has {counted(spent, 'simulation')} already, which count in the budget of "
