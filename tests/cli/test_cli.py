@@ -1,4 +1,5 @@
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ import click
 import pytest
 
 from falsifier.cli import cli
+from falsifier.core.files import bundled
 from tests.command import ROOT, falsifier
 
 
@@ -25,6 +27,9 @@ from tests.command import ROOT, falsifier
         (["run", "python:json:dumps"], "dumps() raised TypeError: dumps() missing 1 required"),
         (["run", "python:gone_module:problem"], "start the command line with python -m falsifier"),
         (["run", "python:tests.problems:gone"], "expected python:MODULE:NAME that can be imported"),
+        (["run", "pr\udce9f.toml:R"], "pr\\xe9f.toml:R: the name is not valid UTF-8; rename the file"),
+        (["check", "m\udce9.fmu", "--stl", "x <= 1"], "m\\xe9.fmu: the name is not valid UTF-8"),
+        (["run", "AT1", "--context", "\udce9.md"], "\\xe9.md: the name is not valid UTF-8"),
         (["init", "AT.fmu", "--out", "gone/x.toml"], "no such folder gone"),
         (["tools", "build", "AT", "--out", "gone/x.fmu"], "no such folder gone"),
         (["tools", "build", "AT", "--out", "/dev/null"], "/dev/null is not a file that can be replaced"),
@@ -85,6 +90,20 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert message in done.err
     assert "Traceback" not in done.err
     assert done.out == ""
+
+
+def test_files_whose_names_are_not_utf_8_are_told_before_anything_is_written(tmp_path: Path) -> None:
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / "\udce9.fmu")
+    (tmp_path / "\udce9.csv").write_text("time,throttle,brake\n0,10,0\n50,10,0\n")
+    run = ("run", "AT1", "--out", "new", "--budget", "1")
+    for arguments in (
+        ("init", "\udce9.fmu", "--out", "new"),
+        (*run, "--inputs", "\udce9.csv"),
+        (*run, "--allow", "read:\udce9.csv"),
+    ):
+        done = falsifier(*arguments, cwd=tmp_path)
+        assert (done.code, "the name is not valid UTF-8; rename" in done.err) == (2, True), done.err
+    assert not (tmp_path / "new").exists()
 
 
 IMPORTED = """

@@ -1,7 +1,9 @@
 """The one way to search, as users call it."""
 
 import json
+import sys
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from time import perf_counter, sleep
 from typing import Any
@@ -10,6 +12,7 @@ import pytest
 from numpy import int64
 
 from falsifier.core.files import bundled
+from falsifier.counterexamples.store import changes_since
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
@@ -178,6 +181,27 @@ class TestResume:
         for name in ("easy", "impossible"):
             falsify(f"python:tests.problems:{name}", "corners", budget=2, directory=tmp_path / name)
         assert [r.problem.name for r in resume(tmp_path)] == ["EASY", "NEVER"]
+
+    @pytest.mark.parametrize("here", [True, False])
+    def test_a_module_that_has_changed_is_refused(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: bool
+    ) -> None:
+        (tmp_path / "cwd").mkdir()
+        monkeypatch.chdir(tmp_path if here else tmp_path / "cwd")
+        monkeypatch.syspath_prepend(tmp_path)
+        name = f"changing_{here}"
+        file = tmp_path / f"{name}.py"
+        file.write_text("from tests.problems import impossible as problem\n")
+        falsify(f"python:{name}:problem", "corners", budget=2, directory=tmp_path / "run")
+        digest = sha256(file.read_bytes()).hexdigest()
+        assert manifest.read(tmp_path / "run").hashes == {file.name if here else str(file): digest}
+        assert resume(tmp_path / "run", budget=3)[0].spent.simulations == 3
+        file.write_text("from tests.problems import easy as problem\n")
+        with pytest.raises(JournalError, match=rf"{name}\.py has changed since the start"):
+            resume(tmp_path / "run", budget=4)
+        said = changes_since(manifest.read(tmp_path / "run").origin, load_problem(f"python:{name}:problem"))
+        assert list(said) == [f"{name}.py has changed since it was stored"]
+        monkeypatch.delitem(sys.modules, name)
 
     def test_what_was_made_in_python_must_be_given_again(self, tmp_path: Path) -> None:
         falsify(lag_problem(), "uniform", budget=2, directory=tmp_path / "problem")
