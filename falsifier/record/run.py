@@ -218,7 +218,8 @@ def resume(
 def runs_in(directory: Path) -> list[Path]:
     """Return a run directory, or those in a folder; JournalError if they are not of one spec and its FMUs."""
     found = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
-    if any(manifest.read(place).hashes != manifest.read(found[0]).hashes for place in found):
+    known = [hashes for place in found if (hashes := manifest.read(place).hashes)]  # none if made in Python
+    if any(hashes != known[0] for hashes in known):
         manifest.check_no_folder(directory)
     return found or [directory]
 
