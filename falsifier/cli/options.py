@@ -124,9 +124,17 @@ def policy_options(command: Function) -> Function:
     )
 
 
-_CHANGES = (
-    *("values", "ranges", "stop_time", "output_interval", "time_limit", "interface", "omit", "allow", "deny"),
-)
+_CHANGES = [
+    "values",
+    "ranges",
+    "stop_time",
+    "output_interval",
+    "time_limit",
+    "interface",
+    "omit",
+    "allow",
+    "deny",
+]
 
 
 def changes_in(options: dict[str, Any]) -> "ModelChanges":

@@ -42,9 +42,8 @@ class Database:
     def save(self, problem: Problem, stored: StoredCounterexample) -> Path:
         """Write a counterexample; one with the same candidate is overwritten."""
         key = repr(Candidate.from_json(stored.candidate).key)
-        return save(
-            stored, self.place(problem.name, problem.source) / f"{sha256(key.encode()).hexdigest()[:8]}.json"
-        )
+        place = self.place(problem.name, problem.source)
+        return save(stored, place / f"{sha256(key.encode()).hexdigest()[:8]}.json")
 
     def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
         """Yield the stored counterexamples of a problem, by file name."""

@@ -284,10 +284,8 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                 stated["value"] = variable.literals[section.value]
             elif isinstance(section.value, str) and variable.kind != "string":
                 items = f" or one of {', '.join(variable.literals)}" if variable.literals else ""
-                raise SpecError(
-                    f"expected a number{items}, got {section.value!r}; to search a range: "
-                    f"{searching(kind, name)}"
-                )
+                got, to_search = f"got {section.value!r}", f"to search a range: {searching(kind, name)}"
+                raise SpecError(f"expected a number{items}, {got}; {to_search}")
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:
