@@ -71,10 +71,7 @@ def in_existing_folder(path: Path) -> Path:
 
 
 def saved(file: Path, write: Callable[[Path], object]) -> list[Path]:
-    """Write a file of what was computed; return its path.
-
-    No path if it cannot be written, which is said on stderr: the rest of a result is worth having.
-    """
+    """Write a file of what was computed; return its path, or none and a message if that fails."""
     try:
         write(file)
     except (OSError, FalsifierError) as error:

@@ -124,17 +124,8 @@ def policy_options(command: Function) -> Function:
     )
 
 
-_CHANGES = [
-    "values",
-    "ranges",
-    "stop_time",
-    "output_interval",
-    "time_limit",
-    "interface",
-    "omit",
-    "allow",
-    "deny",
-]
+_EXPERIMENT = ("stop_time", "output_interval", "time_limit", "interface")
+_CHANGES = ("values", "ranges", *_EXPERIMENT, "omit", "allow", "deny")
 
 
 def changes_in(options: dict[str, Any]) -> "ModelChanges":
