@@ -8,6 +8,7 @@ every start and the package takes time to import.
 import re
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 _DEFAULT_BUDGET = 100
 _DEFAULT_DATABASE = "counterexamples"
 _OPTIONS = ("budget", "engine", "seed", "strict", "database")
-_NUMBERS = ("budget", "seed")
+_NUMBERS = {"budget": (1, 10_000_000), "seed": (0, 2**63)}
 # Files of other tools, whatever they contain.
 _FOREIGN = frozenset(
     f"{name}.toml"
@@ -110,7 +111,9 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
     if not parent.config.getoption("falsifier") or file_path.suffix != ".toml":
         return None
     if not parent.session.isinitpath(file_path):
-        if file_path.name in _FOREIGN:
+        # pytest also looks at the neighbours of a file that is given.
+        is_asked_for = any(map(parent.session.isinitpath, file_path.parents))
+        if file_path.name in _FOREIGN or not is_asked_for:
             return None
         tables, fault = _tables(file_path)
         if "requirements" not in tables:
@@ -133,18 +136,23 @@ def _tables(file: Path) -> tuple[list[str], str]:
     from falsifier.core.literals import one_line
     from falsifier.problem.spec import Spec
 
-    content, fault = b"", ""
+    content, fault, hollow = b"", "", set[str]()
     try:
         content = file.read_bytes()
         data = tomllib.loads(content.decode("utf-8-sig"))
         keys = [key for key, value in data.items() if isinstance(value, dict)]
+        # As packages are listed: requirements of a spec are tables of their own.
+        hollow = {k for k in keys if data[k] and not any(isinstance(v, dict) for v in data[k].values())}
     # ValueError: also not UTF-8, and integers of any length; RecursionError: nested without end.
     except (OSError, ValueError, RecursionError) as error:
         fault = one_line(f"it cannot be read as TOML ({error})")
         keys = _WORDS.findall(content.decode("utf-8-sig", "replace"))
     known = list(Spec.model_fields)
-    near = (get_close_matches(key.lower(), known, 1, _NEAR) for key in dict.fromkeys(keys))
-    return list(dict.fromkeys(name for names in near for name in names)), fault
+    found = []
+    for key in dict.fromkeys(keys):
+        for name in get_close_matches(key.lower(), known, 1, _NEAR):
+            found.append(f"{key} of values" if name == "requirements" and key in hollow else name)
+    return found, fault
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -332,16 +340,17 @@ def _setting(config: pytest.Config, name: str) -> Any:
     """Value from the command line, otherwise from the ini file, otherwise None."""
     key = f"falsifier_{name}"
     stated = config.getoption(key)
-    if stated is not None:
-        return stated
     try:
-        found = config.getini(key) or None
+        found = (config.getini(key) or None) if stated is None else stated
     except (ValueError, TypeError, pytest.UsageError) as error:
         raise pytest.UsageError(f"{key}: {error}") from None
-    try:
-        return int(found) if found is not None and name in _NUMBERS else found
-    except ValueError:
-        raise pytest.UsageError(f"{key}: expected a whole number, got {found!r}") from None
+    if found is None or name not in _NUMBERS:
+        return found
+    least, most = _NUMBERS[name]
+    with suppress(ValueError):
+        if least <= (number := int(found)) <= most:
+            return number
+    raise pytest.UsageError(f"{key}: expected a whole number from {least} to {most}, got {found!r}")
 
 
 def _database(config: pytest.Config, stated: Any) -> Path:

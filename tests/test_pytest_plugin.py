@@ -252,8 +252,9 @@ def test_a_counterexample_that_cannot_be_stored_or_drawn_is_shown(repository: Pa
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
-        ("budget", "abc", "a whole number, got 'abc'"),
-        ("seed", "x", "a whole number, got 'x'"),
+        ("budget", "abc", "a whole number from 1 to 10000000, got 'abc'"),
+        ("budget", "99999999999", "a whole number from 1 to 10000000, got '99999999999'"),
+        ("seed", "-1", "a whole number from 0 to .*, got '-1'"),
         ("strict", "x", "x"),
     ],
 )
@@ -280,7 +281,16 @@ formula = "y >= -1"
 def test_a_budget_of_nothing_is_refused_like_any_other_wrong_one(repository: Path) -> None:
     for budget in ("0", "-5"):
         done = run_pytest(repository, "--falsifier", "specs", "--falsifier-budget", budget)
-        assert done.code == 1 and f"at least 1, got {budget}" in done.out, done.out
+        assert done.code == 4 and f"from 1 to 10000000, got {budget}" in done.err, done.err
+
+
+def test_lists_of_packages_and_files_that_are_not_asked_for_are_no_errors(repository: Path) -> None:
+    (repository / "specs" / "tool.toml").write_text("[requirements]\nnumpy = '>1'\n")
+    alone = run_pytest(repository, "--falsifier", "specs/car.toml", "--co")
+    assert alone.code == 0 and "tool.toml" not in alone.out, alone.out
+    folder = run_pytest(repository, "--falsifier", "specs", "--co")
+    assert folder.code == 0 and "tool.toml is not collected: it has tables of a spec" in folder.out
+    assert "(requirements of values)" in folder.out
 
 
 def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None:

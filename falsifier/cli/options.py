@@ -205,7 +205,7 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
             "--omit",
             multiple=True,
             metavar="OUTPUT",
-            help="Output not to record, such as one that becomes NaN and that no formula names. Repeatable.",
+            help="Output not to record unless a formula names it, such as one that becomes NaN. Repeatable.",
         ),
         policy_options,
     )

@@ -6,7 +6,7 @@ from contextlib import suppress
 from math import isfinite
 from numbers import Real
 from operator import index
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, SupportsIndex, TypeVar
 
@@ -51,7 +51,7 @@ def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> 
     instance(name, given, (str, PathLike), expected)
     if not given:
         raise SpecError(f"{name}: expected {expected}, got an empty text")
-    return Path(given)
+    return Path(utf_8(fspath(given)))
 
 
 def utf_8(path: str) -> str:

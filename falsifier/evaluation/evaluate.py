@@ -135,7 +135,7 @@ def simulate(
         driven = read_inputs(Path(driven), info).signals
     if isinstance(driven, Candidate):
         driven, values = driven.signals, {**driven.parameters, **values}
-    instance("inputs", driven, Mapping, "signals or numbers by name, such as {'u': 1.0}")
+    instance("inputs", driven, Mapping, "numbers or signals by name, a CSV file or a candidate")
     instance("parameters", values, Mapping, "numbers by name, such as {'p': 1.5}")
     known = [v.name for v in info.inputs]
     settable = [v.name for v in info.variables if v.settable and v.causality != "input"]

@@ -150,7 +150,10 @@ def test_only_what_is_searched_is_evaluated(candidate: Candidate, message: str) 
         ({"u": None}, "inputs.u: .*got None"),
         ({"u": float("nan")}, "inputs.u: .*got nan"),
         ({"u": "1"}, "inputs.u: .*got '1'"),
-        (([0, 10], [0, 1]), "inputs: expected signals or numbers by name, .*tuple"),
+        (
+            ([0, 10], [0, 1]),
+            "inputs: expected numbers or signals by name, a CSV file or a candidate, .*tuple",
+        ),
     ],
 )
 def test_what_is_no_signal_is_named(inputs: Any, message: str) -> None:

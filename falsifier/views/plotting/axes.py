@@ -7,6 +7,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import shortened
 
@@ -71,7 +72,9 @@ def save_figure(figure: "Figure", path: Path) -> None:
     """Write a figure; the file extension determines the format."""
     # By which our pictures are told from others, so that these are not replaced.
     key = "Software" if path.suffix.lower() == ".png" else "Creator"
-    _save(figure, path, dpi=130, metadata={key: "falsifier"})
+    buffer = BytesIO()
+    _save(figure, buffer, format=path.suffix[1:].lower(), dpi=130, metadata={key: "falsifier"})
+    write_whole(path, buffer.getvalue())
 
 
 def png(figure: "Figure", *, dpi: int) -> bytes:
@@ -91,7 +94,7 @@ def svg(figure: "Figure") -> bytes:
     return buffer.getvalue()
 
 
-def _save(figure: "Figure", place: Path | BytesIO, **options: Any) -> None:
+def _save(figure: "Figure", place: BytesIO, **options: Any) -> None:
     """Draw a figure; characters that the font lacks, as in names of signals, become boxes without a word."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
