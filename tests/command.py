@@ -18,8 +18,9 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def listen_to_interrupts() -> None:
-    """Before a child starts: shells let background jobs ignore Ctrl-C, and children inherit that."""
+    """Before a child starts: background jobs and nohup ignore signals, which children inherit."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @dataclass(frozen=True)
