@@ -197,6 +197,11 @@ def written(option: str, argument: str) -> str:
     return option if reader() == "command line" else argument
 
 
+def refusal(error: OSError) -> str:
+    """Say which file the operating system refused, and why."""
+    return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+
+
 def setting(name: str, value: str = "") -> str:
     """Return how the reader names a setting that is an option and an argument of the same name, or states it.
 

@@ -117,8 +117,9 @@ def explain(
         lines, content = _map(case, run, rights, budget or MAP_BUDGET, out)
     else:
         lines, content = _explain(case, run, rights)
-    only_drawn = all(name.endswith(".png") for name in content.get("files", ()))
-    code = INTERRUPTED if content.get("interrupted") else 3 if shrunk and only_drawn else 0
+    only_drawn = shrunk and all(name.endswith(".png") for name in content["files"])
+    is_lost = only_drawn or (mapped and content["picture"] is None)  # what was to be written
+    code = INTERRUPTED if content.get("interrupted") else 3 if is_lost else 0
     conclude(as_shown("\n".join(lines), content, as_json=as_json), code)
 
 

@@ -92,19 +92,20 @@ class Trajectory:
         k = self.index(time)
         return {name: float(column[k]) for name, column in self.columns.items()}
 
-    def save(self, place: Path | IO[bytes]) -> None:
-        """Write the trajectory, without its log, to a numpy archive (``.npz``), whole or not at all."""
-        if isinstance(place, Path):
-            buffer = BytesIO()
-            self.save(buffer)
-            write_whole(place, buffer.getvalue())
-            return
+    def save(self, path: Path) -> None:
+        """Write the content to a file, whole or not at all."""
+        write_whole(path, self.content())
+
+    def content(self) -> bytes:
+        """Return the trajectory, without its log, as a numpy archive (``.npz``)."""
+        buffer = BytesIO()
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
         stacked = (
             np.stack([self.columns[n] for n in self.names]) if self.columns else np.empty((0, len(self)))
         )
-        np.savez(place, times=self.times, names=names, units=units, columns=stacked)
+        np.savez(buffer, times=self.times, names=names, units=units, columns=stacked)
+        return buffer.getvalue()
 
     @classmethod
     def load(cls, place: Path | IO[bytes]) -> "Trajectory":

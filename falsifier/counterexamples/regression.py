@@ -22,7 +22,7 @@ from falsifier.counterexamples.store import (
     save,
     to_store,
 )
-from falsifier.errors import SimulationError
+from falsifier.errors import SimulationError, refusal
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Problem
@@ -112,7 +112,7 @@ def check(
     try:
         file = database.save(problem, to_store(found)) if database and found else None
     except OSError as error:  # what was found is worth more than its file
-        return Checked(problem, found, None, replayed, result, f"{error.filename}: {error.strerror}")
+        return Checked(problem, found, None, replayed, result, refusal(error))
     return Checked(problem, found, file, replayed, result)
 
 

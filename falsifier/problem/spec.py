@@ -39,6 +39,7 @@ from falsifier.problem.template_arguments import Template
 from falsifier.problem.templates import TEMPLATES
 
 Section = TypeVar("Section", bound=BaseModel)
+Profiles = dict[str, ProfileSection]
 # Names that we choose stand in messages, tables and titles.
 NAME_IN_LINES = "expected a name of one line without control characters"
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
@@ -85,13 +86,11 @@ class Spec(Strict):
     requirements: dict[str, AnyRequirement] = Field(
         min_length=1, description="What to falsify, as [requirements.NAME]."
     )
-    profiles: dict[str, ProfileSection] = Field(default_factory=dict)
+    profiles: Profiles = Field(default_factory=dict)
 
     @field_validator("profiles")
     @classmethod
-    def _are_required(
-        cls, found: dict[str, ProfileSection], stated: ValidationInfo
-    ) -> dict[str, ProfileSection]:
+    def _are_required(cls, found: Profiles, stated: ValidationInfo) -> Profiles:
         known = stated.data.get("requirements", {})
         for profile, section in found.items():
             if unknown := next((name for name in section.requirements if name not in known), None):

@@ -98,9 +98,7 @@ def save_trajectory(directory: Path, index: int, trajectory: Trajectory) -> str:
         OSError: if it cannot be written, or the folder of trajectories is gone.
     """
     (directory / TRAJECTORIES).stat()  # else a run directory that was moved would be made again
-    buffer = BytesIO()
-    trajectory.save(buffer)
-    content = buffer.getvalue()
+    content = trajectory.content()
     name = f"{TRAJECTORIES}/{index}-{checksum(content)}.npz"
     write_whole(directory / name, content)
     return name

@@ -11,8 +11,7 @@
 Lines are written before and after every simulation and after every reply of a language model. A last line
 that a crash left incomplete is dropped when the journal is opened again. The manifest and every line end with
 a checksum, lines are numbered and name their run, and SUM in the name of a trajectory is that file's
-checksum: damage is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops what is not
-intact.
+checksum: damage is noticed. ``manifest`` and ``files`` have the other files; ``repair`` drops damage.
 """
 
 import os

@@ -10,7 +10,7 @@ from time import perf_counter
 from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
-from falsifier.errors import ChatError, SpecError
+from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
@@ -99,9 +99,6 @@ def search(
 
 class _CannotRecordError(Exception):
     """The machine refuses to record what happens; what has happened until then is the result."""
-
-    def __init__(self, error: OSError) -> None:
-        super().__init__(f"{error.filename}: {error.strerror}" if error.filename else str(error))
 
 
 # A candidate that is being simulated, or will be when it is waited for, and whose engine suggested it.
@@ -355,7 +352,7 @@ class _Loop:
             for listener in self.listeners:
                 listener(event)
         except OSError as error:
-            raise _CannotRecordError(error) from error
+            raise _CannotRecordError(refusal(error)) from error
 
     def emit_last(self, event: Event) -> None:
         """Announce what ends the search: it counts even if the machine can no longer record it."""

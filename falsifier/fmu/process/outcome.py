@@ -18,7 +18,7 @@ _TEXTS: Mapping[int, str] = {
     Where.STEPPING: f"the step {{returned}} {_BEFORE}",
     Where.GETTING: f"reading the outputs {{returned}} {_BEFORE}",
     Where.EVENT: _EVENT,
-    Where.TERMINATED: f"the FMU terminated the simulation {_BEFORE}; a stop_time before that judges the rest",
+    Where.TERMINATED: f"the FMU terminated the simulation {_BEFORE}; a shorter stop_time can be judged",
     Where.STUCK: f"the FMU makes no progress: its events never end {_BEFORE}",
     Where.TOO_SMALL: (
         "no step is small enough: the derivatives are NaN, infinite or discarded, or change too fast "

@@ -130,7 +130,7 @@ def simulate(
     outputs, log = REGISTRY.runner(order).simulate(plan, given_values(plan, inputs, parameters))
     columns = dict(zip(plan.outputs, outputs, strict=True))
     if not np.isfinite(outputs).all():
-        check_finite(plan.model, plan.times, columns, hint="; omit leaves out what no formula names")
+        check_finite(plan.model, plan.times, columns, hint="; omit it if no formula names it")
     return Trajectory(plan.times, columns, plan.units, log)
 
 

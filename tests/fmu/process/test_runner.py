@@ -53,7 +53,7 @@ def misdeeds() -> Iterator[FmuModel]:
         (ABORT, "crashed", "signal SIGABRT; its last message: assertion failed: pressure > 0"),
         (EXIT, "crashed", "it exited with code 7"),
         (ALLOCATE, "failed", "the step returned error at t = 0.5 s.*no memory for the table"),
-        (NAN, "failed", "output 'y' is nan at t = 0.6 s; omit leaves out what no formula names"),
+        (NAN, "failed", "output 'y' is nan at t = 0.6 s; omit it if no formula names it"),
         (DISCARD, "failed", "the step returned discard at t = 0.5 s, before the stop time 1 s"),
         (END, "failed", "the step returned discard at t = 0.5 s"),
         (ERROR, "failed", "the step returned error at t = 0.5 s.*the tank is empty"),
