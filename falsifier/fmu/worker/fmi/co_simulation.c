@@ -7,8 +7,12 @@
 /* Early returns at one time, or rounds of one event iteration, after which the FMU is considered stuck. */
 #define MOST_ROUNDS 1000
 
+enum { DISCARD = 2, LAST_SUCCESSFUL_TIME_2 = 2, TERMINATED_2 = 3 };
+
 typedef unsigned (*step_1)(void *, double, double, char);
 typedef unsigned (*step_2)(void *, double, double, int);
+typedef unsigned (*boolean_status_2)(void *, int, int *);
+typedef unsigned (*real_status_2)(void *, int, double *);
 typedef unsigned (*step_3)(void *, double, double, uint8_t, uint8_t *, uint8_t *, uint8_t *, double *);
 
 /* Iterate events in FMI 3's event mode until nothing changes any more. */
@@ -80,6 +84,19 @@ static struct outcome advance_3(struct fmu *fmu, double start, double end, int *
     }
 }
 
+/* What a step of FMI 2 that was discarded means: the FMU may want to end, and may have done the step. */
+static struct outcome discarded_2(struct fmu *fmu, double end, int *ends)
+{
+    boolean_status_2 terminated = (boolean_status_2)fmu_function(fmu, "GetBooleanStatus");
+    real_status_2 successful = (real_status_2)fmu_function(fmu, "GetRealStatus");
+    double reached = -1.0;
+    *ends = terminated && terminated(fmu->instance, TERMINATED_2, ends) <= 1 && *ends;
+    if (!*ends)
+        return (struct outcome){DISCARD, STEPPING};
+    int is_known = successful && successful(fmu->instance, LAST_SUCCESSFUL_TIME_2, &reached) <= 1;
+    return (struct outcome){0, is_known && end - reached <= 1e-9 * fmax(1.0, fabs(end)) ? DONE : TERMINATED};
+}
+
 /* Do one communication step; ends says whether the FMU ends the simulation. */
 struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
 {
@@ -89,7 +106,7 @@ struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
     unsigned status = fmu->major == 2
                           ? ((step_2)fmu->step.do_step)(fmu->instance, start, end - start, 1)
                           : ((step_1)fmu->step.do_step)(fmu->instance, start, end - start, 1);
-    return checked(status, STEPPING);
+    return fmu->major == 2 && status == DISCARD ? discarded_2(fmu, end, ends) : checked(status, STEPPING);
 }
 
 /* Look up what is called in every step. */

@@ -35,8 +35,7 @@
 
 struct process {
     _Atomic uint64_t asked, answered;
-    pid_t parent, id;
-    int status; /* with which it has ended */
+    pid_t parent;
     size_t plan_bytes; /* of a request behind this structure */
     struct exchange exchange;
     double numbers[];
@@ -50,10 +49,11 @@ static void nap(long nanoseconds)
     nanosleep(&(struct timespec){0, nanoseconds}, NULL);
 }
 
-/* Wait until a counter reaches a number; return 0 if the process that counts has ended. */
-static int await(struct process *p, _Atomic uint64_t *counter, uint64_t number)
+/* Wait until a counter reaches a number; return 0 if the process that counts has ended: that of a component, then
+ * with its status, or its parent. */
+static int await(struct component *c, _Atomic uint64_t *counter, uint64_t number, int *status)
 {
-    int is_master = counter == &p->answered;
+    pid_t parent = c->process->parent;
     for (int k = 0; k < LOOKS; k++) {
         if (atomic_load_explicit(counter, memory_order_acquire) == number)
             return 1;
@@ -63,7 +63,7 @@ static int await(struct process *p, _Atomic uint64_t *counter, uint64_t number)
     for (long length = FIRST_NAP; atomic_load_explicit(counter, memory_order_acquire) != number;) {
         nap(length);
         length = length + length / 32 < LONGEST_NAP ? length + length / 32 : LONGEST_NAP;
-        if (is_master ? waitpid(p->id, &p->status, WNOHANG) != 0 : getppid() != p->parent)
+        if (c->id ? waitpid((pid_t)c->id, status, WNOHANG) != 0 : getppid() != parent)
             return atomic_load_explicit(counter, memory_order_acquire) == number;
     }
     return 1;
@@ -99,7 +99,8 @@ static void serve(struct component *c)
 {
     struct process *p = c->process;
     struct exchange *x = c->exchange;
-    while (await(p, &p->asked, atomic_load_explicit(&p->answered, memory_order_relaxed) + 1)) {
+    while (await(c, &p->asked, atomic_load_explicit(&p->answered, memory_order_relaxed) + 1, NULL)) {
+        enum task task = x->task; /* after the answer, that of the next question may be there */
         failing = "";
         if (setjmp(end_of_request))
             x->outcome = (struct outcome){0, IMPOSSIBLE};
@@ -108,7 +109,7 @@ static void serve(struct component *c)
         snprintf(x->text, sizeof x->text, "%s", failing);
         x->memory = most_memory_used();
         count_up(&p->answered);
-        if (x->task == UNLOAD)
+        if (task == UNLOAD)
             break;
     }
     end_process(0);
@@ -124,10 +125,10 @@ void start_process(struct component *c)
     c->process = p;
     c->exchange = &p->exchange;
     p->parent = getpid();
-    p->id = (pid_t)split_process();
-    if (p->id < 0)
+    c->id = split_process(); /* not in what both share: 0 in the new process */
+    if (c->id < 0)
         give_up("components cannot have processes of their own here; use isolation = \"together\"");
-    if (p->id)
+    if (c->id)
         return;
     for (size_t k = 0; k < c->system->count; k++) {
         struct component *other = &c->system->components[k];
@@ -143,7 +144,7 @@ void start_process(struct component *c)
 /* Wait for the end of a process that was asked to unload its library. */
 void end_process_of(struct component *c)
 {
-    waitpid(c->process->id, NULL, 0);
+    waitpid((pid_t)c->id, NULL, 0);
     munmap(c->process, SHARED_BYTES);
     c->process = NULL;
 }
@@ -152,8 +153,9 @@ void end_process_of(struct component *c)
 struct outcome ask_process(struct component *c)
 {
     struct process *p = c->process;
-    if (!await(p, &p->answered, count_up(&p->asked)))
-        end_like(p->status);
+    int status = 0;
+    if (!await(c, &p->answered, count_up(&p->asked), &status))
+        end_like(status);
     struct exchange *x = c->exchange;
     x->text[sizeof x->text - 1] = '\0'; /* the FMU may have written there */
     failing = x->text;

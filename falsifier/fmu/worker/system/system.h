@@ -53,6 +53,7 @@ struct component {
     double *in, *out; /* values that it is given, or that are read from it */
     void *kept_state, *kept_solver;
     struct process *process; /* its own; NULL if it runs in this one */
+    long id; /* of that process */
 };
 
 /* A connected output that is recorded. */
