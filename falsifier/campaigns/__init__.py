@@ -11,9 +11,10 @@ finished, so a campaign that was killed can be resumed from them.
 
 from falsifier.campaigns.archcomp import suite
 from falsifier.campaigns.directory import is_worked_on
-from falsifier.campaigns.progress import Follower, Progress, RunProgress
+from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, Method, cross, method_of, run_name
 from falsifier.campaigns.runner import CampaignEnd, resume_campaign, run_campaign
+from falsifier.campaigns.runs import RunProgress
 
 __all__ = [
     "CampaignEnd",

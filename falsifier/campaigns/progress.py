@@ -12,20 +12,10 @@ from falsifier.campaigns.directory import (
     run_directories,
     run_directory,
 )
-from falsifier.campaigns.request import Method, method_of, method_of_run
-from falsifier.record import manifest
-from falsifier.record.summary import RunFollower, RunStatus, Summary
+from falsifier.campaigns.request import method_of
+from falsifier.campaigns.runs import RunProgress, unread_runs
+from falsifier.record.summary import RunFollower, RunStatus
 from falsifier.search.budget import Spent
-
-
-@dataclass(kw_only=True)
-class RunProgress(Summary):
-    """Progress of one requirement in one run, which need not have started."""
-
-    name: str  # of the run's directory
-    requirement: str
-    method: Method
-    seed: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,18 +73,7 @@ def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
             yield RunFollower(run_directory(directory, name), [run])
         return
     for place in run_directories(directory):
-        described = manifest.read(place)
-        runs = [
-            RunProgress(
-                name=str(place),
-                requirement=name,
-                recorded_as=name,
-                method=method_of_run(described),
-                seed=described.request.seed,
-            )
-            for name in described.names
-        ]
-        yield RunFollower(place, runs)
+        yield RunFollower(place, list[RunProgress](unread_runs(place)))
 
 
 def spent_together(shares: Iterable[tuple[object, Spent]]) -> Spent:

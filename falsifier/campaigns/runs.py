@@ -23,21 +23,34 @@ if TYPE_CHECKING:
     import pandas
 
 
+@dataclass(kw_only=True)
+class RunProgress(Summary):
+    """Progress of one requirement in one run, which need not have started.
+
+    Attributes:
+        name: name of the run's directory.
+        requirement: name of the requirement; numbered if another run has another formula of the same name.
+        method: how it searches.
+        seed: seed of the engine.
+    """
+
+    name: str
+    requirement: str
+    method: Method
+    seed: int
+
+
 @dataclass(eq=False, kw_only=True)
-class Run(Summary):
+class Run(RunProgress):
     """One requirement in one run, read from its directory: its numbers (see Summary) and what was requested.
 
     Attributes:
         directory: run directory.
         manifest: its manifest, reduced to this requirement.
-        method: how it searched.
-        requirement: name of the requirement; numbered if another run has another formula of the same name.
     """
 
     directory: Path
     manifest: Manifest
-    method: Method
-    requirement: str
 
     @property
     def is_ad_hoc(self) -> bool:
@@ -49,11 +62,6 @@ class Run(Summary):
     def counterexample_file(self) -> Path:
         """Path of the counterexample, for ``falsifier replay``, which creates the file if it is missing."""
         return self.directory / file_of(self.manifest.requirement.name, shared=self.method.together)
-
-    @property
-    def seed(self) -> int:
-        """Seed of the engine."""
-        return self.manifest.request.seed
 
     @property
     def simulations(self) -> int:
@@ -122,8 +130,10 @@ def unread_runs(directory: Path) -> list[Run]:
         Run(
             directory=directory,
             manifest=manifest.of(name),
-            method=method_of_run(manifest),
+            name=str(directory),
             requirement=name,
+            method=method_of_run(manifest),
+            seed=manifest.request.seed,
             recorded_as=name,
         )
         for name in manifest.names

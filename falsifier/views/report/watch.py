@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run
 from falsifier.campaigns.directory import is_campaign, is_worked_on, run_directories
-from falsifier.campaigns.progress import Follower, RunProgress
-from falsifier.campaigns.runs import unread_runs
+from falsifier.campaigns.progress import Follower
+from falsifier.campaigns.runs import RunProgress, unread_runs
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.llm.messages import Exchange
