@@ -24,7 +24,7 @@ from falsifier.campaigns.tables import read_published
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import csv_cell
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shortened
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, first_fault
 from falsifier.evaluation.evaluate import evaluate_any
 from falsifier.evaluation.input_file import csv_rows
@@ -120,8 +120,8 @@ def _matrix(text: str) -> Matrix:
     try:
         return np.atleast_2d(np.array([[float(v) for v in row] for row in rows], dtype=np.float64))
     except ValueError:  # no number, or rows of unequal length
-        shown = text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
-        raise ValueError(f"expected numbers such as [0 50; 10 20], got {shown!r}") from None
+        shown = repr(shortened(text, _LONGEST_SHOWN))
+        raise ValueError(f"expected numbers such as [0 50; 10 20], got {shown}") from None
 
 
 class Row(BaseModel):

@@ -11,7 +11,7 @@ from falsifier.context.simulink.comparisons import diagram_thresholds
 from falsifier.context.simulink.diagram import upstream
 from falsifier.context.sources import Source, constants_of, without_annotations
 from falsifier.context.thresholds import Threshold, thresholds
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shortened
 
 _HTML = (".html", ".htm", ".xhtml")
 # What a page does not show, with its tags; where a head ends that stays open. Every pattern takes what it has
@@ -43,7 +43,7 @@ def of_diagram(diagram: Diagram, seeds: Collection[str]) -> Readable:
     forms = (
         (whole, structure_text(diagram, only)),
         ("names only", names_text(diagram)),
-        ("name only", _short(diagram.name)),
+        ("name only", shortened(diagram.name, _LONGEST_NAME)),
     )
     return Readable(forms, (*_modes(diagram), *diagram_thresholds(diagram, only)))
 
@@ -92,10 +92,6 @@ def of_text(text: str, shown: str, signals: Collection[str]) -> Readable:
     return Readable(tuple(form for form in forms if form[1]))
 
 
-def _short(name: str) -> str:
-    return name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}... ({len(name):,} characters)"
-
-
 def _naming(text: str, end: str, signals: Collection[str]) -> Iterator[str]:
     """Return the pieces of a text that name a signal, by the pattern between pieces."""
     names = {name.rpartition(".")[2] for name in signals}
@@ -113,7 +109,7 @@ def _modes(diagram: Diagram) -> Iterator[Threshold]:
         for data in chart.data:
             if data.scope == "output" and states:
                 more = f", ... ({len(states)})" if len(states) > _SHOWN_NAMES else ""
-                listed = ", ".join(map(_short, states[:_SHOWN_NAMES]))
+                listed = ", ".join(shortened(name, _LONGEST_NAME) for name in states[:_SHOWN_NAMES])
                 text = f"set by the chart {chart.name} with the states {listed}{more}"
                 yield Threshold(frozenset([data.name]), text, (), "")
 

@@ -247,9 +247,8 @@ def _influences(values: NDArray[np.float64], robustness: NDArray[np.float64]) ->
     from scipy.stats import rankdata
 
     known = np.isfinite(robustness)
-    if not known.any():
+    if known.sum() < 2:
         return np.zeros(values.shape[1])
-    ranks, level = rankdata(values[known], axis=0), rankdata(robustness[known])
-    ranks, level = ranks - ranks.mean(axis=0), level - level.mean()
-    spread = np.sqrt((ranks**2).sum(axis=0) * (level**2).sum())
-    return np.asarray(np.divide(level @ ranks, spread, out=np.zeros(len(spread)), where=spread > 0))
+    ranks = rankdata(np.column_stack((values, robustness))[known], axis=0)
+    with np.errstate(invalid="ignore"):  # what does not vary has no correlation
+        return np.asarray(np.nan_to_num(np.corrcoef(ranks, rowvar=False)[-1, :-1]))

@@ -78,13 +78,12 @@ def _sources(system: BlockSystem, fed: Mapping[str, str]) -> Mapping[str, Mappin
     inports, outports = set(system.ports("Inport")), set(system.ports("Outport"))
     found: dict[str, dict[str, str]] = {}
     for wire in system.wires:
-        if wire.source is not None:
-            outport = next((end.block for end in wire.targets if end.block in outports), "")
-            own = wire.source.block if wire.source.block in inports else ""  # before the name of its line
-            inner = own or wire.name or outport or wire.source.block
-            name = values.get(wire.source.block) or fed.get(wire.source.block) or inner
-            for target in wire.targets:
-                found.setdefault(target.block, {})[target.port] = _quoted(name)
+        source = wire.source.block
+        outport = next((end.block for end in wire.targets if end.block in outports), "")
+        own = source if source in inports else ""  # before the name of its line
+        name = values.get(source) or fed.get(source) or own or wire.name or outport or source
+        for target in wire.targets:
+            found.setdefault(target.block, {})[target.port] = _quoted(name)
     return found
 
 

@@ -39,9 +39,9 @@ class End:
 
 @dataclass(frozen=True, slots=True)
 class Wire:
-    """A line from one output, None if it is not connected, to any number of inputs."""
+    """A line from one output to any number of inputs."""
 
-    source: End | None
+    source: End
     targets: tuple[End, ...]
     name: str = ""
 
@@ -58,13 +58,12 @@ class BlockSystem:
         found = [b for b in self.blocks if b.type == kind and not b.is_off]
         return tuple(b.name for b in sorted(found, key=lambda b: b.number))
 
-    def leading(self) -> Mapping[str, Mapping[str, tuple[End, str]]]:
-        """Return what leads to each port of each block: where its line begins, and the line's name."""
-        found: dict[str, dict[str, tuple[End, str]]] = {}
+    def leading(self) -> Mapping[str, Mapping[str, Wire]]:
+        """Return the line that leads to each port of each block."""
+        found: dict[str, dict[str, Wire]] = {}
         for wire in self.wires:
-            if wire.source is not None:
-                for target in wire.targets:
-                    found.setdefault(target.block, {})[target.port] = (wire.source, wire.name)
+            for target in wire.targets:
+                found.setdefault(target.block, {})[target.port] = wire
         return found
 
     def walk(self, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], "BlockSystem"]]:
@@ -140,8 +139,7 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] |
     wanted = {name.rpartition(".")[2].strip("'") for name in signals} | set(signals)
     queue = [place for place in sources if place[-1] in wanted and place[0]]
     for path, system in diagram.root.walk():
-        named = (wire for wire in system.wires if wire.name and wire.name in wanted)
-        queue += [(*path, wire.source.block) for wire in named if wire.source is not None]
+        queue += [(*path, wire.source.block) for wire in system.wires if wire.name and wire.name in wanted]
     if not queue:
         return None
     found: set[BlockPath] = set()
@@ -172,8 +170,9 @@ def _sources(diagram: Diagram) -> Mapping[BlockPath, list[BlockPath]]:
                 found.append(path)
             if block.system is not None and not block.is_off:
                 found += [(*place, name) for name in block.system.ports("Outport")]
-        for name, ends in system.leading().items():
-            sources.setdefault((*path, name), []).extend((*path, end.block) for end, _ in ends.values())
+        for name, wires in system.leading().items():
+            found = sources.setdefault((*path, name), [])
+            found += [(*path, wire.source.block) for wire in wires.values()]
     for chart in diagram.charts:
         for data in chart.data:
             if data.scope == "data_store_memory":

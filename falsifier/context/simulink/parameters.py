@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping
 
+from falsifier.core.words import shortened
+
 _SATURATION = ("LimitOutput", "UpperSaturationLimit", "LowerSaturationLimit")
 # Of these types of blocks, only the parameters below count.
 _BLOCKS = """
@@ -69,7 +71,7 @@ def meaningful(
     if kind not in ("Constant", "SubSystem") or sample not in ("inf", "-1"):
         found["SampleTime"] = sample
     return tuple(
-        (name, _cut(" ".join(value.split())))
+        (name, shortened(" ".join(value.split()), _LONGEST_VALUE))
         for name, value in found.items()
         if value.strip() not in _EMPTY or (name in _KEPT_EVEN_IF_EMPTY and value.strip())
     )
@@ -78,9 +80,3 @@ def meaningful(
 def _is_drawn(name: str, value: str) -> bool:
     """Whether a parameter says how a block is drawn or which types it has; library blocks state dozens."""
     return name in _DRAWN or name.startswith("Mask") or name.endswith(_TYPES) or value.startswith("Inherit")
-
-
-def _cut(value: str) -> str:
-    if len(value) <= _LONGEST_VALUE:
-        return value
-    return f"{value[:_LONGEST_VALUE]} ... ({len(value):,} characters)"

@@ -1,6 +1,6 @@
 """From a file's sections to a diagram: blocks, lines, charts and settings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -86,10 +86,10 @@ class _Systems:
         nodes = [block for block in node.children if block.kind in ("Block", "Reference")]
         names = {block.get("SID"): _in_one_line(block.get("Name")) for block in nodes if block.get("SID")}
         blocks = tuple(self._block(block, path) for block in nodes)
-        wires = tuple(_wire(line, names) for line in node.all("Line"))
+        wires = tuple(_wires(node.all("Line"), names))
         known = {block.name for block in blocks}
         for end in (end for wire in wires for end in (wire.source, *wire.targets)):
-            if end is not None and end.block not in known:
+            if end.block not in known:
                 where = path or "the model"
                 raise SpecError(
                     f"{self.shown}: a line of {where} ends at {end.block!r}, which is no block there"
@@ -132,9 +132,11 @@ def _inputs(below: Node | None) -> tuple[str, ...]:
     return tuple(_in_one_line(p.get("Name")) for p in sorted(ports, key=lambda p: _number(p.get("Port"))))
 
 
-def _wire(line: Node, names: Mapping[str, str]) -> Wire:
-    source = _end(line, "Src", names)
-    return Wire(source, tuple(_targets(line, names)), _in_one_line(line.get("Name")))
+def _wires(lines: Iterable[Node], names: Mapping[str, str]) -> Iterator[Wire]:
+    """The lines that begin at a block; others carry nothing."""
+    for line in lines:
+        if (source := _end(line, "Src", names)) is not None:
+            yield Wire(source, tuple(_targets(line, names)), _in_one_line(line.get("Name")))
 
 
 def _targets(line: Node, names: Mapping[str, str]) -> Iterator[End]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Iterator, Mapping
 
-from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram, End
+from falsifier.context.simulink.diagram import Block, BlockPath, BlockSystem, Chart, Diagram, Wire
 from falsifier.core.words import counted
 
 
@@ -70,15 +70,16 @@ def _block(block: Block) -> str:
     return f"{block.name}: {kind}{number}{f' ({stated})' if stated else ''}{reference}{off}"
 
 
-def _from(leading: Mapping[str, tuple[End, str]]) -> str:
+def _from(leading: Mapping[str, Wire]) -> str:
     # Ports in order; named ones, such as enable, last.
     ports = sorted(leading, key=lambda port: (not port.isdigit(), port.rjust(4)))
-    return f" <- {', '.join(_source(port, *leading[port]) for port in ports)}" if ports else ""
+    return f" <- {', '.join(_source(port, leading[port]) for port in ports)}" if ports else ""
 
 
-def _source(port: str, source: End, name: str) -> str:
+def _source(port: str, wire: Wire) -> str:
+    source = wire.source
     output = "" if source.port == "1" else f":{source.port}"
-    signal = f" '{name}'" if name and name != source.block else ""
+    signal = f" '{wire.name}'" if wire.name and wire.name != source.block else ""
     role = "" if port.isdigit() else f"{port}: "
     return f"{role}{source.block}{output}{signal}"
 
