@@ -187,14 +187,13 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     return other if other.origin == found.origin else found
 
 
-def nearest_miss(directory: Path, requirement: str | None = None) -> Case:
-    """Return the simulation of a run that came nearest to violating a requirement; None: the run's first.
+def nearest_miss(directory: Path, name: str) -> Case:
+    """Return the simulation of a run that came nearest to violating the requirement of this name.
 
     Raises:
         SpecError: if no simulation was judged, or none has a robustness that is not negative.
     """
     described = manifest.read(directory)
-    name = described.names[0] if requirement is None else requirement
     judged = _judged(directory, name)
     misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
     if not judged:

@@ -14,11 +14,11 @@ from pathlib import Path
 from random import uniform
 from time import perf_counter, sleep
 from typing import Any
-from uuid import uuid4
 
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance
+from falsifier.core.files import write_whole
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
@@ -152,13 +152,8 @@ class LiteLLMChat:
         """Keep a valid reply, if the directory can be written: it is paid for, so that the run goes on."""
         if self.cache is None or reply.source == "cache":
             return
-        path = self._place(self.cache, request)
-        # Under a unique name first: several runs may store the same reply at the same time.
-        partial = path.with_name(f"{path.name}.{uuid4().hex}")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            partial.write_text(reply.model_dump_json(indent=1), encoding="utf-8")
-            partial.replace(path)
+        try:  # several runs may store the same reply at the same time
+            write_whole(self._place(self.cache, request), reply.model_dump_json(indent=1))
         except OSError as error:
             _LOG.warning("The reply is not kept for later runs: cannot write to %s (%s).", self.cache, error)
 

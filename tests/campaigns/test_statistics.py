@@ -7,19 +7,6 @@ from falsifier.campaigns.analysis import load, statistics
 from falsifier.campaigns.statistics import bootstrap, wilson
 
 
-@pytest.mark.parametrize(
-    ("successes", "trials", "low", "high"),
-    [  # from the closed formula with z = 1.959964
-        (10, 10, 0.7225, 1.0),
-        (0, 10, 0.0, 0.2775),
-        (5, 10, 0.2366, 0.7634),
-        (1, 10, 0.0179, 0.4042),
-    ],
-)
-def test_wilson_interval(successes: int, trials: int, low: float, high: float) -> None:
-    assert wilson(successes, trials) == pytest.approx((low, high), abs=5e-5)
-
-
 def test_bootstrap_interval_holds_the_mean_and_repeats() -> None:
     values = np.array([1.0, 2.0, 4.0, 8.0, 100.0])
     low, high = bootstrap(values)

@@ -4,7 +4,7 @@ import pytest
 
 from falsifier import falsify
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.case import case_of, known_inputs, nearest_miss
+from falsifier.counterexamples.case import case_of, known_inputs
 from falsifier.counterexamples.store import save, to_store
 from falsifier.errors import CandidateError, JournalError, SpecError
 from falsifier.evaluation.confirm import confirm
@@ -15,7 +15,7 @@ from tests.problems import easy, hard, impossible, unusable
 
 def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path) -> None:
     result = falsify(impossible(), "corners", budget=5, directory=tmp_path)
-    found = nearest_miss(tmp_path)
+    found = case_of(tmp_path)
     assert result.best is not None
     assert found.candidate.key == result.best.candidate.key
     assert (
@@ -64,7 +64,7 @@ def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) ->
 def test_a_system_that_violates_now_is_said_to_have_changed(tmp_path: Path) -> None:
     falsify(impossible(), "corners", budget=2, directory=tmp_path)
     with pytest.raises(SpecError, match="now violates"):
-        nearest_miss(tmp_path).simulated(lag_problem("G[0,10] (x <= 0.1)", name="NEVER"))
+        case_of(tmp_path).simulated(lag_problem("G[0,10] (x <= 0.1)", name="NEVER"))
 
 
 def test_a_csv_file_is_fitted_and_says_where_it_is_from(tmp_path: Path) -> None:
@@ -88,4 +88,4 @@ def test_a_counterexample_file_is_taken_as_it_is(tmp_path: Path) -> None:
 def test_a_run_of_which_nothing_was_judged_has_no_nearest_miss(tmp_path: Path) -> None:
     falsify(unusable(), "uniform", budget=2, directory=tmp_path)
     with pytest.raises(SpecError, match=r"could be judged by .*; falsifier coverage .* says why"):
-        nearest_miss(tmp_path)
+        case_of(tmp_path)

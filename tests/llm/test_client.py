@@ -220,11 +220,12 @@ _TEXTS = [message.content for message in REQUEST.messages]
         ({"prompt_tokens": 7, "completion_tokens": 8, "prompt_tokens_details": {"cached_tokens": "x"}}, 7, 8),
         ({"prompt_tokens": 7, "completion_tokens": 8, "cost": 0.5, "total_tokens": 15}, 7, 8),
         (["many"], None, None),
+        (None, None, None),
     ],
     ids=str,
 )
 def test_counts_of_the_wrong_form_are_counted_here(
-    counts: dict[str, Any], sent: int | None, received: int | None
+    counts: Any, sent: int | None, received: int | None
 ) -> None:
     with serving(Step("some words", usage=counts)) as server:
         reply = LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)

@@ -13,6 +13,7 @@ from bench.replies import odd_replies, outcome
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.llm.conversation import RejectedReplyError
+from falsifier.llm.formalizing import readings_schema
 from falsifier.llm.messages import ChatReply
 from falsifier.llm.replies import ReplyForm
 
@@ -147,9 +148,9 @@ def strict_subset(schema: dict[str, Any]) -> None:
 @pytest.mark.parametrize("free", [True, False])
 @pytest.mark.parametrize("count", [1, 3])
 def test_schema_is_in_the_strict_subset(named: bool, free: bool, count: int) -> None:
-    schema = form_of(named=named, free=free, count=count).schema()
-    assert schema["type"] == "object"
-    strict_subset(schema)
+    for schema in (form_of(named=named, free=free, count=count).schema(), readings_schema()):
+        assert schema["type"] == "object"
+        strict_subset(schema)
 
 
 def test_interpolations_are_those_that_are_possible() -> None:

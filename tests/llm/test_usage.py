@@ -30,17 +30,6 @@ def test_counts_and_cost_are_the_providers_unless_there_is_a_price_of_ones_own()
     assert usage(COUNTED).cost is None, "an unknown price is never zero"
 
 
-@pytest.mark.parametrize(
-    "sent", [None, SimpleNamespace(), SimpleNamespace(prompt_tokens=0, completion_tokens=None)]
-)
-def test_missing_counts_are_estimated_and_only_a_price_of_ones_own_makes_a_cost_of_them(sent: Any) -> None:
-    found = usage(sent, reported=0.0)
-    counted = (count_tokens("x" * 400), count_tokens("y" * 41))
-    assert (found.prompt_tokens, found.completion_tokens, found.estimated) == (*counted, True)
-    assert found.cost is None
-    assert usage(sent, price=PRICE).cost == pytest.approx(PRICE.cost(*counted))
-
-
 NUMBERS = "speed: 0:0 2.5:34.7 5:54.21 20:119.581"
 
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.llm.prompts.numbers import as_signals, bounds, runs
+from falsifier.llm.prompts.numbers import as_signals, bounds
 from falsifier.llm.prompts.published import as_point, as_values
 from falsifier.llm.prompts.view import View
 from falsifier.testing import FREE, START, lag_problem
@@ -57,8 +57,3 @@ def test_printed_bounds_lie_inside_the_range(low: float, width: float) -> None:
         if width > 1e-5 * abs(low):
             printed_low, printed_high = (float(text) for text in bounds(low, low + width, digits))
             assert low <= printed_low <= printed_high <= low + width
-
-
-def test_runs_read_back() -> None:
-    assert runs([1.0] * 20 + [2.0]) == '["1 x 20", 2]'
-    assert runs([1.0] * 10) == f"[{', '.join(['1'] * 10)}]"
