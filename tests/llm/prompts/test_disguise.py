@@ -2,9 +2,9 @@
 
 import json
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
@@ -19,40 +19,19 @@ from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
-from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem
 from tests.engines.support import doubtful
 
-WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|integer"
+WORDS = r"throttle|brake|speed|rpm|gear|mph|ft\.lbf|rev/min|Car|transmission|AT\d|Pos|Ref|magnet|\binteger\b"
 
 
-def text_of(requests: Sequence[ChatRequest]) -> str:
-    return "\n".join(message.content for request in requests for message in request.messages)
-
-
-def asked(name: str, variant: str, replies: Sequence[str]) -> tuple[str, list[Evaluation]]:
-    """What is sent in a run of two samples, the second after a rejected reply."""
-    problem = load_problem(name)
-    chat = ScriptedChat(list(replies))
-    engine = LLMEngine(problem, chat, variant=variant, anonymous=True)
-    done = []
-    for _ in range(2):
-        (candidate,) = engine.ask()
-        done.append(evaluate(problem, candidate))
-        engine.tell(done[-1:])
-    assert len(chat.requests) == 3
-    sent = text_of([*chat.requests, ChatRequest(messages=preview(
-        problem, variant=variant, evaluations=done, anonymous=True))])  # fmt: skip
-    return sent, done
-
-
-def bad_replies(problem: Problem) -> list[str]:
+def bad_replies(first: list[float]) -> list[str]:
     """Replies that are rejected in every way in which names could be told."""
-    size = len(problem.space.dimensions)
     return [
-        json.dumps({"point": [7e5] * size}),
-        json.dumps({"point": [0.5] * (size + 1)}),
-        json.dumps({"point": [0.25] * size}),  # the first sample again
+        json.dumps({"point": [7e5] * len(first)}),
+        json.dumps({"point": [*first, 0.5]}),
+        json.dumps({"point": [0.25] * len(first)}),
+        json.dumps({"point": first}),  # again
         json.dumps({"signals": [{"name": "throttl", "values": [1]}]}),
         json.dumps({"signals": [{"name": "u1", "values": [1]}, {"name": "u1", "values": [1]}]}),
         json.dumps({"signals": [], "parameters": []}),
@@ -61,39 +40,30 @@ def bad_replies(problem: Problem) -> list[str]:
 
 
 @pytest.mark.parametrize(("variant", "anonymous"), [("MP1", False), *((v, True) for v in VARIANTS)])
-@pytest.mark.parametrize("name", ["AT6a", "PulseMeter"])
+@pytest.mark.parametrize("name", ["AT6a", "NN", "PulseMeter"])
 def test_no_name_is_told_that_the_variant_hides(name: str, variant: str, *, anonymous: bool) -> None:
     problem = load_problem(name)
-    first = json.dumps({"point": [0.25] * len(problem.space.dimensions)})
-    if name == "PulseMeter":
-        first = json.dumps({"point": [0, 1] * (len(problem.space.dimensions) // 2)})
-    sent = []
-    for bad in bad_replies(problem):
-        chat = ScriptedChat([first, bad, bad, bad])
+    low, high = problem.space.bounds.T
+    first = low + 0.25 * (high - low)
+    if name == "PulseMeter":  # it is Boolean
+        first = np.resize([0.0, 1.0], len(low))
+    requests, done = list[ChatRequest](), list[Evaluation]()
+    for bad in bad_replies(first.tolist()):
+        chat = ScriptedChat([json.dumps({"point": first.tolist()}), bad, bad, bad])
         engine = LLMEngine(problem, chat, variant=variant, anonymous=anonymous)
-        engine.tell([evaluate(problem, *engine.ask())])
+        done = [evaluate(problem, *engine.ask())]
+        engine.tell(done)
         engine.ask()
-        sent += chat.requests
+        requests += chat.requests
     problem.model.close()
-    told = "\n".join(m.content for r in sent for m in r.messages if m.role != "assistant")
+    assert problem.space.encode(done[0].candidate) == pytest.approx(first, rel=1e-6)
+    again = preview(problem, variant=variant, evaluations=done, anonymous=anonymous)
+    sent = [message for request in requests for message in request.messages] + list(again)
+    told = "\n".join(message.content for message in sent if message.role != "assistant")
     assert "That reply cannot be used" in told
-    names = {n for n in (*problem.space.names, *problem.experiment.outputs)}
-    for name in names:
+    for name in (*problem.space.names, *problem.experiment.outputs):
         assert not re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", told), name
-
-
-@pytest.mark.parametrize(
-    ("name", "variant"), [("AT6a", "MP1"), ("AT51", "MP5"), ("NN", "MP4"), ("AT6a", "MP5")]
-)
-def test_no_real_word_is_told(name: str, variant: str) -> None:
-    space = load_problem(name).space
-    low, high = space.bounds.T
-    points = [low + 0.25 * (high - low), high + 700, (low + high) / 2]
-    sent, done = asked(name, variant, [json.dumps({"point": point.tolist()}) for point in points])
-    assert not re.search(WORDS, sent.replace("Car ", ""))
-    assert "outside its range" in sent or "not in" in sent
-    for evaluation, point in zip(done, (points[0], points[2]), strict=True):
-        assert space.encode(evaluation.candidate) == pytest.approx(point, rel=1e-6)
+    assert not (anonymous and re.search(WORDS, told))
 
 
 def test_candidates_come_back_under_their_names() -> None:
@@ -151,6 +121,6 @@ def test_a_doubt_is_told() -> None:
     engine.doubt(replace(doubtful(problem, violation), outcome="refuted", robustness=0.585, reference=None))
     engine.tell([violation])
     engine.ask()
-    sent = text_of(chat.requests)
+    sent = "\n".join(message.content for request in chat.requests for message in request.messages)
     assert "a second simulation gave robustness +0.585. " in sent
     assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
