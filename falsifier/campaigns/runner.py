@@ -159,7 +159,7 @@ def _work(
         except KeyboardInterrupt:
             stop_all("stopped by the user")
             schedule.run(report, lambda: False)
-    progress = follower.look()
+    progress = Follower(directory).look()  # Ctrl-C may have stopped the other one within a line
     for listener in listeners:
         listener(progress)
     stop.unlink(missing_ok=True)

@@ -1,5 +1,7 @@
+import threading
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -17,6 +19,7 @@ from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.store import load_counterexample, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
+from falsifier.record.records import Record, parse_line
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from tests import problems
@@ -81,6 +84,21 @@ def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> Non
     again = resume_campaign(directory)
     assert again.reason == stopped.reason
     assert again.progress.spent.simulations == stopped.progress.spent.simulations
+
+
+def test_ctrl_c_while_a_journal_is_read_stops_the_campaign_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pressed = iter(["once"])
+
+    def parse(*given: Any) -> Record:
+        if threading.current_thread() is threading.main_thread() and next(pressed, None):
+            raise KeyboardInterrupt
+        return parse_line(*given)
+
+    monkeypatch.setattr("falsifier.record.journal.parse_line", parse)
+    end = run_campaign(request("impossible", seeds=1, budget=100_000), tmp_path)
+    assert (end.reason, end.progress.counts) == ("stopped by the user", {"interrupted": 1})
 
 
 def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path: Path) -> None:
