@@ -4,20 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
+from falsifier.views.report import wording
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather
-from falsifier.views.report.wording import (
-    advice,
-    commands,
-    differences,
-    input_table,
-    limit_facts,
-    margin_beside,
-    parameter_facts,
-    result_text,
-    tried,
-    trouble_lines,
-    unshown_lines,
-)
 from falsifier.views.text import Fact
 
 
@@ -37,7 +25,7 @@ def markdown_report(*directories: Path) -> str:
             else:
                 parts += _verdict(section, where)
     if len(sides) > 1:
-        parts.append(differences(sides).markdown().rstrip())
+        parts.append(wording.differences(sides).markdown().rstrip())
     for side in sides:
         if side.table is not None:
             parts += [f"## Statistics: {markdown_text(side.title)}", side.table.markdown().rstrip()]
@@ -49,7 +37,7 @@ def markdown_report(*directories: Path) -> str:
 
 def _verdict(section: Section, where: str) -> list[str]:
     """What a card of the page shows, without its picture."""
-    result = markdown_text(one_line(result_text(section)))
+    result = markdown_text(one_line(wording.result_text(section)))
     parts = [
         f"## {markdown_text(section.heading)}{where}: {section.status}",
         markdown_text(one_line(section.sentence)),
@@ -58,12 +46,12 @@ def _verdict(section: Section, where: str) -> list[str]:
     if section.shown:
         parts += _found(section.shown[0])
     if section.status != "violated":
-        parts += _listed("What was tried", (f"{name}: {text}" for name, text in tried(section)))
-        parts += _listed("What this does not show", unshown_lines(section))
-    parts += _listed("Incomplete runs and unconfirmed violations", trouble_lines(section))
+        parts += _listed("What was tried", (f"{name}: {text}" for name, text in wording.tried(section)))
+        parts += _listed("What this does not show", wording.unshown_lines(section))
+    parts += _listed("Incomplete runs and unconfirmed violations", wording.trouble_lines(section))
     parts.append(markdown_code(section.formula))
     if section.shown:
-        listing = "\n".join(one_line(command) for _, command in commands(section.shown[0]))
+        listing = "\n".join(one_line(command) for _, command in wording.commands(section.shown[0]))
         parts.append(f"```sh\n{listing}\n```")
     return parts
 
@@ -71,18 +59,18 @@ def _verdict(section: Section, where: str) -> list[str]:
 def _found(shown: Shown) -> list[str]:
     parts = [f"The {shown.what}:"]
     if shown.verdict:
-        parts.append(_facts(limit_facts(shown.verdict, shown.units)))
+        parts.append(_facts(wording.limit_facts(shown)))
     if shown.candidate.signals:
-        parts.append(input_table(shown).markdown().rstrip())
+        parts.append(wording.input_table(shown).markdown().rstrip())
     if shown.candidate.parameters:
-        parts.append(_facts(parameter_facts(shown)))
+        parts.append(_facts(wording.parameter_facts(shown)))
     if shown.explanation:
         parts.append(markdown_text(one_line(shown.explanation)))
     if shown.confirmed:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
-    if beside := margin_beside(shown.verdict, shown.units):
+    if beside := wording.margin_beside(shown):
         parts.append(_facts(beside))
-    parts += [f"{what}: {markdown_code(command)}" for what, command in advice(shown)]
+    parts += [f"{what}: {markdown_code(command)}" for what, command in wording.advice(shown)]
     return parts
 
 

@@ -14,22 +14,9 @@ from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import Html, el, join, picture, table, whole_options
 from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
+from falsifier.views.report import wording
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
-from falsifier.views.report.wording import (
-    advice,
-    commands,
-    differences,
-    input_table,
-    limit_facts,
-    margin_beside,
-    parameter_facts,
-    replay_command,
-    result_text,
-    run_name,
-    tried,
-    trouble_lines,
-    unshown_lines,
-)
+from falsifier.views.report.wording import run_name
 from falsifier.views.text import Fact
 
 if TYPE_CHECKING:
@@ -58,7 +45,7 @@ def html_report(*directories: Path) -> str:
     asking = [sum(s.run.spent.questions > 0 for s in c.shown) for side in sides for c in side.sections]
     most = max(1, _MOST_QUESTIONS // max(1, sum(min(_MOST_TALKS, count) for count in asking)))
     links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in requirements]
-    found = differences(sides)
+    found = wording.differences(sides)
     differing = table(found.header, found.rows, label=found.title) if found.rows else el("p", "Nothing.")
     cards = [_verdicts(sides, name, told, most) for name, told in requirements.items()]
     return document(
@@ -130,16 +117,16 @@ def card_html(section: Section, *, title: str = "", more: Sequence[str]) -> Html
     status = section.status
     found = _found(section.shown[0]) if section.shown else []
     if status != "violated":
-        what = tried(section)
+        what = wording.tried(section)
         found.append(join(el("h3", "What was tried"), facts_html(what)) if what else "")
-        found.append(_lines("What this does not show", unshown_lines(section)))
+        found.append(_lines("What this does not show", wording.unshown_lines(section)))
     return el(
         "article",
         el("h2", title or section.heading, " ", el("span", status, class_="badge")),
         el("p", section.sentence, class_="sentence"),
-        el("p", result_text(section), class_="result"),
+        el("p", wording.result_text(section), class_="result"),
         *found,
-        _lines("Incomplete runs and unconfirmed violations", trouble_lines(section)),
+        _lines("Incomplete runs and unconfirmed violations", wording.trouble_lines(section)),
         *more,
         class_=f"card {status.replace(' ', '-')}",
     )
@@ -165,20 +152,20 @@ def _verdicts(sides: Sequence[Side], name: str, sections: Sequence[Section | Non
 
 def _found(shown: Shown) -> list[str]:
     """What violates, or came nearest: limit and value, picture, inputs, why, and whether it is confirmed."""
-    verdict, named = shown.verdict, f"The {shown.what}"
+    named = f"The {shown.what}"
     if shown.panels:
         names = ", ".join(panel.title for panel in shown.panels)
         seen = drawn(lambda: plot_panels(shown.panels, shown.verdict), f"over time: {names}")
     else:
         lost = "its file is damaged or missing" if shown.is_lost else "its trajectory was not kept"
         seen = el("p", f"{named} is not shown: {lost}.", class_="note")
-    inputs = input_table(shown)
+    inputs = wording.input_table(shown)
     listed = table(inputs.header, inputs.rows, label=inputs.title, numbers=True) if inputs.rows else ""
     if len(inputs.rows) > _MOST_ROWS:
         listed = el("details", el("summary", f"Table of {counted(len(inputs.rows), 'row')}"), listed)
-    parameters = parameter_facts(shown)
+    parameters = wording.parameter_facts(shown)
     return [
-        el("div", facts_html(limit_facts(verdict, shown.units)), class_="limits") if verdict else "",
+        el("div", facts_html(wording.limit_facts(shown)), class_="limits") if shown.verdict else "",
         el("h3", named),
         seen,
         el("h3", "Inputs to enter in a simulator"),
@@ -186,7 +173,7 @@ def _found(shown: Shown) -> list[str]:
         facts_html(parameters) if parameters else "",
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
         facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
-        *(el("p", f"{what}: ", el("code", command), class_="note") for what, command in advice(shown)),
+        *(el("p", f"{what}: ", el("code", how), class_="note") for what, how in wording.advice(shown)),
     ]
 
 
@@ -236,7 +223,7 @@ def _runs(runs: Sequence[Run]) -> Html:
         proposal = run.spent.engine_seconds / max(1, run.simulations)
         asked = ", questions included" if run.spent.questions else ""
         seconds = f"simulation {simulation:.3g}, proposal {proposal:.3g}{asked}" if run.simulations else "–"
-        ended = replay_command(run) if run.falsified else run.reason
+        ended = wording.replay_command(run) if run.falsified else run.reason
         rows.append((run_name(run), run.status, run.spent.simulations_text, robustness, seconds, ended))
     header = ("run", "ended", "simulations", "robustness", "seconds on average", "replay, or why it ended")
     return table(header, rows, label="Runs")
@@ -245,8 +232,8 @@ def _runs(runs: Sequence[Run]) -> Html:
 def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     rationale = shown.candidate.rationale
-    facts = [*margin_beside(shown.verdict, shown.units), *([("rationale", rationale)] if rationale else [])]
-    facts += [(name, el("code", whole_options(command))) for name, command in commands(shown)]
+    facts = [*wording.margin_beside(shown), *([("rationale", rationale)] if rationale else [])]
+    facts += [(name, el("code", whole_options(command))) for name, command in wording.commands(shown)]
     return facts_html(facts)
 
 

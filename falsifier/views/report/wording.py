@@ -1,7 +1,7 @@
 """What a report says of its content: phrases, facts, tables, and commands that repeat what it shows."""
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,6 @@ from falsifier.problem.shorthand import options_from
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.search.request import LLMSettings, RunRequest
-from falsifier.stl import Verdict
 from falsifier.views.analyses_text import tried_facts
 from falsifier.views.report.content import Section, Shown, Side, spent_on
 from falsifier.views.text import Fact, broken_facts, margin_facts, untested
@@ -71,14 +70,14 @@ def result_text(section: Section) -> str:
     return f"no violation found in {count}{untested(f for run in runs for f in run.findings)}"
 
 
-def limit_facts(verdict: Verdict, units: Mapping[str, str]) -> list[Fact]:
+def limit_facts(shown: Shown) -> list[Fact]:
     """Return what broke; without a violation, how near it came."""
-    return broken_facts(verdict) or margin_facts(verdict, units)
+    return broken_facts(shown.verdict) or margin_facts(shown.verdict, shown.units)
 
 
-def margin_beside(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
+def margin_beside(shown: Shown) -> list[Fact]:
     """Return the margin of what broke, also if it was not confirmed; ``limit_facts`` has it of the rest."""
-    return margin_facts(verdict, units) if broken_facts(verdict) else []
+    return margin_facts(shown.verdict, shown.units) if broken_facts(shown.verdict) else []
 
 
 def input_table(shown: Shown) -> Table:
