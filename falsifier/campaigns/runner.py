@@ -23,15 +23,8 @@ from falsifier.evaluation.workers import open_workers
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
 from falsifier.record.journal import STOP, holds_run, open_journal
-from falsifier.record.manifest import (
-    check_in_sight,
-    check_unchanged,
-    describe,
-    environment,
-    file_hashes,
-    write,
-)
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
@@ -70,7 +63,7 @@ def run_campaign(
     problems = check_request(request)
     with campaign_lock(directory):
         check_new(directory)
-        record = CampaignRecord(**environment(), request=request, hashes=_hashes(problems))
+        record = CampaignRecord(**manifest.environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         return _work(directory, record, problems, jobs, tuple(listeners))
 
@@ -94,9 +87,9 @@ def resume_campaign(
     jobs = whole("jobs", jobs, least=1)
     with campaign_lock(directory):
         record = read_campaign(directory)
-        check_in_sight(directory, (run.problems[0] for run in record.request.runs))
+        manifest.check_in_sight(directory, (run.problems[0] for run in record.request.runs))
         problems = _load(record.request.runs)
-        check_unchanged(directory, record.hashes, _hashes(problems))
+        manifest.check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
@@ -144,7 +137,7 @@ def _work(
         keep_recorded(place)
 
     requests = record.request.named()
-    tasks, hashes = [], {source: file_hashes(problem) for source, problem in problems.items()}
+    tasks, hashes = [], {source: manifest.file_hashes(problem) for source, problem in problems.items()}
     for run in follower.look().runs:
         if not run.finished:
             request = requests[run.name]
@@ -208,7 +201,7 @@ def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
 
 
 def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
-    return {path: digest for p in problems.values() for path, digest in file_hashes(p).items()}
+    return {path: digest for p in problems.values() for path, digest in manifest.file_hashes(p).items()}
 
 
 def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
@@ -219,5 +212,5 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     with open_journal(directory, keep=task.request.keep, patience=PATIENCE) as journal:
         if not holds_run(directory):
             method = method_of(task.request).label
-            write(directory, describe(task.request, [task.problem], method, task.hashes))
+            manifest.write(directory, manifest.describe(task.request, [task.problem], method, task.hashes))
         journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent))

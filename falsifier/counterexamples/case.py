@@ -9,16 +9,8 @@ from falsifier.core.arguments import utf_8
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import Fitted, fit
 from falsifier.core.words import counted
-from falsifier.counterexamples.store import (
-    StoredCounterexample,
-    changes_since,
-    counterexample_file,
-    file_of,
-    keep_recorded,
-    load_counterexample,
-    shrunk_file,
-    to_store,
-)
+from falsifier.counterexamples import store
+from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError, written
 from falsifier.evaluation.confirm import Confirmation
@@ -98,7 +90,7 @@ class Case:
 
     def changes(self, problem: Problem) -> list[str]:
         """Say what of the problem has changed since this was recorded."""
-        return list(changes_since(self.origin, problem))
+        return list(store.changes_since(self.origin, problem))
 
     def as_recorded(self, problem: Problem) -> Problem:
         """Return the problem with the formula that this was judged by: it is about no other one."""
@@ -129,7 +121,7 @@ class Case:
         """
         if confirmation.outcome == "refuted":
             raise SpecError(f"{self.place}: {confirmation.reason}")
-        return to_store(confirmation).model_copy(update={"problem": self.source})
+        return store.to_store(confirmation).model_copy(update={"problem": self.source})
 
     def simulated(self, problem: Problem) -> Evaluation:
         """Simulate it again, for its trajectory.
@@ -157,8 +149,8 @@ class Case:
 
 def counterexample_case(place: Path) -> Case:
     """Return the counterexample of a run directory or file; SpecError if there is none or more than one."""
-    file = counterexample_file(place)
-    stored = load_counterexample(file)
+    file = store.counterexample_file(place)
+    stored = store.load_counterexample(file)
     candidate = Candidate.from_json(stored.candidate)
     return Case(file, candidate, stored.problem, stored.allow, stored.deny, stored.origin, stored)
 
@@ -176,13 +168,13 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
         if requirement is not None:
             raise SpecError(f"{place}: not a run directory, of which a requirement can be chosen")
         return counterexample_case(place)
-    keep_recorded(place)
+    store.keep_recorded(place)
     described = manifest.read(place)
     name = _chosen(place, described, requirement)
-    file = place / file_of(name, shared=described.shared)
+    file = place / store.file_of(name, shared=described.shared)
     if not file.exists():
         return nearest_miss(place, name)
-    found, simpler = counterexample_case(file), shrunk_file(file)
+    found, simpler = counterexample_case(file), store.shrunk_file(file)
     other = counterexample_case(simpler) if shrunk and simpler.exists() else found
     return other if other.origin == found.origin else found
 
@@ -206,7 +198,7 @@ def nearest_miss(directory: Path, name: str) -> Case:
     robustness, candidate = min(misses, key=lambda pair: pair[0])
     manifest.check_in_sight(directory, described.request.problems)
     return Case(
-        directory / file_of(name, shared=described.shared),
+        directory / store.file_of(name, shared=described.shared),
         candidate,
         described.of(name).request.source,
         described.allow,
@@ -219,7 +211,7 @@ def nearest_miss(directory: Path, name: str) -> Case:
 
 def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     """Return the requirement that was named, the only one, or the only one with a counterexample."""
-    found = [name for name in described.names if (place / file_of(name, shared=True)).exists()]
+    found = [name for name in described.names if (place / store.file_of(name, shared=True)).exists()]
     if requirement is None and len(found) == 1:
         return found[0]
     return described.of(requirement).requirement.name
@@ -260,7 +252,7 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
                 f"{place}: {found}expected a CSV file of inputs (u.csv), a counterexample.json or a run "
                 "directory"
             )
-        return Candidate.from_json(load_counterexample(place).candidate)
+        return Candidate.from_json(store.load_counterexample(place).candidate)
     names = manifest.read(place).names
     judged = _judged(place, requirement if requirement in names else names[0])
     if not judged:

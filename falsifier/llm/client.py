@@ -22,16 +22,9 @@ from falsifier.core.files import write_whole
 from falsifier.core.secrets import redact, secrets_in, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
+from falsifier.llm import litellm_adapter
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError, UnreadableReplyError, classify
 from falsifier.llm.json_text import without_limits
-from falsifier.llm.litellm_adapter import (
-    check_name,
-    check_options,
-    completed,
-    dropped_parameters,
-    listed_price,
-    load_litellm,
-)
 from falsifier.llm.messages import (
     MODES,
     TOOL_CALL,
@@ -197,7 +190,7 @@ class LiteLLMChat:
         """
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
-        load_litellm()
+        litellm_adapter.load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left
         if left is not None and left <= 0:  # the import above may have taken it
@@ -206,7 +199,7 @@ class LiteLLMChat:
         started = perf_counter()
 
         def ask() -> ChatReply:
-            response = completed(
+            response = litellm_adapter.completed(
                 self.llm,
                 messages=[_sent(m, marks=known(self.llm).marks) for m in request.messages],
                 api_base=self.api_base,
@@ -236,7 +229,7 @@ class LiteLLMChat:
 
     def _lost(self, request: ChatRequest, *, without_reply: int) -> Usage:
         """Usage of a request that brought nothing: the provider charges at least for what was sent."""
-        price = self.price or listed_price(self.llm, api_base=self.api_base)
+        price = self.price or litellm_adapter.listed_price(self.llm, api_base=self.api_base)
         sent = tokens_sent(request, self.llm)
         cost = None if price is None else price.cost(sent, 0)
         return Usage(prompt_tokens=sent, cost=cost, estimated=True, without_reply=without_reply)
@@ -297,7 +290,7 @@ class LiteLLMChat:
 
     def _effective(self, arguments: Mapping[str, Any]) -> dict[str, Any]:
         """What was sent in addition to the messages; ``dropped`` lists what this LLM does not accept."""
-        dropped = dropped_parameters(self.llm, arguments)
+        dropped = litellm_adapter.dropped_parameters(self.llm, arguments)
         omitted = {"effort" if name == "reasoning_effort" else name for name in dropped}
         effective = {k: v for k, v in self.parameters.items() if k not in omitted}
         effective["mode"] = self.mode if "response_format" in arguments else "prompt"
@@ -318,10 +311,10 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
         if api_base is not None:
             raise ChatSetupError(f"{llm}: a model file has a server of its own; drop {setting('api_base')}")
         return
-    check_name(llm)
+    litellm_adapter.check_name(llm)
     check_address(llm, api_base)
     find_key(llm, api_base=api_base)
-    check_options(llm, options or {}, api_base=api_base)
+    litellm_adapter.check_options(llm, options or {}, api_base=api_base)
 
 
 def connect(

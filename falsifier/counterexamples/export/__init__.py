@@ -17,17 +17,9 @@ import shutil
 from pathlib import Path
 
 from falsifier.core.files import file_name
+from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.components import write_components, write_package
 from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
-from falsifier.counterexamples.export.tables import (
-    file_columns,
-    input_table,
-    start_values,
-    write_csv,
-    write_json,
-    write_mat,
-    write_ssv,
-)
 from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, save
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel, System
@@ -47,23 +39,24 @@ def export_counterexample(
     """
     with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
-    table, start = input_table(problem, evaluation.candidate), start_values(problem, evaluation.candidate)
+    candidate = evaluation.candidate
+    table, start = tables.input_table(problem, candidate), tables.start_values(problem, candidate)
     files = [
         save(stored, directory / FILE_NAME),
-        write_json(start, directory / "start_values.json", problem.model),
-        write_ssv(start, problem.name, directory / "start_values.ssv"),
-        write_mat(table, start, directory / "inputs.mat"),
+        tables.write_json(start, directory / "start_values.json", problem.model),
+        tables.write_ssv(start, problem.name, directory / "start_values.ssv"),
+        tables.write_mat(table, start, directory / "inputs.mat"),
     ]
     if table.columns:
-        files.append(write_csv(table, directory / "input.csv", problem.model))
+        files.append(tables.write_csv(table, directory / "input.csv", problem.model))
     if isinstance(problem.model, FmuModel):
         files.append(copied_fmu(problem.model, directory))
     if isinstance(problem.model, System):
         inside = {file.name: file for file in files if file.name in ("input.csv", "start_values.ssv")}
         target = directory / f"{file_name(problem.model.name)}.ssp"
         files.append(write_package(problem.model, problem.experiment.stop_time, inside, target))
-        files += write_components(problem, evaluation.candidate, directory)
-    columns = file_columns(table, problem.model)
+        files += write_components(problem, candidate, directory)
+    columns = tables.file_columns(table, problem.model)
     scripts = {
         "replay.py": replay_script(problem, evaluation, columns),
         "replay.mos": openmodelica_script(problem, start),
