@@ -217,17 +217,14 @@ def fewer_changes(problem: Problem, r: InputRange, signal: Signal) -> Iterator[S
 
 
 def fewer_values(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
-    """Each value replaced, at all its occurrences, by rest, a bound or another of the values."""
+    """Each value replaced, at all its occurrences, by rest, a bound or another of the values.
+
+    Where some of its occurrences stay, a signal is no simpler: it has as many values and changes.
+    """
+    rest, known = rest_value(problem, r), (r.low, r.high, *sorted(set(signal.values)))
     for old in sorted(set(signal.values)):
-        for new in _simple_values(problem, r, signal):
+        for new in dict.fromkeys(known if rest is None else (rest, *known)):
             yield _with_value(signal, old, new)
-
-
-def simple_stretches(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
-    """Each stretch of equal values moved to rest, a bound or another of the values."""
-    for first, end in stretches(signal.values):
-        for new in _simple_values(problem, r, signal):
-            yield with_stretch(signal, first, end, new)
 
 
 def simpler_interpolation(problem: Problem, r: InputRange, signal: Signal) -> Iterator[Signal]:
@@ -279,7 +276,6 @@ PASSES: tuple[Pass, ...] = (
     _of_each(fewer_control_points),
     _of_each(fewer_changes),
     _of_each(fewer_values),
-    _of_each(simple_stretches),
     _of_each(simpler_interpolation),
     rounder_parameters,
     _of_each(rounder_values),
@@ -327,9 +323,3 @@ def _with_value(signal: Signal, old: float, new: float) -> Signal:
 def _with_points(signal: Signal, kept: list[int]) -> Signal:
     times, values = (tuple(part[k] for k in kept) for part in (signal.times, signal.values))
     return replace(signal, times=times, values=values)
-
-
-def _simple_values(problem: Problem, r: InputRange, signal: Signal) -> list[float]:
-    rest = rest_value(problem, r)
-    known = (r.low, r.high, *sorted(set(signal.values)))
-    return list(dict.fromkeys(known if rest is None else (rest, *known)))
