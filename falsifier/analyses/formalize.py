@@ -9,14 +9,9 @@ from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
+from falsifier.llm import formalizing
 from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
-from falsifier.llm.formalizing import (
-    ReadingReply,
-    example_trajectory,
-    formalizing_messages,
-    read_readings,
-    readings_schema,
-)
+from falsifier.llm.formalizing import ReadingReply
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
@@ -135,7 +130,7 @@ def formalize(
         nonlocal readings
         valid: list[Reading] = []
         problems: list[str] = []
-        for number, reply in enumerate(read_readings(text), start=1):
+        for number, reply in enumerate(formalizing.read_readings(text), start=1):
             try:
                 valid.append(_checked_reading(reply, subject, valid))
             except RejectedReplyError as rejection:
@@ -146,8 +141,8 @@ def formalize(
             rejected.extend(problems)
             raise RejectedReplyError("; ".join(problems))
 
-    messages = formalizing_messages(sentence, subject.problem.info, subject.problem.experiment)
-    request = ChatRequest(messages=messages, reply_schema=readings_schema())
+    messages = formalizing.formalizing_messages(sentence, subject.problem.info, subject.problem.experiment)
+    request = ChatRequest(messages=messages, reply_schema=formalizing.readings_schema())
     try:
         converse(chat, request, read, exchanges.append, reasks=reasks)
     except NoValidReplyError:
@@ -226,7 +221,7 @@ def _check_examples(reply: ReadingReply, formula: Formula, problem: Problem) -> 
         (reply.satisfied, "satisfied", "violated"),
         (reply.violated, "violated", "satisfied"),
     ):
-        trajectory = example_trajectory(signals, formula.signals, experiment.times)
+        trajectory = formalizing.example_trajectory(signals, formula.signals, experiment.times)
         try:
             verdict = compiled(formula, experiment.output_interval, experiment.samples).evaluate(trajectory)
         except FalsifierError as error:

@@ -13,15 +13,9 @@ from pathlib import Path
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled, file_name
+from falsifier.counterexamples import store
 from falsifier.counterexamples.shrink import shrink
-from falsifier.counterexamples.store import (
-    Replayed,
-    StoredCounterexample,
-    load_counterexample,
-    replay,
-    save,
-    to_store,
-)
+from falsifier.counterexamples.store import Replayed, StoredCounterexample
 from falsifier.errors import SimulationError, refusal
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.loading import source_file
@@ -43,12 +37,12 @@ class Database:
         """Write a counterexample; one with the same candidate is overwritten."""
         key = repr(Candidate.from_json(stored.candidate).key)
         place = self.place(problem.name, problem.source)
-        return save(stored, place / f"{sha256(key.encode()).hexdigest()[:8]}.json")
+        return store.save(stored, place / f"{sha256(key.encode()).hexdigest()[:8]}.json")
 
     def fetch(self, problem: Problem) -> Iterator[tuple[Path, StoredCounterexample]]:
         """Yield the stored counterexamples of a problem, by file name."""
         for path in sorted(self.place(problem.name, problem.source).glob("*.json")):
-            yield path, load_counterexample(path)
+            yield path, store.load_counterexample(path)
 
     def place(self, name: str, source: ProblemSource | None) -> Path:
         """Folder of a requirement: that of its spec or FMU mirrors the path from beside the database."""
@@ -100,7 +94,7 @@ def check(
     """
     replayed: dict[Path, Replayed] = {}
     for path, stored in database.fetch(problem) if database else ():
-        replayed[path] = again = replay(stored, problem)
+        replayed[path] = again = store.replay(stored, problem)
         if again.status == "violates":
             return Checked(problem, again.confirmation, path, replayed, None)
     result = falsify(problem, engine, budget=budget, seed=seed)
@@ -110,7 +104,7 @@ def check(
         problem, result.counterexample, result.spent.simulations, budget
     )
     try:
-        file = database.save(problem, to_store(found)) if database and found else None
+        file = database.save(problem, store.to_store(found)) if database and found else None
     except OSError as error:  # what was found is worth more than its file
         return Checked(problem, found, None, replayed, result, refusal(error))
     return Checked(problem, found, file, replayed, result)

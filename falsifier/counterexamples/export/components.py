@@ -26,13 +26,8 @@ from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
 from falsifier.core.model import Variable
 from falsifier.core.trajectory import Trajectory
-from falsifier.counterexamples.export.tables import (
-    InputTable,
-    parameter_set,
-    start_values,
-    write_csv,
-    write_json,
-)
+from falsifier.counterexamples.export import tables
+from falsifier.counterexamples.export.tables import InputTable
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.process.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.systems.step_order import late_links
@@ -74,7 +69,7 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
         {**problem.parameters, **candidate.parameters},
         replace(experiment, outputs=tuple(map(network.title, places)), output_interval=step, step_size=None),
     )
-    given = {**dict(system.frame.values), **start_values(problem, candidate)}
+    given = {**dict(system.frame.values), **tables.start_values(problem, candidate)}
     files = []
     for position, member in enumerate(network.members):
         inputs, outputs = _seen(network, position, recorded)
@@ -89,11 +84,11 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
         folder.mkdir(parents=True, exist_ok=True)
         model = FmuModel(member.path, member.interface)
         shutil.copyfile(member.path, folder / member.path.name)
-        files += [folder / member.path.name, write_json(start, folder / "start_values.json", model)]
+        files += [folder / member.path.name, tables.write_json(start, folder / "start_values.json", model)]
         if inputs.columns:
-            files.append(write_csv(inputs, folder / "input.csv", model))
+            files.append(tables.write_csv(inputs, folder / "input.csv", model))
         if outputs.columns:
-            files.append(write_csv(outputs, folder / "outputs.csv", model))
+            files.append(tables.write_csv(outputs, folder / "outputs.csv", model))
             files.append(folder / f"{file_name(member.name)}.toml")
             files[-1].write_text(_spec(member, outputs, start, problem), encoding="utf-8")
     return files
@@ -239,7 +234,7 @@ def _bindings(element: Element, system: System, files: Iterable[str]) -> None:
     bindings = Element(f"{_SSD}ParameterBindings")
     if system.frame.values:
         values = SubElement(SubElement(bindings, f"{_SSD}ParameterBinding"), f"{_SSD}ParameterValues")
-        values.append(parameter_set(dict(system.frame.values), system.name))
+        values.append(tables.parameter_set(dict(system.frame.values), system.name))
     for source in files:
         SubElement(bindings, f"{_SSD}ParameterBinding", {"source": source})
     if len(bindings):

@@ -47,7 +47,7 @@ _GUIDANCE_ON_OUTPUTS = (
 )
 
 
-def published_standing(view: View, variant: Variant, *, count: int = 1) -> str:
+def standing(view: View, variant: Variant, *, count: int = 1) -> str:
     """Return the constant part of a question for so many candidates."""
     named, what = variant.has("names"), view.chosen
     sections = [_TASK.format(what=what if variant.has("requirement") else "values")]
@@ -126,7 +126,7 @@ def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:
     return len(set(signal.values)) == 1 or view.space.is_fixed(r, signal)
 
 
-def published_facts(view: View, variant: Variant, evaluation: Evaluation) -> Iterator[str]:
+def facts(view: View, variant: Variant, evaluation: Evaluation) -> Iterator[str]:
     """Lines on one judged sample: its robustness, what was compared when, and what decided."""
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None

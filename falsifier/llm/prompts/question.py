@@ -15,15 +15,9 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
+from falsifier.llm.prompts import published
 from falsifier.llm.prompts.numbers import as_signals
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
-from falsifier.llm.prompts.published import (
-    MOST_SAMPLES,
-    as_point,
-    as_values,
-    published_facts,
-    published_standing,
-)
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.prompts.view import Variant, View
@@ -128,7 +122,7 @@ class Questions:
         if evaluation.verdict is None and not self._variant.has("failures"):
             return
         if self._variant.is_published:
-            self._samples = [*self._samples, self._published(evaluation, doubt)][-MOST_SAMPLES:]
+            self._samples = [*self._samples, self._published(evaluation, doubt)][-published.MOST_SAMPLES :]
         else:
             sample = self._seen(evaluation, doubt, why)
             self._samples.append(sample)
@@ -178,7 +172,7 @@ class Questions:
 
     def _standing(self, count: int) -> str:
         if self._variant.is_published:
-            return published_standing(self._view, self._variant, count=count)
+            return published.standing(self._view, self._variant, count=count)
         return standing(self._view, self._variant, count=count, start=self._start)
 
     def _lasting(self) -> str:
@@ -186,8 +180,8 @@ class Questions:
             return ""
         left_out = f", {len(self._samples)} of {self._told}" if self._omitted else ""
         # The published prompts count the samples that they show, not all that there were.
-        published = self._variant.is_published
-        numbered = ((n if published else s.number, s) for n, s in enumerate(self._samples, start=1))
+        renumbers = self._variant.is_published
+        numbered = ((n if renumbers else s.number, s) for n, s in enumerate(self._samples, start=1))
         told = (f"Sample {n}: {s.texts[s.depth]}" for n, s in numbered)
         return "\n\n".join((f"Samples so far{left_out}, in the order in which they were simulated:", *told))
 
@@ -268,7 +262,7 @@ class Questions:
         return f"{self._told} of {counted(budget, 'simulation')} spent, {budget - self._told} left. "
 
     def _published(self, evaluation: Evaluation, doubt: str) -> _Sample:
-        robustness, *facts = published_facts(self._view, self._variant, evaluation)
+        robustness, *facts = published.facts(self._view, self._variant, evaluation)
         text = _text(self._chosen(evaluation.candidate), robustness, doubt, *facts)
         return _Sample(self._told, (text,) * 3, (0, 0, 0), _FULL, evaluation.robustness)
 
@@ -339,8 +333,8 @@ class Questions:
         if not self._variant.is_published:
             return as_signals(self._view, candidate)
         if not self._variant.has("names"):
-            return as_point(self._view, candidate)
-        return as_values(self._view, candidate)
+            return published.as_point(self._view, candidate)
+        return published.as_values(self._view, candidate)
 
 
 def _text(inputs: Sequence[str], *lines: str) -> str:
