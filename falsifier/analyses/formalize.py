@@ -10,7 +10,7 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
 from falsifier.llm import formalizing
-from falsifier.llm.conversation import MAX_REASKS, NoValidReplyError, RejectedReplyError, converse
+from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.formalizing import ReadingReply
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
@@ -40,7 +40,7 @@ class Reading:
         meaning: what it means, as the language model says.
         words: the formula said back in words, made from the formula alone.
         problem: the problem with this requirement.
-        nominal: the nominal simulation, judged; None if there was none.
+        nominal: the nominal simulation, judged; None before it.
     """
 
     formula: Formula
@@ -88,22 +88,15 @@ class Formalized:
     spent: Spent
 
 
-def formalize(
-    target: str,
-    sentence: str,
-    llm: Chat | LLMSettings | str,
-    *,
-    reasks: int = MAX_REASKS,
-    nominal: bool = True,
-) -> Formalized:
+def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Formalized:
     """Return what a requirement in words may mean, as formulas.
+
+    They are judged on one simulation with the inputs at their start values.
 
     Args:
         target: an FMU, a spec, one of its requirements, or a bundled name.
         sentence: the requirement.
         llm: the language model: its name, settings, or a chat.
-        reasks: how often readings are asked for again if one of them is invalid.
-        nominal: whether to judge the readings on one simulation with the inputs at their start values.
 
     Raises:
         SpecError: if the target or the sentence cannot be used.
@@ -144,15 +137,14 @@ def formalize(
     messages = formalizing.formalizing_messages(sentence, subject.problem.info, subject.problem.experiment)
     request = ChatRequest(messages=messages, reply_schema=formalizing.readings_schema())
     try:
-        converse(chat, request, read, exchanges.append, reasks=reasks)
+        converse(chat, request, read, exchanges.append)
     except NoValidReplyError:
         if not readings:
             raise
     spent = Spent()
     for exchange in exchanges:
         spent = spent.plus_requests(exchange.requests, exchange.usage)
-    if nominal:
-        readings = _judged(subject, readings)
+    readings = _judged(subject, readings)
     differences = tuple(
         _difference(i, j, readings[i - 1], readings[j - 1])
         for i, j in combinations(range(1, len(readings) + 1), 2)

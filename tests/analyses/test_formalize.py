@@ -88,11 +88,11 @@ def replying(*readings: dict[str, Any]) -> Step:
     return Step(f"I thought about it. {json.dumps({'readings': readings})}")
 
 
-def ask(server: Server, target: str, *steps: Step, sentence: str = "It is slow.", **more: Any) -> Formalized:
+def ask(server: Server, target: str, *steps: Step, sentence: str = "It is slow.") -> Formalized:
     server.script[:] = steps
     server.received.clear()
     llm = LLMSettings(name="openai/gpt-5-mini", api_base=server.url, cache=False, price=(1.0, 2.0))
-    return formalize(target, sentence, llm, nominal=False, **more)
+    return formalize(target, sentence, llm)
 
 
 @pytest.fixture(autouse=True)
@@ -198,11 +198,11 @@ def test_the_same_reading_twice_is_one(server: Server, target: str) -> None:
 def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, target: str) -> None:
     good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
     bad = good | {"formula": "G[0,60] (speed <= 120)"}
-    found = ask(server, target, replying(good, bad), replying(bad), reasks=1)
+    found = ask(server, target, replying(good, bad), replying(bad), replying(bad))
     assert [str(r.formula) for r in found.readings] == [GOOD]
-    assert len(found.rejected) == 2
-    with pytest.raises(ChatError, match="no valid reply in 2 attempts"):
-        ask(server, target, replying(bad), replying(bad), reasks=1)
+    assert len(found.rejected) == 3
+    with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
+        ask(server, target, *[replying(bad)] * 3)
 
 
 def test_readings_on_different_grids_are_told_apart(server: Server, target: str, tmp_path: Path) -> None:

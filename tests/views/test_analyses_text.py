@@ -51,9 +51,7 @@ READINGS = [
 
 
 def test_readings_are_told_with_words_examples_and_cost() -> None:
-    found = formalize(
-        "AT1", "Fast at 10 s.", ScriptedChat([json.dumps({"readings": READINGS})]), nominal=False
-    )
+    found = formalize("AT1", "Fast at 10 s.", ScriptedChat([json.dumps({"readings": READINGS})]))
     text = formalized_text(found)
     for part in (
         "1. F[0,10] (speed >= 80)\n   in words   At some time from 0 to 10 s, speed is at least 80.\n",
@@ -67,7 +65,7 @@ def test_readings_are_told_with_words_examples_and_cost() -> None:
 
 def test_a_reason_that_occurred_again_is_told_once_in_one_line() -> None:
     wrong = json.dumps({"readings": [{**READINGS[0], "formula": "F[0,10] (speed >= 80"}, READINGS[0]]})
-    found = formalize("AT1", "Fast.", ScriptedChat([wrong] * 3), nominal=False)
+    found = formalize("AT1", "Fast.", ScriptedChat([wrong] * 3))
     assert len(found.rejected) > 1
     (line,) = (line for line in formalized_text(found).splitlines() if line.startswith("rejected"))
     assert line.endswith("(position 21); hint: it closes the '(' at position 9")
