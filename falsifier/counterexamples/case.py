@@ -174,7 +174,7 @@ def case_of(place: Path, requirement: str | None = None, *, shrunk: bool = False
     file = place / store.file_of(name, shared=described.shared)
     if not file.exists():
         return nearest_miss(place, name)
-    found, simpler = counterexample_case(file), store.shrunk_file(file)
+    found, simpler = counterexample_case(file), store.beside(file, store.SHRUNK)
     other = counterexample_case(simpler) if shrunk and simpler.exists() else found
     return other if other.origin == found.origin else found
 

@@ -42,6 +42,8 @@ from falsifier.stl.margins import signed
 FILE_NAME = "counterexample.json"
 # What falsifier explain has found out, beside the counterexample's file; reports repeat it.
 EXPLANATION = "explanation.txt"
+# What falsifier explain --shrink makes of a counterexample, beside its file.
+SHRUNK = "shrunk.json"
 
 ReplayStatus = Literal["violates", "fragile", "does not violate", "does not fit"]
 
@@ -103,11 +105,7 @@ class Replayed:
 
 
 def to_store(confirmation: Confirmation) -> StoredCounterexample:
-    """Make the content of the file for a confirmed or fragile violation.
-
-    Raises:
-        ValueError: if the evaluation has no verdict.
-    """
+    """Make the content of the file for a confirmed or fragile violation."""
     problem = confirmation.problem
     return _content(
         problem.name,
@@ -125,8 +123,7 @@ def _content(
     requirement: str, source: ProblemSource | None, evaluation: Evaluation, **recorded: Any
 ) -> StoredCounterexample:
     verdict = evaluation.verdict
-    if verdict is None:
-        raise ValueError("a failed simulation is not a counterexample: expected an evaluation with a verdict")
+    assert verdict is not None, "a failed simulation is not a counterexample"
     return StoredCounterexample(
         requirement=requirement,
         problem=source,
@@ -229,17 +226,12 @@ def file_of(requirement: str, *, shared: bool) -> str:
     return f"counterexample-{file_name(requirement)}.json" if shared else FILE_NAME
 
 
-def shrunk_file(counterexample: Path) -> Path:
-    """Where ``falsifier explain --shrink`` writes what it makes of a counterexample.
+def beside(counterexample: Path, name: str) -> Path:
+    """Path next to a counterexample's file, with its suffix if the directory contains several.
 
-    >>> shrunk_file(Path("run/counterexample-AT1.json")).name
+    >>> beside(Path("run/counterexample-AT1.json"), SHRUNK).name
     'shrunk-AT1.json'
     """
-    return beside(counterexample, "shrunk.json")
-
-
-def beside(counterexample: Path, name: str) -> Path:
-    """Path next to a counterexample's file, with its suffix if the directory contains several."""
     place, (kind, dash, requirement) = Path(name), counterexample.stem.partition("-")
     which = f"{dash}{requirement}" if kind in ("counterexample", "shrunk") else ""
     return counterexample.with_name(f"{place.stem}{which}{place.suffix}")

@@ -30,9 +30,7 @@ _MOST_TICKS = 12
 
 def caption(text: str) -> str:
     """Return a text for a picture: one line, not too long, and without matplotlib's mathematical notation."""
-    line = one_line(text)
-    shown = shortened(line, _LONGEST_CAPTION)
-    return shown.replace("$", r"\$")
+    return shortened(one_line(text), _LONGEST_CAPTION).replace("$", r"\$")
 
 
 def wrapped(text: str, width: int) -> str:

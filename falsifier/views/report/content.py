@@ -12,7 +12,7 @@ from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import in_one_line
-from falsifier.counterexamples.store import EXPLANATION, beside, load_counterexample, shrunk_file
+from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
@@ -182,7 +182,7 @@ def _shrunk(run: Run) -> Shown | None:
 
     None if there is none, or if its formula, FMU or spec is no longer that of the run.
     """
-    file = shrunk_file(run.counterexample_file)
+    file = beside(run.counterexample_file, SHRUNK)
     samples = file.with_suffix(".npz")
     if not run.falsified or not (file.is_file() and samples.is_file()):
         return None

@@ -10,7 +10,7 @@ from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted, listed, with_unit
-from falsifier.counterexamples.store import shrunk_file
+from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from
 from falsifier.problem.source import ProblemSource
@@ -168,7 +168,7 @@ def replay_command(run: Run, *, shrunk: bool = False) -> str:
     """Shell command that replays a run's counterexample, or what it was shrunk to."""
     place = run.counterexample_file if run.method.together else run.directory
     if shrunk:
-        place = shrunk_file(run.counterexample_file)
+        place = beside(run.counterexample_file, SHRUNK)
     return shlex.join(["falsifier", "replay", str(place)])
 
 
