@@ -113,8 +113,7 @@ def _variable(v: Variable) -> str:
     facts += [f"in {v.unit}"] if v.unit else []
     facts += [f"at least {number(low)}"] if low is not None else []
     facts += [f"at most {number(high)}"] if high is not None else []
-    items = ", ".join(f"{n} = {item}" for item, n in v.literals.items())
-    facts += [items] if items else []
+    facts += [v.items_text] if v.items_text else []
     return f"- {v.name} ({', '.join(facts)})" + (f": {v.description}" if v.description else "")
 
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from falsifier.context.values import Context
 from falsifier.core.space import Freedom, InputRange, ParameterRange
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, with_unit
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
@@ -159,9 +159,8 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
     yield "Recorded signals:"
     for name in view.recorded:
         known = view.variable(name)
-        items = ", ".join(f"{n} = {item}" for item, n in known.literals.items())
-        values = items or (known.kind if known.kind in ("integer", "boolean") else "")
-        text = f"- {name}{_bracketed(known.unit)}{values and f', {values}'}{_described(known.description)}"
+        values = known.items_text or (known.kind if known.kind in ("integer", "boolean") else "")
+        text = f"- {with_unit(name, known.unit)}{values and f', {values}'}{_described(known.description)}"
         if name in start:
             low, high = start[name]
             # Some points of the search space show that it depends on these, but not how far it goes.
@@ -195,7 +194,7 @@ def _choice(view: View) -> Iterator[str]:
     yield from _freedom(view)
     for p in view.space.parameters:
         nominal = "" if p.nominal is None else f", nominally {number(p.nominal)}"
-        what = f"- parameter {p.name}{_bracketed(p.unit)}{_described(p.description)}"
+        what = f"- parameter {with_unit(p.name, p.unit)}{_described(p.description)}"
         once = "one value for the whole simulation"
         yield f"{what}; {_values(p)}{nominal}; {once}{_in_files(view, p.name)}"
 
@@ -206,7 +205,7 @@ def _horizon(view: View) -> str:
 
 
 def _input(view: View, r: InputRange) -> str:
-    parts = [f"- input signal {r.name}{_bracketed(r.unit)}{_described(r.description)}", _values(r)]
+    parts = [f"- input signal {with_unit(r.name, r.unit)}{_described(r.description)}", _values(r)]
     if r.control_points == 1:
         parts.append("one value for the whole time")
     else:
@@ -256,10 +255,6 @@ def _values(ranged: InputRange | ParameterRange) -> str:
         return "Boolean, 0 (false) or 1 (true)"
     low, high = bounds(ranged.low, ranged.high, _DIGITS_OF_BOUNDS)
     return f"{'' if ranged.kind == 'real' else 'integers '}from {low} to {high}"
-
-
-def _bracketed(unit: str) -> str:
-    return f" [{unit}]" if unit else ""
 
 
 def _described(description: str) -> str:
