@@ -10,15 +10,8 @@ from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, compiled
-from falsifier.llm.prompts.courses import (
-    MOST_BREAKPOINTS,
-    Array,
-    change_list,
-    course,
-    dwell_list,
-    longest_stretch,
-    oscillations,
-)
+from falsifier.llm.prompts import courses
+from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
@@ -88,10 +81,10 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     predicates = _predicates(view, diagnosis, trajectory, over_time)
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
-    courses = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
+    continuous = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
     few_courses = _continuous(view, evaluation, inside, of=_deciding(view, verdict))
     return Observed(
-        (*reasons, there, *parts, *discrete, *predicates, *courses),
+        (*reasons, there, *parts, *discrete, *predicates, *continuous),
         (*reasons, *parts, *discrete, *few_courses),
         line,
     )
@@ -117,8 +110,8 @@ def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
         if name not in inside.columns or not view.is_discrete(name, inside[name]):
             continue
         clock, label = _clock(view), partial(view.labelled, name)
-        yield f"{name}: {change_list(inside.times, inside[name], clock=clock, label=label)}"
-        stays = dwell_list(inside.times, inside[name], clock=clock, label=label)
+        yield f"{name}: {courses.change_list(inside.times, inside[name], clock=clock, label=label)}"
+        stays = courses.dwell_list(inside.times, inside[name], clock=clock, label=label)
         if name in view.formula_outputs and stays:
             yield f"{name} stays: {stays}"
 
@@ -133,7 +126,7 @@ def _continuous(
     for name, column in columns.items():
         if (of is not None and name not in of) or view.is_discrete(name, column):
             continue
-        most = MOST_BREAKPOINTS if of is None and name in compared else _FEWER_BREAKPOINTS
+        most = courses.MOST_BREAKPOINTS if of is None and name in compared else _FEWER_BREAKPOINTS
         yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
 
 
@@ -183,7 +176,7 @@ def _predicates(
         margin, times = over_time[predicate][asked], trajectory.times[asked]
         start, end = float(times[0]), float(times[-1])
         wrong = margin < 0
-        stretch = longest_stretch(times, wrong)
+        stretch = courses.longest_stretch(times, wrong)
         near = int(np.abs(margin).argmin())
         nearest, closest = float(times[near]), f"{shown(abs(margin[near])):.5g}"
         if stretch is None:
@@ -240,7 +233,7 @@ def _drawn(
     for predicate in view.requirement.formula.predicates:
         if name in map(str, predicate.sides):
             wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
-    return course(
+    return courses.course(
         inside.times,
         column,
         clock=coarse_clock(view.space.stop_time),
@@ -265,7 +258,7 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
             continue
         visible = 10.0 ** -_decimals(view, column, name, verdict.robustness)
         claimed = CLOSE_TOLERANCE * float(np.ptp(part))
-        told = course(
+        told = courses.course(
             inside.times[near],
             part,
             clock=_clock(view),
@@ -283,7 +276,7 @@ def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluati
     assert evaluation.verdict is not None
     critical = evaluation.verdict.critical_time
     reach = _CLOSE_SHARE / 2 * float(times[-1])
-    swings = oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
+    swings = courses.oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
     around = [s for s in swings if s.start <= critical <= s.end]
     if around:
         reach = _CLOSE_PERIODS / 2 * around[0].periods[0]
