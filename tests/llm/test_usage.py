@@ -28,6 +28,7 @@ def test_counts_and_cost_are_the_providers_unless_there_is_a_price_of_ones_own()
     assert (found.cost, found.estimated) == (0.5, False)
     assert usage(COUNTED, price=PRICE, reported=0.5).cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
     assert usage(COUNTED).cost is None, "an unknown price is never zero"
+    assert usage(None, reported=0.0).cost is None, "nor is that of counts that were estimated"
 
 
 NUMBERS = "speed: 0:0 2.5:34.7 5:54.21 20:119.581"

@@ -99,8 +99,8 @@ def number(value: float, digits: int = _BOUND_DIGITS) -> str:
 def runs(values: Sequence[float]) -> str:
     """Numbers in order, long repetitions as runs.
 
-    >>> runs([100.0, 100.0, 0.0]), runs([0.0] * 187 + [1.0])
-    ('[100, 100, 0]', '["0 x 187", 1]')
+    >>> runs([100.0] * 4 + [0.0]), runs([0.0] * 187 + [1.0])
+    ('[100, 100, 100, 100, 0]', '["0 x 187", 1]')
     """
     shortest_run = 4
     parts: list[str] = []
