@@ -19,7 +19,8 @@ def test_a_run_is_loaded_as_it_was(campaign: Path) -> None:
         assert run.simulations == len(evaluations)
         assert run.falsified == (run.counterexample is not None) == (run.requirement == "HARD")
         assert run.verdict == evaluations[int(np.nanargmin(run.robustness))].verdict
-    assert load_run(runs[0].directory).seed == 0
+    assert [run.seed for run in runs] == [0, 1] * 4
+    assert load_run(runs[1].directory).seed == 1
 
 
 def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:

@@ -72,6 +72,7 @@ def test_each_stretch_moves_alone() -> None:
     assert found.axes[0] == 2  # what comes last decides x(10)
 
 
+@pytest.mark.filterwarnings("error")
 def test_what_was_simulated_before_the_user_stopped_it_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     def stopped(after: int) -> RobustnessMap:
         def limited(problem: Problem, candidate: Candidate) -> Evaluation:
@@ -86,6 +87,7 @@ def test_what_was_simulated_before_the_user_stopped_it_is_shown(monkeypatch: pyt
 
     with pytest.raises(KeyboardInterrupt):
         stopped(0)
+    assert set(stopped(1).influences) == {0.0}
     early, late, whole = stopped(20), stopped(150), stopped(200)
     assert (early.interrupted, late.interrupted, whole.interrupted) == (True, True, False)
     assert len(early.robustness) == len(early.values) == 20 and np.isnan(early.surface).all()
