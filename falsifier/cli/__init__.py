@@ -13,6 +13,7 @@ import click
 
 from falsifier import __version__
 from falsifier.cli.output import (
+    FAILED,
     INTERRUPTED,
     end_at_interrupts,
     open_streams,
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 # Exit code that a shell reports for a program whose pipe was closed: 128 + SIGPIPE.
 _PIPE_CLOSED = 141
-_FAILED = 3
 # Set by the shell when it asks for completions; falsifier completes by what click brings.
 _COMPLETES = "_FALSIFIER_COMPLETE"
 # What a machine has run out of, and what to do.
@@ -180,7 +180,7 @@ def _carried_out(arguments: list[str]) -> int:
             cli.invoke(context)
         return 0
     except SystemExit as end:
-        return _FAILED if isinstance(end.code, str) else int(end.code or 0)
+        return FAILED if isinstance(end.code, str) else int(end.code or 0)
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
@@ -200,10 +200,10 @@ def _carried_out(arguments: list[str]) -> int:
         return _report_refusal(error)
     except MemoryError:
         warn("falsifier: not enough memory; free some, or raise the limit (ulimit)")
-        return _FAILED
+        return FAILED
     except Exception:
         warn(f"{traceback.format_exc()}falsifier: this is a defect of falsifier itself; please report it")
-        return _FAILED
+        return FAILED
 
 
 def _report_refusal(error: OSError) -> int:
@@ -216,4 +216,4 @@ def _report_refusal(error: OSError) -> int:
     else:
         warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2
-    return _FAILED
+    return FAILED

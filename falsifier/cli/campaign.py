@@ -50,7 +50,7 @@ from falsifier.cli.options import (
     seed_option,
     total_option,
 )
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import FAILED, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
@@ -236,7 +236,7 @@ def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) 
         shown = shown.only(*shown.header[:-1])
     if cut := tables[table].header[len(shown.header) :]:
         warn(f"too wide for this terminal: {', '.join(cut)}; in {directory / f'table-{table}.md'}")
-    conclude(data if as_json else shown.text(), 3 if failed or outcome.reason else 0, nl=not as_json)
+    conclude(data if as_json else shown.text(), FAILED if failed or outcome.reason else 0, nl=not as_json)
 
 
 def _agree(request: CampaignRequest, *, yes: bool) -> None:

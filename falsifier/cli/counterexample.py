@@ -31,7 +31,7 @@ from falsifier.cli.options import (
     requirement_option,
     run_argument,
 )
-from falsifier.cli.output import INTERRUPTED, as_shown, conclude, say
+from falsifier.cli.output import FAILED, INTERRUPTED, as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
@@ -119,7 +119,7 @@ def explain(
         lines, content = _explain(case, run, rights)
     only_drawn = shrunk and all(name.endswith(".png") for name in content["files"])
     is_lost = only_drawn or (mapped and content["picture"] is None)  # what was to be written
-    code = INTERRUPTED if content.get("interrupted") else 3 if is_lost else 0
+    code = INTERRUPTED if content.get("interrupted") else FAILED if is_lost else 0
     conclude(as_shown("\n".join(lines), content, as_json=as_json), code)
 
 

@@ -15,7 +15,7 @@ from falsifier.cli.llm_options import (
     variant_option,
 )
 from falsifier.cli.options import PATH, json_option, problem_source, requirement_options
-from falsifier.cli.output import as_shown, conclude, say
+from falsifier.cli.output import FAILED, as_shown, conclude, say
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_source
@@ -183,4 +183,4 @@ def check(*, name: str, **options: Any) -> None:
     is_usable = features[0].works
     if not is_usable:
         lines.append("  no usable answer came: a run with this language model would fail")
-    conclude("\n".join(lines), 0 if is_usable else 3)
+    conclude("\n".join(lines), 0 if is_usable else FAILED)

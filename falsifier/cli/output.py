@@ -20,7 +20,7 @@ import click
 from falsifier.core.literals import plain
 from falsifier.views.terminal import warn
 
-INTERRUPTED = 130
+FAILED, INTERRUPTED = 3, 130
 _STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # In s; a signal that follows the first one this soon is the same one, as ``timeout`` sends it to the command
 # and to its group. Ctrl-C is different: who presses it twice is impatient.

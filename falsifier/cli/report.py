@@ -18,7 +18,7 @@ from falsifier.cli.files import (
     write_named,
 )
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
-from falsifier.cli.output import as_shown, say
+from falsifier.cli.output import FAILED, as_shown, conclude, say
 from falsifier.core.files import file_name
 from falsifier.core.literals import csv_text
 from falsifier.core.words import counted
@@ -104,7 +104,7 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     drawn = draw(lambda: plot_coverage(found, name), picture)
     text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
     content = {"requirements": name, **coverage_json(found), "picture": next(map(str, drawn), None)}
-    say(as_shown(text, content, as_json=as_json))
+    conclude(as_shown(text, content, as_json=as_json), FAILED if out and not drawn else 0)
 
 
 def _write_arch_comp(directory: Path, path: Path) -> None:

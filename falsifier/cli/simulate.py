@@ -9,7 +9,7 @@ from typing import Any
 from falsifier.cli.command import command
 from falsifier.cli.files import draw_evaluation, made_folder, saved
 from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
-from falsifier.cli.output import as_shown, conclude
+from falsifier.cli.output import FAILED, as_shown, conclude
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_text, one_line
@@ -26,6 +26,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
+
+# What --out is to hold.
+_FILES = ("trajectory.csv", "input.csv", "trajectory.png")
 
 
 @command()
@@ -90,7 +93,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         "files": list(map(str, files)),
     }
     text = "\n".join(map(one_line, lines))
-    conclude(as_shown(text, content, as_json=as_json), 1 if evaluation.violated else 0)
+    is_lost = out is not None and len(files) < len(_FILES)
+    code = FAILED if is_lost else 1 if evaluation.violated else 0
+    conclude(as_shown(text, content, as_json=as_json), code)
 
 
 def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, float]]:
@@ -141,8 +146,9 @@ def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path
     assert trajectory is not None, "what was judged has a trajectory"
     rows = zip(trajectory.times.tolist(), *(c.tolist() for c in trajectory.columns.values()), strict=True)
     outputs, inputs = [["time", *trajectory.names], *rows], input_table(problem, evaluation.candidate)
+    trajectory_file, input_file, picture = (out / name for name in _FILES)
     return [
-        *saved(out / "trajectory.csv", lambda file: write_whole(file, csv_text(outputs))),
-        *saved(out / "input.csv", lambda file: write_csv(inputs, file, problem.model)),
-        *draw_evaluation(drawn, evaluation, out / "trajectory.png"),
+        *saved(trajectory_file, lambda file: write_whole(file, csv_text(outputs))),
+        *saved(input_file, lambda file: write_csv(inputs, file, problem.model)),
+        *draw_evaluation(drawn, evaluation, picture),
     ]
