@@ -178,7 +178,10 @@ def check(*, name: str, **options: Any) -> None:
     price = price_of(settings) or "unknown"
     variable = key_variable(settings.name)
     key = f"key from {variable}" if variable else "no key needed"
-    lines = [f"{settings.name}: {key}; price: {price}; {counted(usage.tokens, 'token')} for this check"]
+    where = f" at {settings.api_base}" if settings.api_base else ""
+    lines = [
+        f"{settings.name}{where}: {key}; price: {price}; {counted(usage.tokens, 'token')} for this check"
+    ]
     lines += [f"  {'ok ' if f.works else 'no '} {f.name}: {f.said}" for f in features]
     is_usable = features[0].works
     if not is_usable:

@@ -38,7 +38,16 @@ from falsifier.llm.messages import (
     cleaned,
 )
 from falsifier.llm.model_file import check_model_file, is_model_file, served
-from falsifier.llm.providers import check_address, find_key, first_mode, known
+from falsifier.llm.providers import (
+    check_address,
+    check_option_values,
+    find_key,
+    first_mode,
+    known,
+    provider_of,
+    server_address,
+    stated_address,
+)
 from falsifier.llm.transport import UnusableReplyError, within
 from falsifier.llm.usage import Price, tokens_sent, usage_of
 
@@ -55,6 +64,8 @@ DEFAULT_TIMEOUT = 600.0
 _MOST_UNREADABLE = 2
 # Characters of the name of a tool that are told.
 _LONGEST_NAME = 60
+# Providers whose server is that of OpenAI.
+_OF_OPENAI = ("openai", "text-completion-openai")
 # In s; the longest that a socket can wait is 2**31 ms.
 _LONGEST_TIMEOUT = 2e6
 
@@ -202,14 +213,15 @@ class LiteLLMChat:
             response = litellm_adapter.completed(
                 self.llm,
                 messages=[_sent(m, marks=known(self.llm).marks) for m in request.messages],
-                api_base=self.api_base,
+                api_base=server_address(self.llm, self.api_base),
                 timeout=timeout,
                 **{"api_key": key, **arguments},
             )
             return self._reply(request, response, arguments, perf_counter() - started)
 
         try:
-            return cleaned(within(timeout if left is None else min(timeout, left), ask), secrets)
+            seconds = timeout if left is None else min(timeout, left)
+            return cleaned(within(seconds, ask, never=_not_to(self.llm)), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
                 error, llm=self.llm, api_base=self.api_base, secrets=secrets, options=self.options
@@ -313,7 +325,9 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
         return
     litellm_adapter.check_name(llm)
     check_address(llm, api_base)
+    server_address(llm, api_base)
     find_key(llm, api_base=api_base)
+    check_option_values(options or {})
     litellm_adapter.check_options(llm, options or {}, api_base=api_base)
 
 
@@ -334,7 +348,7 @@ def connect(
         llm: PROVIDER/MODEL as litellm names it, or the path of a model file (GGUF).
         effort: reasoning effort: ``none``, ``minimal``, ``low``, ``medium`` or ``high``; what the LLM does
             not take is left out, and the record says so.
-        api_base: address of the server, if it is not the provider's own.
+        api_base: address of the server, if it is not the provider's own or that of the environment.
         options: further parameters of litellm's ``completion``.
         price: what the LLM costs; None: litellm's table.
         timeout: seconds to wait for one reply.
@@ -348,6 +362,7 @@ def connect(
     own = served(llm) if is_model_file(llm) else None
     if own is not None:
         llm, api_base, price = own.name, own.address, price or Price(0.0, 0.0)
+    api_base = stated_address(llm, api_base)
     return LiteLLMChat(
         llm=llm,
         effort=effort,
@@ -360,6 +375,11 @@ def connect(
         attempts=attempts,
         cache=cache,
     )
+
+
+def _not_to(llm: str) -> frozenset[str]:
+    """Hosts that are not those of an LLM's server: litellm sends to OpenAI's if it knows no other one."""
+    return frozenset() if provider_of(llm) in _OF_OPENAI else frozenset({"api.openai.com"})
 
 
 def _sent(message: Message, *, marks: bool) -> dict[str, Any]:

@@ -134,8 +134,8 @@ def classify(
     The ``options`` are those that the user passes on, by name.
     """
     provider, address = known(llm), server_address(llm, api_base)
-    where = f"{llm} at {redact(api_base, secrets)}: " if api_base else f"{llm}: "
-    if _is_refused(error) and (urlsplit(address).hostname or "") in _THIS_MACHINE:
+    where = f"{llm} at {redact(address, secrets)}: " if address else f"{llm}: "
+    if address and _is_refused(error) and (urlsplit(address).hostname or "") in _THIS_MACHINE:
         start = f"the server with '{provider.start}'" if provider.start else "the LLM's server"
         return TransientChatError(
             f"{llm}: nothing is listening at {redact(address, secrets)}: start {start}, "

@@ -27,7 +27,7 @@ from inspect import signature
 from typing import Any
 
 from falsifier.errors import ChatError, ChatSetupError, did_you_mean, written
-from falsifier.llm.providers import PROVIDERS, known, provider_of
+from falsifier.llm.providers import PROVIDERS, known, provider_of, stated_address
 from falsifier.llm.transport import guarded_client
 from falsifier.llm.usage import Price
 
@@ -117,7 +117,7 @@ def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
 
     Another server under a listed name has its own prices, unless it is the user's own machine.
     """
-    if api_base is not None and not known(llm).local:
+    if stated_address(llm, api_base) is not None and not known(llm).local:
         return None
     try:
         info = load_litellm().get_model_info(llm)
@@ -143,7 +143,12 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
     if "timeout" in options:
         raise ChatSetupError("timeout: state it beside the options, which also limits slow replies")
     provider = provider_of(llm)
-    is_own = api_base is not None or known(llm).local or not known(llm).keys or provider in _ROUTERS
+    is_own = (
+        stated_address(llm, api_base) is not None
+        or known(llm).local
+        or not known(llm).keys
+        or provider in _ROUTERS
+    )
     if not options or is_own:
         return
     taken = _options_of(llm)
@@ -151,8 +156,8 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
         if name not in taken:
             given = written(f"--llm-option {name}", name)
             raise ChatSetupError(
-                f"{given}: {provider} has no such option; {did_you_mean(name, taken)}. What litellm "
-                "does not know can be sent in Python as options={'extra_body': {...}}"
+                f"{given}: {provider} has no such option; {did_you_mean(name, sorted(taken))}. What litellm "
+                "does not know can be sent in Python: connect(NAME, options={'extra_body': {...}})"
             )
 
 

@@ -3,12 +3,13 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import isfinite
 from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
 from falsifier.core.secrets import holds_credentials
-from falsifier.errors import ChatSetupError, setting
+from falsifier.errors import ChatSetupError, setting, written
 from falsifier.llm.messages import Mode
 
 
@@ -19,7 +20,7 @@ class Provider:
     # Environment variables that may contain its key, the usual one first; empty: none is needed.
     keys: tuple[str, ...] = ()
     local: bool = False  # runs on the user's own machine, so a price of zero is correct
-    address: str = ""  # default address of its server, for messages
+    address: str = ""  # default address of its server; litellm has none for some
     start: str = ""  # command that starts its server, for messages
     openai_client: bool = False  # served through the OpenAI client, which silently retries by default
     defaults: Mapping[str, Any] = field(default_factory=dict)  # sent unless the user states them
@@ -74,6 +75,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
 
 # Sent if an OpenAI-compatible server needs no key, because its client insists on one.
 NO_KEY = "none"
+_ADDRESS_FORM = "http://HOST:PORT/v1 or https://..."
 
 
 def provider_of(llm: str) -> str:
@@ -99,15 +101,33 @@ def check_address(llm: str, api_base: str | None) -> None:
     if holds_credentials(api_base):
         raise ChatSetupError(
             f"{setting('api_base')}: an address with a user name, a password or a key would be recorded; "
-            f"drop it, and put the whole address into the environment variable {_address_variable(llm)}"
+            "drop it, and put the whole address into the environment variable "
+            f"{_address_variables(llm)[-1]}"
         )
+    if not _is_address(api_base):
+        raise ChatSetupError(f"{setting('api_base')} {api_base}: expected {_ADDRESS_FORM}")
+
+
+def _is_address(text: str) -> bool:
     try:
-        parts = urlsplit(api_base)
-        is_address = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+        parts = urlsplit(text)
+        return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
-        is_address = False
-    if not is_address:
-        raise ChatSetupError(f"{setting('api_base')} {api_base}: expected http://HOST:PORT/v1 or https://...")
+        return False
+
+
+def check_option_values(options: Mapping[str, Any]) -> None:
+    """Refuse numbers that no request or record can contain, and limits of tokens that are none.
+
+    Raises:
+        ChatSetupError: naming the option.
+    """
+    for name, value in options.items():
+        option = written(f"--llm-option {name}", name)
+        if isinstance(value, float) and not isfinite(value):
+            raise ChatSetupError(f"{option}: expected a finite number, got {value}")
+        if name in ("max_tokens", "max_completion_tokens") and (type(value) is not int or value < 1):
+            raise ChatSetupError(f"{option}: expected an integer from 1 on, got {value!r}")
 
 
 def find_key(llm: str, *, api_base: str | None = None) -> str | None:
@@ -121,10 +141,8 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     """
     provider = known(llm)
     if variable := key_variable(llm):
-        return os.environ[variable].strip()
-    # Azure has no address of its own, so that a stated one says nothing about the key.
-    address = api_base if provider_of(llm) == "azure" else server_address(llm, api_base)
-    if provider.openai_client and (address or provider.local):
+        return _sendable(variable)
+    if provider.openai_client and (stated_address(llm, api_base) or provider.local):
         return NO_KEY
     if provider.keys and api_base is None:
         variables = " or ".join(provider.keys)
@@ -132,24 +150,60 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     return None
 
 
+def _sendable(variable: str) -> str:
+    """The key in a variable; ChatSetupError if no HTTP header can contain it, as with typographic quotes."""
+    key = os.environ[variable].strip()
+    for position, character in enumerate(key, start=1):
+        if not " " <= character <= "~":
+            raise ChatSetupError(
+                f"{variable} in the environment: character {position} of {len(key)} ({character!r}) cannot "
+                "be part of a key; copy the key again"
+            )
+    return key
+
+
 def key_variable(llm: str) -> str:
     """Environment variable that contains a key for this LLM; empty if none does."""
     return next((name for name in known(llm).keys if os.environ.get(name, "").strip()), "")
 
 
-def server_address(llm: str, api_base: str | None) -> str:
-    """Address of an LLM's server: as stated, from the environment, or the provider's default.
+def stated_address(llm: str, api_base: str | None) -> str | None:
+    """Address of an LLM's server as the user states it, here or in the environment; None: the provider's.
 
-    Empty if only the client library knows it.
+    Raises:
+        ChatSetupError: if the environment states none; naming the variable.
     """
-    return api_base or os.environ.get(_address_variable(llm), "") or known(llm).address
+    # An address of Azure is the provider's own: there is no other.
+    if api_base or provider_of(llm) == "azure":
+        return api_base
+    variable = next((name for name in _address_variables(llm) if os.environ.get(name, "").strip()), None)
+    if variable is None:
+        return None
+    address = os.environ[variable].strip()
+    if not _is_address(address):
+        raise ChatSetupError(f"{variable} in the environment: expected {_ADDRESS_FORM}")
+    return address
 
 
-def _address_variable(llm: str) -> str:
-    """Environment variable in which the client library looks for a server's address."""
+def server_address(llm: str, api_base: str | None) -> str | None:
+    """Address of an LLM's server: as stated, or the provider's default; None if only litellm knows it.
+
+    Raises:
+        ChatSetupError: if it is a server of the user's own, and nothing says where.
+    """
+    address = stated_address(llm, api_base) or known(llm).address
+    if known(llm).start and not address:
+        variable = _address_variables(llm)[-1]
+        raise ChatSetupError(f"{llm}: where is the server? state {setting('api_base')}, or set {variable}")
+    return address or None
+
+
+def _address_variables(llm: str) -> tuple[str, ...]:
+    """Environment variables in which litellm looks for a server's address, the first one first."""
     # A campaign's settings hold for several LLMs and are made without a name.
     provider = "OLLAMA" if known(llm) is _OLLAMA else provider_of(llm).upper() or "OPENAI"
-    return f"{provider}_API_BASE"
+    others = (f"{provider}_BASE_URL",) if provider in ("OPENAI", "ANTHROPIC") else ()
+    return (*others, f"{provider}_API_BASE")
 
 
 def first_mode(llm: str) -> Mode:

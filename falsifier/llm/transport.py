@@ -14,7 +14,7 @@ import os
 import re
 import socket
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar, copy_context
 from http.cookiejar import CookieJar, DefaultCookiePolicy
@@ -43,6 +43,7 @@ _LONGEST_BEGINNING = 80
 _WITHIN = "the connection was cut within the reply"
 _CUT = "the server or a proxy before it ended it; its log says why"
 _ADDRESS = "check host, port and http or https in the server's address"
+_OWN_ADDRESS = "state the address of your server"
 _NO_LLM = f"that is no server of a language model; {_ADDRESS}"
 # How httpx and what it stands on tell a failure, by words of it, and what causes and cures it.
 _FAULTS = (
@@ -84,15 +85,17 @@ class UnusableReplyError(BrokenReplyError):
     """An LLM's server answered, so that the request is paid for, but with nothing that can be used."""
 
 
-def within(seconds: float, action: Callable[[], T]) -> T:
+def within(seconds: float, action: Callable[[], T], *, never: Collection[str] = ()) -> T:
     """Return what an action returns, or give it up after so many seconds and cut its connections.
+
+    Nothing is sent to the hosts ``never``.
 
     Raises:
         TimeoutError: if it has not returned by then.
         RefusedReplyError: if a server's reply was refused.
         BrokenReplyError: if the action failed because of the connection, or of a reply that is not readable.
     """
-    call = _Call()
+    call = _Call(never)
     outcome: SimpleQueue[tuple[T | None, BaseException | None]] = SimpleQueue()
 
     def work() -> None:
@@ -148,7 +151,8 @@ def _is_importing(thread: Thread) -> bool:
 class _Call:
     """The connections of one call, why a reply was refused, and what was wrong with the last one."""
 
-    def __init__(self) -> None:
+    def __init__(self, never: Collection[str]) -> None:
+        self.never = never
         self.refusal = ""
         self.fault: BrokenReplyError | None = None
         self._lock = Lock()
@@ -219,6 +223,8 @@ class _Guarded(httpx.BaseTransport):
             return self._plain.send(request, stream=True)
         if call.has_ended:  # litellm looks up prices and the like in threads that outlive the call
             raise httpx.TransportError("the call has ended")
+        if request.url.host in call.never:
+            call.refuse(f"nothing was sent: it would have gone to {request.url.host}; {_OWN_ADDRESS}")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.

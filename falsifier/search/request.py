@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from falsifier.core.secrets import holds_credentials, is_secret_option
 from falsifier.llm import Effort
 from falsifier.llm.model_file import is_model_file
-from falsifier.llm.providers import check_address
+from falsifier.llm.providers import check_address, check_option_values, stated_address
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 
@@ -49,6 +49,20 @@ class LLMSettings(Strict):
     anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _address_of_environment(cls, given: Any, info: ValidationInfo) -> Any:
+        """Take the address from the environment, unless it is read from a record or contains a password.
+
+        So a run that is continued, or repeated elsewhere, asks the same server.
+        """
+        is_new = info.mode == "python" and isinstance(given, dict) and given.get("api_base") is None
+        if not (is_new and isinstance(name := given.get("name"), str) and name):
+            return given
+        address = stated_address(name, None)
+        is_secret = address is not None and holds_credentials(address)
+        return given if is_secret else {**given, "api_base": address}
+
     @model_validator(mode="after")
     def _without_password(self) -> Self:
         check_address(self.name, self.api_base)
@@ -74,6 +88,7 @@ class LLMSettings(Strict):
                     f"{name}: contains a user name or a password, and requests are recorded; state them in "
                     "the environment"
                 )
+        check_option_values(options)
         return options
 
 

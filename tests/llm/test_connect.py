@@ -5,11 +5,14 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
-from falsifier.llm.client import connect, preflight
+from falsifier.llm import litellm_adapter
+from falsifier.llm.client import LiteLLMChat, connect, preflight
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.make_engines import price_of
+from falsifier.search.request import LLMSettings
 from tests.llm.support import Served
 
 
@@ -31,7 +34,8 @@ def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
         ("lm_studio/x", None, {}, NO_KEY),
         ("llamafile/x", None, {}, NO_KEY),
         ("ollama_chat/x", None, {}, None),
-        ("hosted_vllm/x", None, {}, None),
+        ("hosted_vllm/x", "http://127.0.0.1/v1", {}, None),
+        ("openai/mine", None, {"OPENAI_API_BASE": "http://127.0.0.1/v1"}, NO_KEY),
         ("anthropic/x", "http://127.0.0.1", {}, None),
     ],
 )
@@ -95,7 +99,91 @@ def test_a_server_is_where_it_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:1")
     assert server_address("ollama_chat/x", None) == "http://127.0.0.1:1"
     assert server_address("ollama_chat/x", "http://127.0.0.1:2") == "http://127.0.0.1:2"
-    assert server_address("openai/x", None) == ""
+    assert server_address("openai/x", None) is None
+    monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:3")
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:4")  # which litellm looks at first
+    assert server_address("openai/x", None) == "http://127.0.0.1:4"
+    monkeypatch.setenv("OPENAI_BASE_URL", "127.0.0.1:4")
+    with pytest.raises(
+        ChatSetupError, match=r"^OPENAI_BASE_URL in the environment: expected http://HOST:PORT"
+    ):
+        connect("openai/x")
+
+
+@pytest.mark.parametrize(
+    ("llm", "variable", "value", "address"),
+    [
+        ("lm_studio/x", "UNUSED", "", "http://localhost:1234/v1"),
+        ("llamafile/x", "UNUSED", "", "http://127.0.0.1:8080/v1"),
+        ("ollama_chat/x", "UNUSED", "", "http://localhost:11434"),
+        ("hosted_vllm/x", "HOSTED_VLLM_API_BASE", "http://127.0.0.1:9/v1", "http://127.0.0.1:9/v1"),
+    ],
+)
+def test_prompts_are_sent_to_the_server_that_is_meant(
+    llm: str, variable: str, value: str, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def sent(llm: str, **arguments: object) -> None:
+        raise ConnectionError(f"to {arguments['api_base']}")
+
+    for name in ("LM_STUDIO_API_BASE", "LLAMAFILE_API_BASE", "OLLAMA_API_BASE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(variable, value)
+    monkeypatch.setattr(litellm_adapter, "completed", sent)
+    with pytest.raises(ChatError, match=f"^{llm} at {address}: .*to {address}$"):
+        connect(llm, attempts=1).send(QUESTION)  # type: ignore[attr-defined]
+
+
+def test_a_server_of_the_users_own_must_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("HOSTED_VLLM_API_BASE", raising=False)
+    with pytest.raises(ChatSetupError, match=r"where is the server.* or set HOSTED_VLLM_API_BASE"):
+        connect("hosted_vllm/x")
+
+
+def test_no_prompt_of_another_provider_goes_to_openai() -> None:
+    """Its library would take it for its own if no address is named."""
+    with pytest.raises(ChatError, match=r"nothing was sent: it would have gone to api\.openai\.com"):
+        connect("custom_openai/x", options={"api_key": "k"}, attempts=1).complete(QUESTION)
+
+
+@pytest.mark.parametrize(
+    ("options", "wrong"),
+    [
+        ({"top_p": float("nan")}, "top_p: expected a finite number, got nan"),
+        ({"max_tokens": "many"}, "max_tokens: expected an integer from 1 on, got 'many'"),
+        ({"max_tokens": 0}, "max_tokens: expected an integer from 1 on, got 0"),
+        ({"max_completion_tokens": 2.5}, "max_completion_tokens: expected an integer from 1 on, got 2.5"),
+    ],
+)
+def test_an_option_with_a_value_that_cannot_be_sent_or_kept_is_refused(
+    options: dict[str, str | float], wrong: str
+) -> None:
+    with pytest.raises(ChatSetupError, match=f"^{wrong}"):
+        connect("ollama_chat/x", options=options)
+    with pytest.raises(ChatSetupError, match=f"^{wrong}"):
+        LLMSettings(name="ollama_chat/x", options=options)
+
+
+@pytest.mark.parametrize("key", ["\u201csk-1\u201d", "sk-\u00e4", "sk-1\nsk-2"])
+def test_a_key_that_no_request_can_contain_is_refused_and_not_shown(
+    key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", key)
+    with pytest.raises(ChatSetupError, match=r"^OPENAI_API_KEY in the environment: character ") as caught:
+        connect("openai/gpt-5-mini")
+    assert "sk-" not in str(caught.value)
+
+
+def test_an_address_of_the_environment_is_recorded_and_has_its_own_price(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    own = LLMSettings(name="openai/gpt-5-mini")
+    assert own.api_base is None and price_of(own) is not None
+    monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:1/v1")
+    there = LLMSettings(name="openai/gpt-5-mini")
+    assert there.api_base == "http://127.0.0.1:1/v1" and price_of(there) is None
+    assert LLMSettings.model_validate_json(own.model_dump_json()) == own  # what was recorded stays
+    monkeypatch.setenv("OPENAI_API_BASE", "http://me:word@127.0.0.1:1/v1")
+    assert LLMSettings(name="openai/gpt-5-mini").api_base is None
 
 
 @pytest.mark.parametrize(
@@ -119,6 +207,17 @@ PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=
 
 
 class TestCache:
+    def test_replies_of_one_server_are_not_those_of_another(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        places = []
+        for port in (1, 2):
+            monkeypatch.setenv("OPENAI_API_BASE", f"http://127.0.0.1:{port}/v1")
+            chat = connect("openai/mine", cache=tmp_path)
+            assert isinstance(chat, LiteLLMChat)
+            places.append(chat._place(tmp_path, QUESTION))
+        assert len(set(places)) == 2
+
     def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
         inner = ScriptedChat([PAID, "never"])
         chat = Served(server=inner, cache=tmp_path / "new" / "folder")

@@ -18,9 +18,11 @@ from falsifier.testing import lag_problem
 PROBLEM = lag_problem()
 CHAT = ScriptedChat([], llm="script")
 
+BASE = "http://127.0.0.1:9"
+
 
 def request(engine: str | None = None, llm: str | None = None, **settings: object) -> RunRequest:
-    named = LLMSettings(name=llm, **settings) if llm else None
+    named = LLMSettings(name=llm, api_base=BASE, **settings) if llm else None
     return RunRequest(problems=(), engine=engine, llm=named, seed=3)
 
 
@@ -66,7 +68,7 @@ def test_a_limit_on_money_needs_a_price() -> None:
     asked = request(llm="hosted_vllm/mine").model_copy(update={"budget": Budget(cost=1.0)})
     with pytest.raises(SpecError, match=r"price=\(SENT, RECEIVED\)"):
         make_engines(asked, [PROBLEM], None)
-    priced = LLMSettings(name="hosted_vllm/mine", price=(0.25, 2.0), cache=False)
+    priced = LLMSettings(name="hosted_vllm/mine", api_base=BASE, price=(0.25, 2.0), cache=False)
     (engine,) = make_engines(asked.model_copy(update={"llm": priced}), [PROBLEM], None)
     assert engine.name.startswith("hosted_vllm/mine")
 
