@@ -369,4 +369,6 @@ def _settings(llm: LLM | None) -> LLMSettings | None:
         return llm
     if not isinstance(llm, str) and not hasattr(llm, "llm"):
         raise SpecError(f"llm: expected a name, LLMSettings or a chat, got {llm!r}")
-    return LLMSettings(name=llm if isinstance(llm, str) else llm.llm)
+    if isinstance(llm, str):
+        return LLMSettings(name=llm)
+    return LLMSettings.model_construct(name=llm.llm)  # not with the environment's address: it has its own
