@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from falsifier import __version__
-from falsifier.cli.output import (
-    FAILED,
-    INTERRUPTED,
-    end_at_interrupts,
-    open_streams,
-    settle_streams,
-    stop_at_interrupts,
-)
+from falsifier.cli import output
 from falsifier.core.posix import check_memory_limits
 from falsifier.errors import FalsifierError, did_you_mean, reader, speak_to
 from falsifier.views.terminal import warn
@@ -159,11 +152,11 @@ def main() -> NoReturn:
     """Entry point; no error ends with exit code 1, which means falsified."""
     # The engines' matrices are small: threads of the linear algebra library would only slow them down.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    open_streams()
-    stop_at_interrupts()
+    output.open_streams()
+    output.stop_at_interrupts()
     code = _carried_out(sys.argv[1:])
-    end_at_interrupts(code)
-    settle_streams()
+    output.end_at_interrupts(code)
+    output.settle_streams()
     sys.exit(code)
 
 
@@ -180,7 +173,7 @@ def _carried_out(arguments: list[str]) -> int:
             cli.invoke(context)
         return 0
     except SystemExit as end:
-        return FAILED if isinstance(end.code, str) else int(end.code or 0)
+        return output.FAILED if isinstance(end.code, str) else int(end.code or 0)
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.ClickException as error:
@@ -190,7 +183,7 @@ def _carried_out(arguments: list[str]) -> int:
         return 2
     except (click.Abort, KeyboardInterrupt):
         warn("interrupted")
-        return INTERRUPTED
+        return output.INTERRUPTED
     except FalsifierError as error:
         warn(f"falsifier: {error}")
         return error.exit_code
@@ -200,10 +193,10 @@ def _carried_out(arguments: list[str]) -> int:
         return _report_refusal(error)
     except MemoryError:
         warn("falsifier: not enough memory; free some, or raise the limit (ulimit)")
-        return FAILED
+        return output.FAILED
     except Exception:
         warn(f"{traceback.format_exc()}falsifier: this is a defect of falsifier itself; please report it")
-        return FAILED
+        return output.FAILED
 
 
 def _report_refusal(error: OSError) -> int:
@@ -216,4 +209,4 @@ def _report_refusal(error: OSError) -> int:
     else:
         warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2
-    return FAILED
+    return output.FAILED

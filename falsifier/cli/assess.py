@@ -9,18 +9,8 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from falsifier.cli import options
 from falsifier.cli.command import command, refuse
-from falsifier.cli.options import (
-    budget_option,
-    json_option,
-    problem_options,
-    problem_source,
-    quiet_option,
-    requirement_option,
-    requirement_options,
-    seed_option,
-    stl_option,
-)
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
@@ -41,14 +31,14 @@ _SAID_EVERY = 100
 
 
 @command()
-@requirement_options
-@budget_option(_ASSESS_BUDGET)
-@requirement_option
-@seed_option()
-@quiet_option
-@json_option
+@options.requirement_options
+@options.budget_option(_ASSESS_BUDGET)
+@options.requirement_option
+@options.seed_option()
+@options.quiet_option
+@options.json_option
 def assess(
-    *, budget: int, requirement: str | None, seed: int, quiet: bool, as_json: bool, **options: Any
+    *, budget: int, requirement: str | None, seed: int, quiet: bool, as_json: bool, **given: Any
 ) -> None:
     """Bound the probability of a violation by simulating at random.
 
@@ -66,7 +56,7 @@ def assess(
         if not quiet and count % _SAID_EVERY == 0:
             warn(f"simulation {count} of at most {budget}")
 
-    problem, searched = _loaded(options, requirement)
+    problem, searched = _loaded(given, requirement)
     with closing(problem.model):
         found = assess_problem(problem, budget=budget, seed=seed, searched=searched, progress=said)
     content = assurance_json(found) | {"budget": budget, "seed": seed}
@@ -77,14 +67,14 @@ def assess(
 
 
 @command()
-@problem_options
-@stl_option("Formula or template with {limit} in place of a threshold.")
+@options.problem_options
+@options.stl_option("Formula or template with {limit} in place of a threshold.")
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
-@budget_option(least=20, note=" of all searches together")
-@seed_option()
-@quiet_option
-@json_option
+@options.budget_option(least=20, note=" of all searches together")
+@options.seed_option()
+@options.quiet_option
+@options.json_option
 def margin(
     *,
     stl: str | None,
@@ -94,7 +84,7 @@ def margin(
     seed: int,
     quiet: bool,
     as_json: bool,
-    **options: Any,
+    **given: Any,
 ) -> None:
     """Find the threshold at which a search starts to find violations.
 
@@ -111,7 +101,7 @@ def margin(
     if stl is None or LIMIT not in stl:
         raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
-    made_here = Target.parse(options["target"]).kind != "python"
+    made_here = Target.parse(given["target"]).kind != "python"
     requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
@@ -119,7 +109,7 @@ def margin(
             found = "falsified" if falsified else "not falsified"
             warn(f"{threshold:.12g}: {found} ({count} of at most {budget} simulations used)")
 
-    problem = load_source(problem_source(options | requirement))
+    problem = load_source(options.problem_source(given | requirement))
     with closing(problem.model):
         found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
     content = {"stl": stl, "between": [low, high], **asdict(found)}
@@ -127,7 +117,7 @@ def margin(
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
-def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
+def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
     """Load the problem of a target or a run; of a run, return what it evaluated, too.
 
     Raises:
@@ -136,11 +126,11 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
             FMU or the spec has changed since.
         SpecError: if the run's problem was made in Python.
     """
-    place = Path(options["target"])
+    place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)
         try:
-            return load_source(problem_source(options)), []
+            return load_source(options.problem_source(given)), []
         except SpecError:
             if not place.is_dir():
                 raise
@@ -153,7 +143,7 @@ def _loaded(options: dict[str, Any], requirement: str | None) -> tuple[Problem, 
     changed = [
         parameter.opts[0]
         for parameter in context.command.params
-        if parameter.name in options.keys() - {"target"}
+        if parameter.name in given.keys() - {"target"}
         and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT
     ]
     if changed:

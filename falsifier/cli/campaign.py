@@ -22,34 +22,8 @@ from falsifier.campaigns.directory import check_new, is_campaign
 from falsifier.campaigns.request import Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
+from falsifier.cli import llm_options, options
 from falsifier.cli.command import command, refuse
-from falsifier.cli.llm_options import (
-    asking_options,
-    check_context,
-    context_option,
-    llm_option,
-    llm_settings,
-    name_and_effort,
-    read_budget,
-    variant_option,
-)
-from falsifier.cli.options import (
-    DEFAULT_PARAMETERIZATION,
-    Parameterized,
-    budget_option,
-    changes_in,
-    directory_argument,
-    engine_option,
-    jobs_option,
-    json_option,
-    limit_options,
-    out_option,
-    parameterization_option,
-    policy_options,
-    quiet_option,
-    seed_option,
-    total_option,
-)
 from falsifier.cli.output import FAILED, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
@@ -82,15 +56,15 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 @command(help=_BENCH_HELP)
 @click.argument("targets", nargs=-1)
 @click.option("--suite", "suite_name", type=click.Choice(SUITES), help="Published list of requirements.")
-@policy_options
-@parameterization_option(
-    multiple=True, default=f"{DEFAULT_PARAMETERIZATION}; with --suite {PROTOCOL_PARAMETERIZATION}"
+@options.policy_options
+@options.parameterization_option(
+    multiple=True, default=f"{options.DEFAULT_PARAMETERIZATION}; with --suite {PROTOCOL_PARAMETERIZATION}"
 )
-@engine_option(multiple=True)
-@llm_option(multiple=True)
-@variant_option(multiple=True)
-@asking_options
-@context_option
+@options.engine_option(multiple=True)
+@llm_options.llm_option(multiple=True)
+@llm_options.variant_option(multiple=True)
+@llm_options.asking_options
+@llm_options.context_option
 @click.option(
     "--runs",
     type=click.IntRange(1),
@@ -98,23 +72,23 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     show_default=True,
     help="Number of runs per requirement and method, each with its own seed.",
 )
-@seed_option("Random seed of the first run; the others count up.")
-@budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}", note=" per run")
-@limit_options(note=" per run")
-@total_option
-@jobs_option("runs")
+@options.seed_option("Random seed of the first run; the others count up.")
+@options.budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}", note=" per run")
+@options.limit_options(note=" per run")
+@options.total_option
+@options.jobs_option("runs")
 @click.option(
     "--table", type=click.Choice(list(TABLES)), default="main", show_default=True, help="Table to print."
 )
-@out_option("Campaign directory; default: runs/bench-TIME.", metavar="DIR")
+@options.out_option("Campaign directory; default: runs/bench-TIME.", metavar="DIR")
 @click.option("--yes", is_flag=True, help="Do not ask whether to pay for language models.")
-@quiet_option
-@json_option
+@options.quiet_option
+@options.json_option
 def bench(
     *,
     targets: tuple[str, ...],
     suite_name: str | None,
-    parameterizations: tuple[Parameterized, ...],
+    parameterizations: tuple[options.Parameterized, ...],
     engines: tuple[str, ...],
     llms: tuple[str, ...],
     variants: tuple[str, ...],
@@ -128,10 +102,10 @@ def bench(
     yes: bool,
     quiet: bool,
     as_json: bool,
-    **options: Any,
+    **given: Any,
 ) -> None:
     profile, kinds = _kinds(
-        parameterizations, PROTOCOL_PARAMETERIZATION if suite_name else DEFAULT_PARAMETERIZATION
+        parameterizations, PROTOCOL_PARAMETERIZATION if suite_name else options.DEFAULT_PARAMETERIZATION
     )
     if bool(targets) == (suite_name is not None):
         raise click.UsageError("expected either TARGETS (requirements or specs) or --suite")
@@ -141,8 +115,8 @@ def bench(
         if suite_name
         else [s for target in targets for s in sources_of(ProblemSource(target=target, profile=profile))]
     )
-    check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
-    changes = {"changes": changes_in(options)}
+    llm_options.check_context(context, [] if llms else [engine or None for engine in engines or ("",)])
+    changes = {"changes": options.changes_in(given)}
     problems = [
         source.model_copy(update=changes | {"parameterization": kind, "context": (*source.context, *context)})
         for source in problems
@@ -150,8 +124,8 @@ def bench(
     ]
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
-    budget = read_budget(options, asks=bool(llms), usual=usual)
-    how = llm_settings({"llm": next(iter(llms), None), **options})
+    budget = llm_options.read_budget(given, asks=bool(llms), usual=usual)
+    how = llm_options.llm_settings({"llm": next(iter(llms), None), **given})
     searchers = _searchers(engines, llms, variants, how)
     request = CampaignRequest(
         runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget), limits=totals
@@ -175,7 +149,7 @@ def bench(
 
 
 @command()
-@directory_argument
+@options.directory_argument
 @click.option("--page", is_flag=True, help="Serve a web page of it, on this machine only, until Ctrl-C.")
 @click.option("--allow-stop", is_flag=True, help="With --page: add a button that stops the run, like Ctrl-C.")
 def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
@@ -250,7 +224,7 @@ def _agree(request: CampaignRequest, *, yes: bool) -> None:
 
 
 def _kinds(
-    given: Sequence[Parameterized], default: Parameterization
+    given: Sequence[options.Parameterized], default: Parameterization
 ) -> tuple[str | None, tuple[Parameterization, ...]]:
     """Return the profile of all runs, of which there may be one, and their parameterizations."""
     profiles = {chosen.profile for chosen in given}
@@ -271,7 +245,7 @@ def _searchers(
         return [*(engines or (DEFAULT_ENGINE,))]
     models = []
     for llm, variant in product(llms, variants or (None,)):
-        name, effort = name_and_effort(llm)
+        name, effort = llm_options.name_and_effort(llm)
         decided = {"name": name, "effort": effort, "variant": variant}
         models.append(LLMSettings.model_validate(how.model_dump() | decided))
     return [*product(engines, models)] if engines else [*models]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.cli import options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.files import (
     DRAWN,
@@ -19,17 +20,6 @@ from falsifier.cli.files import (
     draw_evaluation,
     made_folder,
     saved,
-)
-from falsifier.cli.options import (
-    PATH,
-    budget_option,
-    interface_option,
-    json_option,
-    out_option,
-    policy_options,
-    quiet_option,
-    requirement_option,
-    run_argument,
 )
 from falsifier.cli.output import FAILED, INTERRUPTED, as_shown, conclude, say
 from falsifier.core.files import write_whole
@@ -60,14 +50,14 @@ Told = tuple[list[str], dict[str, Any]]
 
 
 @command()
-@run_argument
+@options.run_argument
 @click.option(
     "--shrink", "shrunk", is_flag=True, help="Write the simplest counterexample near it that still violates."
 )
 @click.option(
     "--map", "mapped", is_flag=True, help="Change all inputs at random; draw which changes still violate."
 )
-@budget_option(shown=f"{SHRINK_BUDGET}; with --map {MAP_BUDGET}", note=" of --shrink or --map")
+@options.budget_option(shown=f"{SHRINK_BUDGET}; with --map {MAP_BUDGET}", note=" of --shrink or --map")
 @click.option(
     "--at-most",
     type=float,
@@ -75,13 +65,13 @@ Told = tuple[list[str], dict[str, Any]]
     help="With --shrink: maximum robustness of the simpler one; 0: any violation. Default: half of that of "
     "a counterexample, or a tenth more than that of a nearest miss.",
 )
-@requirement_option
-@out_option(
+@options.requirement_option
+@options.out_option(
     "File to write; default: shrunk.json, or shrunk.csv for a nearest miss; with --map robustness-map.png."
 )
-@policy_options
-@quiet_option
-@json_option
+@options.policy_options
+@options.quiet_option
+@options.json_option
 def explain(
     *,
     run: Path,
@@ -124,10 +114,10 @@ def explain(
 
 
 @command()
-@run_argument
-@interface_option("FMI interface to simulate with; default: that of the run.")
-@policy_options
-@json_option
+@options.run_argument
+@options.interface_option("FMI interface to simulate with; default: that of the run.")
+@options.policy_options
+@options.json_option
 def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights: Any) -> None:
     """Simulate a counterexample again, even if the FMU or the requirement has changed since.
 
@@ -154,15 +144,15 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
 
 
 @command()
-@run_argument
-@out_option("New directory to write; default: export in RUN's directory.", metavar="DIR")
+@options.run_argument
+@options.out_option("New directory to write; default: export in RUN's directory.", metavar="DIR")
 @click.option(
     "--store",
-    type=PATH,
+    type=options.PATH,
     metavar="DIR",
     help="Store the counterexample in this folder, for pytest --falsifier, and write nothing else.",
 )
-@policy_options
+@options.policy_options
 def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) -> None:
     """Write a counterexample for FMPy, fmusim, OpenModelica and Simulink, or store it for pytest.
 

@@ -8,15 +8,8 @@ import click
 from falsifier.analyses.coverage import coverage as coverage_of_run
 from falsifier.campaigns.analysis import load
 from falsifier.campaigns.archcomp import export
+from falsifier.cli import files
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import (
-    check_ending,
-    check_out,
-    checked_picture,
-    draw,
-    in_existing_folder,
-    write_named,
-)
 from falsifier.cli.options import PATH, directory_argument, json_option, out_option
 from falsifier.cli.output import FAILED, as_shown, conclude, say
 from falsifier.core.files import file_name
@@ -71,20 +64,20 @@ def report(
         )
     for file, begins, ending in named:
         if file.parent != first:  # whether that is a run is seen when it is read
-            in_existing_folder(file)
+            files.in_existing_folder(file)
         if file.is_file() or file.is_dir():
-            check_out(file, begins=begins)
+            files.check_out(file, begins=begins)
         if file.suffix not in ("", ".txt", ".htm", ".markdown"):
-            check_ending(file, (ending,))
+            files.check_ending(file, (ending,))
     if arch_comp is not None:
         _write_arch_comp(first, arch_comp)
     if csv_file is not None:
-        write_named(csv_file, _evaluations_csv(directories))
+        files.write_named(csv_file, _evaluations_csv(directories))
     made = markdown_report(*directories) if markdown else html_report(*directories)
     if path is None:
         say(made, nl=False)
     else:
-        write_named(path, made)
+        files.write_named(path, made)
 
 
 @command()
@@ -99,9 +92,9 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     """
     from falsifier.views.plotting import plot_coverage
 
-    picture = directory / "coverage.png" if out is None else checked_picture(out)
+    picture = directory / "coverage.png" if out is None else files.checked_picture(out)
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
-    drawn = draw(lambda: plot_coverage(found, name), picture)
+    drawn = files.draw(lambda: plot_coverage(found, name), picture)
     text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
     content = {"requirements": name, **coverage_json(found), "picture": next(map(str, drawn), None)}
     conclude(as_shown(text, content, as_json=as_json), FAILED if out and not drawn else 0)
@@ -117,8 +110,8 @@ def _write_arch_comp(directory: Path, path: Path) -> None:
     for label, text in exported.items():
         own = path if len(exported) == 1 else path.with_stem(f"{path.stem}-{file_name(label)}")
         if own.exists():
-            check_out(own, begins=_ARCH_COMP)
-        write_named(own, text)
+            files.check_out(own, begins=_ARCH_COMP)
+        files.write_named(own, text)
 
 
 def _evaluations_csv(directories: Iterable[Path]) -> str:

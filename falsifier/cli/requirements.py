@@ -8,17 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.analyses.lint import LintFinding, lint
+from falsifier.cli import options
 from falsifier.cli.command import command
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
-from falsifier.cli.options import (
-    budget_option,
-    json_option,
-    out_option,
-    parameterization_option,
-    problem_source,
-    stl_option,
-    target_argument,
-)
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
 from falsifier.core.literals import one_line
@@ -34,14 +26,14 @@ if TYPE_CHECKING:  # writing specs takes a package that check does not need
 
 
 @command()
-@target_argument
-@parameterization_option()
-@stl_option()
-@budget_option(
+@options.target_argument
+@options.parameterization_option()
+@options.stl_option()
+@options.budget_option(
     0, least=0, note=" to measure whether inputs affect a requirement; 0: rely on what the FMU declares"
 )
-@json_option
-def check(*, budget: int, as_json: bool, **options: Any) -> None:
+@options.json_option
+def check(*, budget: int, as_json: bool, **given: Any) -> None:
     """Check a spec file, and find requirements that say nothing.
 
     First, keys, signals, ranges and formulas are checked. Then it looks for parts that cannot fail or hold,
@@ -50,7 +42,7 @@ def check(*, budget: int, as_json: bool, **options: Any) -> None:
 
     Exit codes: 0 nothing was found, 1 something was, 2 wrong usage or spec.
     """
-    source = problem_source(options)
+    source = options.problem_source(given)
     findings = lint(source, simulations=budget)
     invalid = {finding.requirement for finding in findings if finding.kind == "invalid"}
     code = 2 if invalid else 1 if findings else 0
@@ -89,8 +81,8 @@ def _lines(finding: LintFinding) -> list[str]:
 @llm_option()
 @connection_options
 @click.option("--choose", type=click.IntRange(1), metavar="N", help="Write reading N into the spec.")
-@out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
-def formalize(*, target: str, sentence: str, choose: int | None, out: Path | None, **options: Any) -> None:
+@options.out_option("Spec file to write; default: MODEL if it is a spec, else NAME.toml beside the FMU.")
+def formalize(*, target: str, sentence: str, choose: int | None, out: Path | None, **given: Any) -> None:
     """Turn a requirement in words into formulas, and write the chosen one into a spec.
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
@@ -101,7 +93,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     from falsifier.problem.writing import subject_of
     from falsifier.views.analyses_text import formalized_text
 
-    settings = llm_settings(options)
+    settings = llm_settings(given)
     if settings is None:
         raise SpecError(
             f"formalize needs --llm NAME, which proposes the readings; or choose a template "
@@ -116,8 +108,8 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     if choose is None:
         say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
     else:
-        file, given = _write(found, choose, out)
-        say(f"{file}: requirement {given} written; to search: falsifier run {shlex.quote(f'{file}:{given}')}")
+        file, name = _write(found, choose, out)
+        say(f"{file}: requirement {name} written; to search: falsifier run {shlex.quote(f'{file}:{name}')}")
 
 
 def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str]:
@@ -128,9 +120,9 @@ def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str
         raise SpecError(f"--choose {number}: expected 1 to {len(found.readings)}, the number of a reading")
     file = _file(found.subject, out)
     formula = str(found.readings[number - 1].formula)
-    text, given = with_requirement(found.subject, file, formula, description=found.sentence)
+    text, name = with_requirement(found.subject, file, formula, description=found.sentence)
     write_whole(file, text)
-    return str(file), given
+    return str(file), name
 
 
 def _file(subject: "Subject", out: Path | None) -> Path:

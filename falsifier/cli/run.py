@@ -8,24 +8,9 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
+from falsifier.cli import options
 from falsifier.cli.command import Command, command, refuse
 from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
-from falsifier.cli.options import (
-    PATH,
-    budget_option,
-    directory_argument,
-    engine_option,
-    inputs_option,
-    jobs_option,
-    json_option,
-    limit_options,
-    out_option,
-    problem_source,
-    quiet_option,
-    requirement_options,
-    seed_option,
-    total_option,
-)
 from falsifier.cli.output import as_shown, conclude
 from falsifier.core.files import file_name
 from falsifier.errors import JournalError
@@ -59,24 +44,24 @@ class _OneTarget(Command):
 
 
 @click.command(cls=_OneTarget)
-@requirement_options
-@engine_option()
+@options.requirement_options
+@options.engine_option()
 @llm_options
 @context_option
-@budget_option()
-@limit_options()
-@seed_option()
-@jobs_option("simulations")
-@inputs_option("Known inputs to simulate first; the engine learns from them", multiple=True)
-@quiet_option
-@out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
+@options.budget_option()
+@options.limit_options()
+@options.seed_option()
+@options.jobs_option("simulations")
+@options.inputs_option("Known inputs to simulate first; the engine learns from them", multiple=True)
+@options.quiet_option
+@options.out_option("Run directory; default: runs/NAME-TIME.", metavar="DIR")
 @click.option(
     "--fmu-log",
-    type=PATH,
+    type=options.PATH,
     metavar="FILE",
     help="Ask the FMU for messages in every simulation, and write them to this file.",
 )
-@json_option
+@options.json_option
 def run(
     *,
     engine: str | None,
@@ -87,7 +72,7 @@ def run(
     out: Path | None,
     fmu_log: Path | None,
     as_json: bool,
-    **options: Any,
+    **given: Any,
 ) -> None:
     """Search for inputs that violate a requirement.
 
@@ -102,9 +87,9 @@ def run(
     from falsifier.record.run import falsify
     from falsifier.views.progress import log_fmu, make_display
 
-    source, llm = problem_source(options), llm_settings(options)
+    source, llm = options.problem_source(given), llm_settings(given)
     check_context(source.context, [engine] if llm is None else [])
-    budget = read_budget(options, asks=llm is not None)
+    budget = read_budget(given, asks=llm is not None)
     logs = [log_fmu(fmu_log)] if fmu_log else []
     if fmu_log:
         if out is not None and fmu_log.resolve() == out.resolve():
@@ -134,12 +119,12 @@ def run(
 
 
 @command()
-@directory_argument
-@jobs_option("runs")
-@budget_option(None, note=", including those already done")
-@total_option
-@quiet_option
-@json_option
+@options.directory_argument
+@options.jobs_option("runs")
+@options.budget_option(None, note=", including those already done")
+@options.total_option
+@options.quiet_option
+@options.json_option
 def resume(
     *, directory: Path, jobs: int, budget: int | None, totals: "Budget | None", quiet: bool, as_json: bool
 ) -> None:

@@ -16,13 +16,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import (
-    CandidateError,
-    ModelError,
-    MonitorError,
-    SimulationError,
-    did_you_mean,
-)
+from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem

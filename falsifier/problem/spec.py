@@ -19,27 +19,12 @@ from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, Vali
 from falsifier.core.literals import one_line
 from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
 from falsifier.fmu import is_package
-from falsifier.problem.sections import (
-    Components,
-    Connections,
-    ContextSection,
-    CouplingSection,
-    Inputs,
-    InputSection,
-    ModelChanges,
-    ModelSection,
-    Parameters,
-    ParameterSection,
-    ProfileSection,
-    RequirementSection,
-    Strict,
-    missing,
-)
+from falsifier.problem import sections
 from falsifier.problem.template_arguments import Template
 from falsifier.problem.templates import TEMPLATES
 
 Section = TypeVar("Section", bound=BaseModel)
-Profiles = dict[str, ProfileSection]
+Profiles = dict[str, sections.ProfileSection]
 # Names that we choose stand in messages, tables and titles.
 NAME_IN_LINES = "expected a name of one line without control characters"
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
@@ -66,23 +51,23 @@ def _kind_of_requirement(section: object) -> str | None:
 
 
 if TYPE_CHECKING:
-    AnyRequirement = RequirementSection | Template
+    AnyRequirement = sections.RequirementSection | Template
 else:
-    _KINDS = {"formula": RequirementSection, **TEMPLATES}
+    _KINDS = {"formula": sections.RequirementSection, **TEMPLATES}
     _TAGGED = (Annotated[kind, Tag(f"<{name}>")] for name, kind in _KINDS.items())
     AnyRequirement = Annotated[reduce(or_, _TAGGED), Discriminator(_kind_of_requirement)]
 
 
-class Spec(Strict):
+class Spec(sections.Strict):
     """A whole spec file."""
 
-    model: ModelSection = Field(default_factory=ModelSection)
-    components: Components = Field(default_factory=dict)
-    connections: Connections = Field(default_factory=dict)
-    coupling: CouplingSection = Field(default_factory=CouplingSection)
-    context: ContextSection = Field(default_factory=ContextSection)
-    inputs: Inputs = Field(default_factory=dict)
-    parameters: Parameters = Field(default_factory=dict)
+    model: sections.ModelSection = Field(default_factory=sections.ModelSection)
+    components: sections.Components = Field(default_factory=dict)
+    connections: sections.Connections = Field(default_factory=dict)
+    coupling: sections.CouplingSection = Field(default_factory=sections.CouplingSection)
+    context: sections.ContextSection = Field(default_factory=sections.ContextSection)
+    inputs: sections.Inputs = Field(default_factory=dict)
+    parameters: sections.Parameters = Field(default_factory=dict)
     requirements: dict[str, AnyRequirement] = Field(
         min_length=1, description="What to falsify, as [requirements.NAME]."
     )
@@ -109,9 +94,9 @@ class Spec(Strict):
             raise ValueError("a requirement has an empty name; write [requirements.NAME]")
         return found
 
-    def changes(self, requirement: str, profile: str | None) -> list[ModelChanges]:
+    def changes(self, requirement: str, profile: str | None) -> list[sections.ModelChanges]:
         """Return the sections that apply to this requirement with this profile; later ones override."""
-        layers: list[ModelChanges] = [self.requirements[requirement]]
+        layers: list[sections.ModelChanges] = [self.requirements[requirement]]
         if profile is not None:
             layers.append(self.profiles[profile])
             if requirement in self.profiles[profile].requirements:
@@ -176,12 +161,12 @@ def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
 def _check_model(spec: Spec) -> None:
     """Check that a spec has either an FMU or components."""
     if spec.model.fmu is None and not spec.components:
-        raise SpecError(missing(ModelSection.model_fields["fmu"]), key="model.fmu")
+        raise SpecError(sections.missing(sections.ModelSection.model_fields["fmu"]), key="model.fmu")
     if spec.components and spec.model.fmu is not None:
         raise SpecError(
             "a spec has either one FMU here or [components.NAME]; remove one of them", key="model.fmu"
         )
-    is_coupled = spec.coupling != CouplingSection()
+    is_coupled = spec.coupling != sections.CouplingSection()
     if (spec.connections and not spec.components) or (is_coupled and not spec.is_system):
         key = "connections" if spec.connections else "coupling"
         raise SpecError("only a system has this section: add [components.NAME]", key=key)
@@ -192,14 +177,14 @@ def overlay(base: Section | None, changes: Section) -> Section:
     if base is None:
         return changes
     stated = {name: getattr(changes, name) for name in changes.model_fields_set}
-    if isinstance(base, InputSection):
+    if isinstance(base, sections.InputSection):
         if "value" in stated:  # a fixed value replaces a searched range and vice versa
             return changes
         stated.setdefault("value", None)
         # Control points or interpolation that are overridden are meant to be used: no free parameterization.
         if {"control_points", "interpolation"} & stated.keys():
             stated.setdefault("free", None)
-    if isinstance(base, ParameterSection):
+    if isinstance(base, sections.ParameterSection):
         return changes
     return base.model_copy(update=stated)
 
@@ -219,7 +204,7 @@ def _error_of(error: ValidationError) -> SpecError:
         wrong = first["ctx"]["key"]
         if wrong == "formula" and "template" in given:
             message = "this requirement has a template, too; give one of the two"
-        elif section == "parameters" and wrong in InputSection.model_fields:
+        elif section == "parameters" and wrong in sections.InputSection.model_fields:
             message = f"only inputs have {wrong}: write [inputs.{name}] if it is one"
         elif quoted := _unquoted(where, wrong, given):
             is_near = message.startswith("unknown key; did you mean") and "=" in quoted

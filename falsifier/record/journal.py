@@ -30,18 +30,7 @@ from falsifier.core.files import check_seal, remove_partial
 from falsifier.core.words import counted
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.record import manifest
-from falsifier.record.files import (
-    TRAJECTORIES,
-    TRAJECTORY_NAMES,
-    can_be_a_folder,
-    free_name,
-    is_intact,
-    locked,
-    recorded_trajectory,
-    save_trajectory,
-    set_aside,
-)
+from falsifier.record import files, manifest
 from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
@@ -73,7 +62,7 @@ class Journal:
     def __init__(self, directory: Path, keep: Keep) -> None:
         self.directory = directory
         self._keep = keep
-        remove_partial(directory / TRAJECTORIES, TRAJECTORY_NAMES)
+        remove_partial(directory / files.TRAJECTORIES, files.TRAJECTORY_NAMES)
         remove_partial(directory, re.escape(manifest.MANIFEST))
         self._reader = JournalReader(directory)
         self.records = list(self._reader.new())
@@ -159,7 +148,7 @@ class Journal:
         evaluation, file = event.evaluation, None
         every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
         if evaluation.trajectory is not None and (event.improved or every):
-            file = save_trajectory(self.directory, event.index, evaluation.trajectory)
+            file = files.save_trajectory(self.directory, event.index, evaluation.trajectory)
         self.write(
             EvaluatedRecord(
                 index=event.index,
@@ -174,7 +163,7 @@ class Journal:
         )
         # Only after the record: a crash in between must not lose the trajectory that the journal refers to.
         if file is not None and self._keep == "best":
-            for path in (self.directory / TRAJECTORIES).glob("*.npz"):
+            for path in (self.directory / files.TRAJECTORIES).glob("*.npz"):
                 if path != self.directory / file:
                     path.unlink()
 
@@ -189,9 +178,9 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
     Raises:
         JournalError: if another process still writes here after that time, or a line is damaged.
     """
-    with can_be_a_folder(directory):
+    with files.can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / TRAJECTORIES).mkdir(exist_ok=True)
+        (directory / files.TRAJECTORIES).mkdir(exist_ok=True)
     with run_lock(directory, patience):
         journal = Journal(directory, keep)
         try:
@@ -207,12 +196,12 @@ def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[N
         JournalError: if another process still writes to it after so many s.
     """
     busy = f"{directory}: another process is writing to this run; wait until it ends"
-    return locked(directory / LOCK, busy=busy, patience=patience)
+    return files.locked(directory / LOCK, busy=busy, patience=patience)
 
 
 def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
-    with can_be_a_folder(directory):
+    with files.can_be_a_folder(directory):
         return (directory / manifest.MANIFEST).exists()
 
 
@@ -308,7 +297,7 @@ def recorded_evaluations(
                 record.status,
                 record.verdicts.get(requirement or turn[record.index]),
                 record.reason,
-                recorded_trajectory(directory, record.trajectory) if with_trajectories else None,
+                files.recorded_trajectory(directory, record.trajectory) if with_trajectories else None,
                 record.seconds,
                 tuple(record.log),
             )
@@ -351,15 +340,15 @@ def repair(directory: Path) -> list[str]:
         except JournalError as error:
             path = reader.path
             lost = path.read_bytes()[reader.offset :].count(b"\n")
-            copy = Path(copy2(path, free_name(path)))
+            copy = Path(copy2(path, files.free_name(path)))
             with path.open("r+b") as file:
                 file.truncate(reader.offset)
             found.append(
                 f"{path}: line {reader.line} is damaged: {error.__cause__}; {counted(lost, 'line')} from "
                 f"there on dropped, kept as {copy.name}; to resume the run repeats what is missing"
             )
-        for path in sorted((directory / TRAJECTORIES).glob("*.npz")):
-            if not is_intact(path, path.read_bytes()):
-                kept = set_aside(path).name
+        for path in sorted((directory / files.TRAJECTORIES).glob("*.npz")):
+            if not files.is_intact(path, path.read_bytes()):
+                kept = files.set_aside(path).name
                 found.append(f"{path}: damaged; kept as {kept}, simulated again if needed")
     return found

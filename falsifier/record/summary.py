@@ -9,15 +9,8 @@ from typing import Generic, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.record import records
 from falsifier.record.journal import JournalReader
-from falsifier.record.records import (
-    ConfirmedRecord,
-    EndedRecord,
-    EvaluatedRecord,
-    ExchangeRecord,
-    Record,
-    elapsed_at,
-)
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
 from falsifier.search.result import ResultStatus
@@ -89,33 +82,33 @@ class Summary:
         """Index of the evaluation to show: the counterexample, otherwise the best one; None without any."""
         return self.best if self.counterexample is None else self.counterexample
 
-    def add(self, record: Record) -> None:
+    def add(self, record: records.Record) -> None:
         """Update the numbers with one record."""
         if self.counterexample is not None:
             return
         self.status = "running"
-        self.spent = replace(self.spent, seconds=elapsed_at(record))
+        self.spent = replace(self.spent, seconds=records.elapsed_at(record))
         match record:
-            case EvaluatedRecord():
+            case records.EvaluatedRecord():
                 self._evaluated(record)
-            case ConfirmedRecord() if self.recorded_as not in (None, record.requirement):
+            case records.ConfirmedRecord() if self.recorded_as not in (None, record.requirement):
                 pass
-            case ConfirmedRecord(outcome="confirmed"):
+            case records.ConfirmedRecord(outcome="confirmed"):
                 self.counterexample = record.index
                 self.verdict = self._latest
                 self.status, self.reason = "falsified", record.reason
                 self.spent = record.spent
-            case ConfirmedRecord():
+            case records.ConfirmedRecord():
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
-            case ExchangeRecord():
+            case records.ExchangeRecord():
                 exchange = record.exchange
                 self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
-            case EndedRecord():
+            case records.EndedRecord():
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent
                 own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
                 self.findings = tuple(each for found in own for each in found)
 
-    def _evaluated(self, record: EvaluatedRecord) -> None:
+    def _evaluated(self, record: records.EvaluatedRecord) -> None:
         judged = record.verdicts
         name = next(iter(judged)) if self.recorded_as is None else self.recorded_as
         verdict = judged[name]
@@ -155,7 +148,7 @@ class RunFollower(Generic[S]):
         self.summaries = deepcopy(list(self._empty))
         self._reader = JournalReader(self.directory)
 
-    def read(self) -> Iterator[Record]:
+    def read(self) -> Iterator[records.Record]:
         """Yield the records that are new, after they were added to the summaries.
 
         Raises:

@@ -14,17 +14,8 @@ from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange, Usage
 from falsifier.problem.problem import Problem, check_limits, check_names
+from falsifier.search import events
 from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
-from falsifier.search.events import (
-    Asked,
-    Confirmed,
-    Evaluated,
-    Event,
-    Exchanged,
-    Listener,
-    RunEnded,
-    RunStarted,
-)
 from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Steps
@@ -43,7 +34,7 @@ def search(
     jobs: int = 1,
     searched: SearchSpace | None = None,
     directory: Path | None = None,
-    listeners: Iterable[Listener] = (),
+    listeners: Iterable[events.Listener] = (),
 ) -> list[Result]:
     """Falsify one or more requirements of one system.
 
@@ -129,7 +120,7 @@ class _Loop:
     budget: Budget
     steps: Steps
     directory: Path | None
-    listeners: tuple[Listener, ...]
+    listeners: tuple[events.Listener, ...]
     started: float
     spent: Spent
     waiting: deque[_Started] = field(default_factory=deque)
@@ -155,7 +146,7 @@ class _Loop:
     def run(self, jobs: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         self.emit(
-            RunStarted(
+            events.RunStarted(
                 problems=tuple(state.problem for state in self.states),
                 engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
@@ -246,7 +237,7 @@ class _Loop:
         self.turns += 1
         self.think(seconds)
         self.emit(
-            Asked(
+            events.Asked(
                 first=self.count + len(self.waiting),
                 wanted=wanted,
                 candidates=tuple(candidates),
@@ -280,7 +271,7 @@ class _Loop:
             failures=self.spent.failures + failed,
         )
         self.emit(
-            Evaluated(
+            events.Evaluated(
                 index=self.count,
                 problem=asked.problem,
                 evaluation=evaluation,
@@ -318,7 +309,7 @@ class _Loop:
             state.doubtful.append(confirmation)
             if isinstance(state.engine, FollowsRun):
                 state.engine.doubt(confirmation)
-        event = Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
+        event = events.Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
         if all(state.counterexample is not None for state in self.states):
             self.emit_last(event)
         else:
@@ -329,7 +320,7 @@ class _Loop:
         self.is_answered = self.is_answered or exchange.problem is None
         self.last_defect = exchange.problem or self.last_defect
         self.count_requests(exchange.requests, exchange.usage)
-        self.emit(Exchanged(exchange=exchange, spent=self.clock()))
+        self.emit(events.Exchanged(exchange=exchange, spent=self.clock()))
 
     def count_requests(self, count: int, usage: Usage) -> None:
         """Count what was asked of a language model."""
@@ -347,14 +338,14 @@ class _Loop:
         self.spent = replace(self.spent, seconds=perf_counter() - self.started)
         return self.spent
 
-    def emit(self, event: Event) -> None:
+    def emit(self, event: events.Event) -> None:
         try:
             for listener in self.listeners:
                 listener(event)
         except OSError as error:
             raise _CannotRecordError(refusal(error)) from error
 
-    def emit_last(self, event: Event) -> None:
+    def emit_last(self, event: events.Event) -> None:
         """Announce what ends the search: it counts even if the machine can no longer record it."""
         try:
             self.emit(event)
@@ -369,5 +360,7 @@ class _Loop:
         ]
         overall = "falsified" if all(r.falsified for r in results) else status
         stated = results[0].reason if len(results) == 1 else reason
-        self.emit_last(RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock()))
+        self.emit_last(
+            events.RunEnded(status=overall, reason=stated, results=tuple(results), spent=self.clock())
+        )
         return [replace(result, unrecorded=self.unrecorded) for result in results]

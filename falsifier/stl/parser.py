@@ -26,6 +26,8 @@ from decimal import Decimal
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
+from falsifier.stl import formula as stl
+from falsifier.stl import lexer
 from falsifier.stl.expression import (
     POWER,
     PRODUCT,
@@ -40,44 +42,6 @@ from falsifier.stl.expression import (
     Number,
     Operator,
 )
-from falsifier.stl.formula import (
-    COMPARISON,
-    CONJUNCTION,
-    DISJUNCTION,
-    EQUIVALENCE,
-    IMPLICATION,
-    PREFIX,
-    UNTIL,
-    Always,
-    And,
-    Comparison,
-    Constant,
-    Eventually,
-    Flag,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Node,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-    parts_of,
-    without_constants,
-)
-from falsifier.stl.lexer import (
-    FUNCTIONS,
-    JOIN,
-    UNITS,
-    Token,
-    hint_after,
-    hint_at,
-    hint_for,
-    syntax_error,
-    tokenize,
-)
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
@@ -86,20 +50,22 @@ MAX_LENGTH = 20_000
 # Bounds in different units that differ relatively by less are equal but for rounding.
 _ROUNDED = 1e-5
 
-_LEVELS = {
-    "<->": EQUIVALENCE, "->": IMPLICATION, "or": DISJUNCTION, "and": CONJUNCTION, "U": UNTIL,
-    "<": COMPARISON, "<=": COMPARISON, ">": COMPARISON, ">=": COMPARISON, "==": COMPARISON, "!=": COMPARISON,
-    "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER,
+_LEVELS: dict[str, int] = {
+    "<->": stl.EQUIVALENCE, "->": stl.IMPLICATION, "or": stl.DISJUNCTION, "and": stl.CONJUNCTION,
+    "U": stl.UNTIL, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER,
+    **{symbol: stl.COMPARISON for symbol in stl.OPPOSITE},
 }  # fmt: skip
 _RIGHT_ASSOCIATIVE = {"->", "U", "^"}
-_CONNECTIVES: dict[str, Callable[[Formula, Formula], Formula]] = {
-    "<->": Iff, "->": Implies, "or": Or, "and": And,
+_CONNECTIVES: dict[str, Callable[[stl.Formula, stl.Formula], stl.Formula]] = {
+    "<->": stl.Iff, "->": stl.Implies, "or": stl.Or, "and": stl.And,
 }  # fmt: skip
-_PREFIXES: dict[str, Callable[..., Formula]] = {"not": Not, "X": Next, "G": Always, "F": Eventually}
+_PREFIXES: dict[str, Callable[..., stl.Formula]] = {
+    "not": stl.Not, "X": stl.Next, "G": stl.Always, "F": stl.Eventually,
+}  # fmt: skip
 _CLOSED = "only closed windows in seconds are supported: [a,b]"
 
 
-def parse(text: str) -> Formula:
+def parse(text: str) -> stl.Formula:
     """Parse a text that is exactly one formula.
 
     Raises:
@@ -120,15 +86,15 @@ class _Parser:
                 "requirements"
             )
         self.text = text
-        self.tokens = tokenize(text)
+        self.tokens = lexer.tokenize(text)
         self.index = 0
         self.depth = 0
 
     @property
-    def _next(self) -> Token:
+    def _next(self) -> lexer.Token:
         return self.tokens[self.index]
 
-    def _take(self) -> Token:
+    def _take(self) -> lexer.Token:
         token = self._next
         self.index += 1
         return token
@@ -141,22 +107,22 @@ class _Parser:
 
     # -- the grammar -------------------------------------------------------------------------------------
 
-    def formula(self) -> Formula:
+    def formula(self) -> stl.Formula:
         if self._next.kind == "end":
             self._fail("the formula is empty", 0, "for example: G[0,20] (speed <= 120)")
-        formula = self._as_formula(self._climb(EQUIVALENCE), 0)
+        formula = self._as_formula(self._climb(stl.EQUIVALENCE), 0)
         rest = self._next
         if rest.kind != "end":
-            hint = hint_after(rest, self.tokens[self.index - 1])
+            hint = lexer.hint_after(rest, self.tokens[self.index - 1])
             self._fail(f"unexpected {rest.shown} after a complete formula", rest.position, hint)
         if _depth(formula) > MAX_DEPTH:
             self._fail_depth(0)
-        formula = without_constants(formula)
-        if isinstance(formula, Constant):
+        formula = stl.without_constants(formula)
+        if isinstance(formula, stl.Constant):
             self._fail(f"the formula is always {formula}", 0, "compare a signal, for example speed <= 120")
         return formula
 
-    def _climb(self, level: int) -> Node:
+    def _climb(self, level: int) -> stl.Node:
         """Parse everything of at least this precedence."""
         self.depth += 1
         if self.depth > MAX_DEPTH:
@@ -169,10 +135,10 @@ class _Parser:
             after = here if token.text in _RIGHT_ASSOCIATIVE else here + 1
             if token.text == "U":
                 window, right = self._window(), self._formula_at(after)
-                left = Until(self._as_formula(left, start), right, window)
+                left = stl.Until(self._as_formula(left, start), right, window)
             elif token.text in _CONNECTIVES:
                 left = _CONNECTIVES[token.text](self._as_formula(left, start), self._formula_at(after))
-            elif here == COMPARISON:
+            elif here == stl.COMPARISON:
                 left = self._chain(self._as_expression(left, start), token)
             else:
                 term = self._as_expression(left, start)
@@ -180,7 +146,7 @@ class _Parser:
         self.depth -= 1
         return left
 
-    def _formula_at(self, level: int) -> Formula:
+    def _formula_at(self, level: int) -> stl.Formula:
         start = self._next.position
         return self._as_formula(self._climb(level), start)
 
@@ -188,16 +154,16 @@ class _Parser:
         start = self._next.position
         return self._as_expression(self._climb(level), start)
 
-    def _chain(self, left: Expression, token: Token) -> Formula:
+    def _chain(self, left: Expression, token: lexer.Token) -> stl.Formula:
         right = self._expression_at(SUM)
-        formula: Formula = Predicate(cast(Comparison, token.text), left, right)
-        while self._next.kind == "symbol" and _LEVELS.get(self._next.text) == COMPARISON:
+        formula: stl.Formula = stl.Predicate(cast(stl.Comparison, token.text), left, right)
+        while self._next.kind == "symbol" and _LEVELS.get(self._next.text) == stl.COMPARISON:
             token = self._take()
             left, right = right, self._expression_at(SUM)
-            formula = And(formula, Predicate(cast(Comparison, token.text), left, right))
+            formula = stl.And(formula, stl.Predicate(cast(stl.Comparison, token.text), left, right))
         return formula
 
-    def _operand(self, level: int) -> Node:
+    def _operand(self, level: int) -> stl.Node:
         token = self._take()
         if token.kind == "number":
             value = float(token.text)
@@ -207,45 +173,45 @@ class _Parser:
         if token.kind == "name":
             return self._named(token)
         if token.text == "(":
-            inside = self._climb(EQUIVALENCE)
+            inside = self._climb(stl.EQUIVALENCE)
             self._close(token)
             return inside
         if token.text == "-":
             operand = self._expression_at(SIGN)
             return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
         if token.text in ("true", "false"):
-            return Constant(token.text == "true")
-        if token.text in FUNCTIONS:
+            return stl.Constant(token.text == "true")
+        if token.text in lexer.FUNCTIONS:
             return self._call(token)
         if token.text in _PREFIXES:
-            if level > PREFIX:
+            if level > stl.PREFIX:
                 self._fail(
                     f"{token.shown} starts a formula, but a number or a signal is expected here",
                     token.position,
                     f'is a parenthesis missing? Write a signal of that name as "{token.written}"',
                 )
             window = (self._window(),) if token.text in "GF" else ()
-            return _PREFIXES[token.text](self._formula_at(PREFIX), *window)
+            return _PREFIXES[token.text](self._formula_at(stl.PREFIX), *window)
         problem = f"expected a formula, a signal or a number, not {token.shown}"
         if token.kind == "end":
             problem = "the formula ends too early"
-        self._fail(problem, token.position, hint_at(self.tokens, self.index - 1))
+        self._fail(problem, token.position, lexer.hint_at(self.tokens, self.index - 1))
 
-    def _named(self, token: Token) -> Name:
+    def _named(self, token: lexer.Token) -> Name:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
-                hint = hint_for(token) or did_you_mean(token.text, FUNCTIONS)
+                hint = lexer.hint_for(token) or did_you_mean(token.text, lexer.FUNCTIONS)
                 self._fail(f"unknown function {token.text!r}", token.position, hint)
             if self._next.text == "[":
                 self._fail(
                     f"the index of {token.text!r} cannot be read",
                     self._next.position,
-                    hint_for(token)
+                    lexer.hint_for(token)
                     or "indices are integers, as in x[1,2]; put any other name in double quotes",
                 )
         return Name(token.text)
 
-    def _call(self, token: Token) -> Call:
+    def _call(self, token: lexer.Token) -> Call:
         opening = self._take()
         operands = [self._expression_at(SUM)]
         while self._accept(","):
@@ -259,19 +225,19 @@ class _Parser:
             )
         return Call(cast(Function, token.text), tuple(operands))
 
-    def _close(self, opening: Token) -> None:
+    def _close(self, opening: lexer.Token) -> None:
         if not self._accept(")"):
             self._fail(
                 f"expected ')' before {self._next.shown}",
                 self._next.position,
                 f"it closes the '(' at position {opening.position + 1}"
                 if self._next.kind in ("end", "symbol")
-                else JOIN,
+                else lexer.JOIN,
             )
 
     # -- windows -----------------------------------------------------------------------------------------
 
-    def _window(self) -> Window | None:
+    def _window(self) -> stl.Window | None:
         bracket = self._next
         if bracket.text == "(" and self._looks_like_open_window():
             self._fail("open windows are not supported", bracket.position, _CLOSED)
@@ -291,17 +257,19 @@ class _Parser:
                 f"give both a unit, for example [{start_text}{start_unit or end_unit},"
                 f"{end_text}{end_unit or start_unit}]",
             )
-        window = Window(_seconds(start_text, start_unit), _seconds(end_text, end_unit))
+        window = stl.Window(_seconds(start_text, start_unit), _seconds(end_text, end_unit))
         is_rounded = start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED)
         if window.start > window.end and is_rounded:
             # [1.3333333s,0.0222222min] is one moment; the bound in the smaller unit is the more exact one.
-            moment = window.start if UNITS[start_unit or "s"] < UNITS[end_unit or "s"] else window.end
-            window = Window(moment, moment)
+            moment = (
+                window.start if lexer.UNITS[start_unit or "s"] < lexer.UNITS[end_unit or "s"] else window.end
+            )
+            window = stl.Window(moment, moment)
         if window.start > window.end:
             self._fail(
                 f"the window {window} ends before it starts",
                 bracket.position,
-                f"write the smaller bound first: {Window(window.end, window.start)}",
+                f"write the smaller bound first: {stl.Window(window.end, window.start)}",
             )
         if not math.isfinite(window.end):
             self._fail("the bound is too large", end_token.position, "omit the window")
@@ -319,8 +287,8 @@ class _Parser:
         if self._next.kind == "name":
             word = self._take()
             unit = word.text
-            if unit not in UNITS:
-                self._fail(f"unknown unit {unit!r}", word.position, did_you_mean(unit, UNITS))
+            if unit not in lexer.UNITS:
+                self._fail(f"unknown unit {unit!r}", word.position, did_you_mean(unit, lexer.UNITS))
         return token.text, unit
 
     def _looks_like_open_window(self) -> bool:
@@ -329,22 +297,22 @@ class _Parser:
 
     # -- what went wrong ---------------------------------------------------------------------------------
 
-    def _as_formula(self, node: Node, start: int) -> Formula:
-        if isinstance(node, Formula):
+    def _as_formula(self, node: stl.Node, start: int) -> stl.Formula:
+        if isinstance(node, stl.Formula):
             return node
         if isinstance(node, Name):
-            return Flag.of(node)
+            return stl.Flag.of(node)
         what = "a number" if isinstance(node, Number) else "an expression"
         hint = f"compare it, for example {node} >= 0"
         if "=>" in self.text:
             hint += "; => is an implication, greater or equal is >="
         self._fail(f"expected a formula, got {what}, {node}", start, hint)
 
-    def _as_expression(self, node: Node, start: int) -> Expression:
+    def _as_expression(self, node: stl.Node, start: int) -> Expression:
         if isinstance(node, Expression):
             return node
         hint = "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->"
-        if isinstance(node, Constant):
+        if isinstance(node, stl.Constant):
             hint = "write a Boolean signal b as b or not b"
         self._fail("expected a number or a signal, got a formula", start, hint)
 
@@ -354,21 +322,21 @@ class _Parser:
         )
 
     def _fail(self, problem: str, position: int, hint: str) -> NoReturn:
-        raise syntax_error(self.text, problem, position, hint)
+        raise lexer.syntax_error(self.text, problem, position, hint)
 
 
 def _seconds(bound: str, unit: str) -> float:
     """Return a bound in s without the rounding of a product: 0.29 min are 17.4 s."""
     value = float(bound)
-    return float(Decimal(bound) * UNITS[unit or "s"]) if 0.0 < value < math.inf else value
+    return float(Decimal(bound) * lexer.UNITS[unit or "s"]) if 0.0 < value < math.inf else value
 
 
-def _depth(formula: Formula) -> int:
+def _depth(formula: stl.Formula) -> int:
     # Iterative: a chain such as ``a and b and ...`` is parsed in a loop and may be too deep to recurse into.
     deepest = 0
-    below: list[tuple[Node, int]] = [(formula, 1)]
+    below: list[tuple[stl.Node, int]] = [(formula, 1)]
     while below:
         node, depth = below.pop()
         deepest = max(deepest, depth)
-        below.extend((part, depth + 1) for part in parts_of(node))
+        below.extend((part, depth + 1) for part in stl.parts_of(node))
     return deepest
