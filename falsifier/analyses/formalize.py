@@ -141,9 +141,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     except NoValidReplyError:
         if not readings:
             raise
-    spent = Spent()
-    for exchange in exchanges:
-        spent = spent.plus_requests(exchange.requests, exchange.usage)
+    spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())
     readings = _judged(subject, readings)
     differences = tuple(
         _difference(i, j, readings[i - 1], readings[j - 1])

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from falsifier.campaigns.directory import (
@@ -81,15 +81,4 @@ def spent_together(shares: Iterable[tuple[object, Spent]]) -> Spent:
     longest: dict[object, Spent] = {}
     for search, spent in shares:
         longest[search] = max(longest.get(search, spent), spent, key=lambda s: (s.simulations, s.seconds))
-    return total(longest.values())
-
-
-def total(spent: Iterable[Spent]) -> Spent:
-    """Sum of what several runs have spent; unknown if that of any run is."""
-    listed = list(spent)
-
-    def added(name: str) -> float | None:
-        numbers = [getattr(each, name) for each in listed]
-        return None if None in numbers else sum(numbers)
-
-    return Spent(**{f.name: added(f.name) for f in fields(Spent)})  # type: ignore[arg-type]
+    return sum(longest.values(), Spent())

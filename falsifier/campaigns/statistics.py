@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.campaigns.progress import total
 from falsifier.campaigns.request import Method
 from falsifier.campaigns.runs import Run
+from falsifier.search.budget import Spent
 
 _CONFIDENCE = 0.95
 _RESAMPLES = 2000
@@ -59,7 +59,7 @@ def statistics(runs: Iterable[Run]) -> Statistics:
     runs = list(runs)
     finished = [run for run in runs if run.finished]
     counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
-    spent = total(run.spent for run in finished)
+    spent = sum((run.spent for run in finished), Spent())
     share = 1 / max(len(finished), 1)
     return Statistics(
         runs=len(finished),

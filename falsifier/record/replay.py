@@ -123,9 +123,7 @@ def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
 
 def _difference(spent: Spent, played: Sequence[Exchange]) -> Spent:
     """What was spent on a language model beyond the exchanges that are played back."""
-    again = Spent()
-    for exchange in played:
-        again = again.plus_requests(exchange.requests, exchange.usage)
+    again = sum((Spent.on_requests(each.requests, each.usage) for each in played), Spent())
     return Spent(
         cost=None if spent.cost is None else max(0.0, round(spent.cost - (again.cost or 0.0), 12)),
         **{name: getattr(spent, name) - getattr(again, name) for name in ("calls", *USED)},

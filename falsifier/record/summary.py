@@ -102,7 +102,7 @@ class Summary:
                 self.unconfirmed[record.index] = f"{record.outcome}: {record.reason}"
             case records.ExchangeRecord():
                 exchange = record.exchange
-                self.spent = self.spent.plus_requests(exchange.requests, exchange.usage)
+                self.spent += Spent.on_requests(exchange.requests, exchange.usage)
             case records.EndedRecord():
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent
                 own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
@@ -122,12 +122,7 @@ class Summary:
         failed = all(v is None for v in judged.values())
         if failed:
             self._failed[record.index] = record.reason
-        self.spent = replace(
-            self.spent,
-            simulations=self.spent.simulations + 1,
-            simulation_seconds=self.spent.simulation_seconds + record.seconds,
-            failures=self.spent.failures + failed,
-        )
+        self.spent += Spent(simulations=1, simulation_seconds=record.seconds, failures=int(failed))
 
 
 S = TypeVar("S", bound=Summary)

@@ -1,7 +1,7 @@
 """What a run may spend, what it has spent, and a chat that keeps to it and pays for nothing twice."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from time import monotonic
 
 from falsifier.core.arguments import positive, whole
@@ -80,11 +80,15 @@ class Spent:
         """Tokens sent and received."""
         return self.prompt_tokens + self.completion_tokens
 
-    def plus_requests(self, count: int, usage: Usage) -> "Spent":
-        """Return this with more requests to a language model, and what they used."""
-        used = {name: getattr(self, name) + getattr(usage, name) for name in USED}
-        cost = None if usage.cost is None or self.cost is None else self.cost + usage.cost
-        return replace(self, calls=self.calls + count, cost=cost, **used)
+    @classmethod
+    def on_requests(cls, count: int, usage: Usage) -> "Spent":
+        """Return what so many requests to a language model used."""
+        return cls(calls=count, cost=usage.cost, **{name: getattr(usage, name) for name in USED})
+
+    def __add__(self, other: "Spent") -> "Spent":
+        counts = [f.name for f in fields(self) if f.name != "cost"]
+        cost = None if self.cost is None or other.cost is None else self.cost + other.cost
+        return Spent(**{name: getattr(self, name) + getattr(other, name) for name in counts}, cost=cost)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
-from falsifier.llm.messages import Chat, Exchange, Usage
+from falsifier.llm.messages import Chat, Exchange
 from falsifier.problem.problem import Problem, check_limits, check_names
 from falsifier.search import events
 from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
@@ -235,7 +235,7 @@ class _Loop:
         engine = self.known if self.known.left else state.engine
         candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
         self.turns += 1
-        self.think(seconds)
+        self.spent += Spent(engine_seconds=seconds)
         self.emit(
             events.Asked(
                 first=self.count + len(self.waiting),
@@ -264,11 +264,8 @@ class _Loop:
         improved = [state.note(seen) for state, seen in judged]
         failed = all(seen.status != "ok" for _, seen in judged)
         self.last_error = evaluation.reason if failed else self.last_error
-        self.spent = replace(
-            self.clock(),
-            simulations=self.spent.simulations + 1,
-            simulation_seconds=self.spent.simulation_seconds + evaluation.seconds,
-            failures=self.spent.failures + failed,
+        self.spent = self.clock() + Spent(
+            simulations=1, simulation_seconds=evaluation.seconds, failures=int(failed)
         )
         self.emit(
             events.Evaluated(
@@ -293,11 +290,7 @@ class _Loop:
         for state in standing:
             evaluations, state.untold = state.untold, []
             if evaluations:
-                self.think(self.steps.tell(state.engine, evaluations))
-
-    def think(self, seconds: float) -> None:
-        """Add to the time spent in engines."""
-        self.spent = replace(self.spent, engine_seconds=self.spent.engine_seconds + seconds)
+                self.spent += Spent(engine_seconds=self.steps.tell(state.engine, evaluations))
 
     def consider(self, state: RequirementState, evaluation: Evaluation) -> None:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
@@ -319,17 +312,13 @@ class _Loop:
         """Count and announce an exchange with a language model."""
         self.is_answered = self.is_answered or exchange.problem is None
         self.last_defect = exchange.problem or self.last_defect
-        self.count_requests(exchange.requests, exchange.usage)
+        self.spent += Spent.on_requests(exchange.requests, exchange.usage)
         self.emit(events.Exchanged(exchange=exchange, spent=self.clock()))
-
-    def count_requests(self, count: int, usage: Usage) -> None:
-        """Count what was asked of a language model."""
-        self.spent = self.spent.plus_requests(count, usage)
 
     def count_lost(self, error: BaseException | None) -> None:
         """Count the requests that an error tells were in vain."""
         if (lost := getattr(error, "lost", None)) is not None:
-            self.count_requests(lost.without_reply, lost)
+            self.spent += Spent.on_requests(lost.without_reply, lost)
 
     def clock(self) -> Spent:
         """Update and return what has been spent; while a record is repeated, time stands still."""

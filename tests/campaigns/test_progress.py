@@ -2,14 +2,6 @@ import shutil
 from pathlib import Path
 
 from falsifier.campaigns import Follower, RunProgress
-from falsifier.campaigns.progress import total
-from falsifier.search.budget import Spent
-
-
-def test_what_was_spent_adds_up_and_an_unknown_cost_stays_unknown() -> None:
-    assert total([Spent(cost=0.5), Spent(cost=0.25, simulations=1)]) == Spent(cost=0.75, simulations=1)
-    assert total([Spent(cost=0.5), Spent(cost=None, simulations=1)]) == Spent(cost=None, simulations=1)
-    assert total([]) == Spent()
 
 
 def test_following_a_finished_campaign_says_what_its_runs_say(campaign: Path) -> None:

@@ -24,13 +24,13 @@ def test_the_first_limit_that_is_reached_is_named(budget: Budget, spent: Spent, 
 
 def test_an_unknown_price_stays_unknown_and_forbids_a_limit_on_money() -> None:
     once = Usage(prompt_tokens=10, completion_tokens=5, reasoning_tokens=2, cost=0.01)
-    known = Spent().plus_requests(1, once)
-    unknown = known.plus_requests(3, Usage(prompt_tokens=10, completion_tokens=5, without_reply=2))
+    known = Spent(simulations=1) + Spent.on_requests(1, once)
+    unknown = known + Spent.on_requests(3, Usage(prompt_tokens=10, completion_tokens=5, without_reply=2))
     assert known.cost == pytest.approx(0.01)
-    assert unknown.plus_requests(1, Usage(prompt_tokens=1, cost=0.01)).cost is None
-    assert (unknown.calls, unknown.without_reply) == (4, 2)
+    assert (unknown + known).cost is None
+    assert (unknown.simulations, unknown.calls, unknown.without_reply) == (1, 4, 2)
     kept = Exchange(llm="m", messages=(), reply=ChatReply(text="", usage=Usage(cost=0.0, kept=1)))
-    again = known.plus_requests(kept.requests, kept.usage)
+    again = known + Spent.on_requests(kept.requests, kept.usage)
     assert (again.calls, again.kept, again.questions, again.cost) == (1, 1, 2, known.cost)
     assert unknown.tokens == 30
     with pytest.raises(SpecError, match="price of this language model is unknown"):
