@@ -152,8 +152,8 @@ def digits(value: float) -> int:
 def shortest(value: float) -> str:
     """Return the shortest text of a number that has its value.
 
-    >>> shortest(1.1), shortest(2.0)
-    ('1.1', '2')
+    >>> shortest(1.1), shortest(2.0), shortest(1e-7)
+    ('1.1', '2', '1e-07')
     """
     return repr(float(value)).removesuffix(".0")
 

@@ -5,10 +5,11 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
+from falsifier.core.literals import shortest
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import ModelChanges
 from falsifier.stl import parse
-from falsifier.stl.expression import Number, number_text
+from falsifier.stl.expression import Number
 from falsifier.stl.formula import Predicate
 
 # Decimals of times in s; finer than any grid.
@@ -95,7 +96,7 @@ def tidy(value: float) -> float:
 
 def window(start: float, end: float) -> str:
     """Return a window without the digits of rounding."""
-    return f"[{number_text(round(start, _DECIMALS))},{number_text(round(end, _DECIMALS))}]"
+    return f"[{shortest(round(start, _DECIMALS))},{shortest(round(end, _DECIMALS))}]"
 
 
 def size_of(margin: float | str, reference: str | float) -> str:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from falsifier.core.literals import shortest
 from falsifier.errors import FormulaError
 from falsifier.stl import formula as stl
 from falsifier.stl import program as op
@@ -21,7 +22,6 @@ from falsifier.stl.expression import (
     Expression,
     Name,
     Negative,
-    number_text,
 )
 from falsifier.stl.margins import on_limit
 from falsifier.stl.program import CompiledPart, Location, Program
@@ -65,9 +65,9 @@ def window_samples(window: stl.Window, step: float) -> tuple[int, int]:
     for bound, nearest in ((window.start, start), (window.end, end)):
         if abs(bound / step - nearest) > _BOUND_TOLERANCE:
             raise FormulaError(
-                f"the bound {number_text(bound)} s of the window {window} is not a multiple of the sampling "
-                f"step {number_text(step)} s; the nearest multiple is "
-                f"{number_text(round(nearest * step, 12))} s"
+                f"the bound {shortest(bound)} s of the window {window} is not a multiple of the sampling "
+                f"step {shortest(step)} s; the nearest multiple is "
+                f"{shortest(round(nearest * step, 12))} s"
             )
     return start, end
 
@@ -113,8 +113,8 @@ class _Compiler:
         if any(isinstance(f, stl.Temporal) and f.window is None for f in self.formula.walk()):
             hint += "; an operator without a window extends to the stop time: give it one that ends earlier"
         raise FormulaError(
-            f"{what} needs values up to {number_text(round(last * self.step, 9))} s, but the trajectory ends "
-            f"at {number_text(round(end, 9))} s; {hint}"
+            f"{what} needs values up to {shortest(round(last * self.step, 9))} s, but the trajectory ends "
+            f"at {shortest(round(end, 9))} s; {hint}"
         )
 
     # -- the steps ---------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.literals import shortest
 from falsifier.stl.lexer import name_text
 
 Operator = Literal["+", "-", "*", "/", "^"]
@@ -81,7 +82,7 @@ class Number(Expression):
         return SIGN if self.value < 0 else ATOM
 
     def __str__(self) -> str:
-        return number_text(self.value)
+        return shortest(self.value)
 
     def _value(self, columns: Mapping[str, Any]) -> Any:
         return self.value
@@ -183,13 +184,3 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
 def embraced(part: Any, binding: int) -> str:
     """Return the text of a part, in parentheses if its precedence is lower than ``binding``."""
     return str(part) if part.binding >= binding else f"({part})"
-
-
-def number_text(value: float) -> str:
-    """Return the shortest text that parses to this number.
-
-    >>> number_text(120.0), number_text(0.05), number_text(1e-7)
-    ('120', '0.05', '1e-07')
-    """
-    text = repr(float(value))
-    return text.removesuffix(".0")

@@ -16,7 +16,8 @@ from typing import Any, ClassVar, Literal, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.stl.expression import SUM, Expression, Name, Number, embraced, number_text
+from falsifier.core.literals import shortest
+from falsifier.stl.expression import SUM, Expression, Name, Number, embraced
 
 Comparison = Literal["<", "<=", ">", ">=", "==", "!="]
 
@@ -44,7 +45,7 @@ class Window:
     end: float
 
     def __str__(self) -> str:
-        return f"[{number_text(self.start)},{number_text(self.end)}]"
+        return f"[{shortest(self.start)},{shortest(self.end)}]"
 
 
 class Formula:

@@ -25,11 +25,12 @@ from typing import Any
 
 import numpy as np
 
+from falsifier.core.literals import shortest
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError
 from falsifier.stl import formula as stl
 from falsifier.stl.compiler import window_samples
-from falsifier.stl.expression import Expression, Number, number_text
+from falsifier.stl.expression import Expression, Number
 from falsifier.stl.margins import ON_LIMIT
 
 
@@ -117,7 +118,7 @@ class _Translation:
     def side(self, expression: Expression) -> str:
         """Return the text of a compared expression: a number, or the alias of its column."""
         if isinstance(expression, Number):
-            return number_text(expression.value)
+            return shortest(expression.value)
         if expression not in self.aliases:
             known = {name: self.trajectory[name] for name in expression.signals}
             values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)

@@ -1,7 +1,8 @@
 """Formulas in words, for prompts and reports."""
 
+from falsifier.core.literals import shortest
 from falsifier.stl import formula as stl
-from falsifier.stl.expression import Arithmetic, Call, Number, number_text
+from falsifier.stl.expression import Arithmetic, Call, Number
 
 _IS: dict[stl.Comparison, str] = {
     "<": "is below",
@@ -106,7 +107,7 @@ def _when(window: stl.Window | None, *, later: bool, always: bool = False) -> st
     )
     if window is None:
         return open_ended if later else absolute
-    start, end = number_text(window.start), number_text(window.end)
+    start, end = shortest(window.start), shortest(window.end)
     if start == end:
         return f"{start} s later" if later else f"at {start} s"
     if later and window.start == 0:

@@ -83,3 +83,9 @@ def test_a_long_signal_is_cut_in_the_middle_and_says_how_lively_it_is() -> None:
     assert text.startswith("held: 0 at 0 s, 1 at 0.5 s")
     assert "... 28 more ..." in text
     assert text.endswith("1 at 19.5 s (39 switches, shortest dwell 0.5 s)")
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-7, 120.0, -0.5, 1e300])
+def test_numbers_read_back_exactly(value: float) -> None:
+    assert float(literals.shortest(value)) == value
+    assert not literals.shortest(value).endswith(".0")

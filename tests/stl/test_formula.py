@@ -15,7 +15,6 @@ from falsifier.stl.expression import (
     Name,
     Negative,
     Number,
-    number_text,
     unit_of,
 )
 from falsifier.stl.formula import FALSE, TRUE, Constant, Formula, Predicate, replaced, without_constants
@@ -75,12 +74,6 @@ def test_what_is_not_defined_is_no_number_and_no_warning(function: Function, val
 def test_parentheses_stand_where_they_are_needed_and_nowhere_else(expression: Expression, text: str) -> None:
     assert str(expression) == text
     assert parse(f"{text} < x") == Predicate("<", expression, X)
-
-
-@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-7, 120.0, -0.5, 1e300])
-def test_numbers_read_back_exactly(value: float) -> None:
-    assert float(number_text(value)) == value
-    assert not number_text(value).endswith(".0")
 
 
 def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:

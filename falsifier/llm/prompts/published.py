@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import shortest
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange
 from falsifier.core.trajectory import Trajectory
@@ -18,7 +19,6 @@ from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
 from falsifier.llm.prompts.observations import compared_columns
 from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, reply_form, requirement_text
 from falsifier.llm.prompts.view import Variant, View
-from falsifier.stl.expression import number_text
 from falsifier.stl.formula import Formula
 
 # They tell so many of the latest samples.
@@ -169,7 +169,7 @@ def _clock(view: View, time: float) -> str:
 
 
 def _clock_decimals(formula: Formula) -> int:
-    limits = (number_text(limit) for window in formula.windows for limit in (window.start, window.end))
+    limits = (shortest(limit) for window in formula.windows for limit in (window.start, window.end))
     found = max((len(limit.partition(".")[2]) for limit in limits), default=0)
     return min(found, _MOST_CLOCK_DECIMALS) or 1
 
