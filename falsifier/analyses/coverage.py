@@ -17,13 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
+from falsifier.core.space import Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.levels import Climb
 from falsifier.record import manifest
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import read_journal, recorded_candidates
-from falsifier.record.manifest import InputRecord, Manifest
+from falsifier.record.manifest import Manifest
 from falsifier.record.records import EvaluatedRecord
 from falsifier.search.findings import Failure
 from falsifier.search.findings import failures as by_cause
@@ -62,7 +63,7 @@ class RangeCoverage:
         paces: number of simulations by the input's fastest change, as PACES; empty for a parameter.
     """
 
-    searched: InputRecord
+    searched: Range
     low: float | None
     high: float | None
     parts: Counts
@@ -237,9 +238,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     )
 
 
-def _of_range(
-    r: InputRecord, tried: Sequence[ArrayLike], paces: Mapping[str, int]
-) -> tuple[RangeCoverage, Cells]:
+def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) -> tuple[RangeCoverage, Cells]:
     """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
     n is _SAMPLES for an input, 1 for a parameter, which has no paces.
@@ -310,7 +309,7 @@ class _Seen:
         return ModeCoverage(name, named(sorted(values)), never, tuple(map(named, sorted(self.changes[name]))))
 
 
-def _allowed(r: InputRecord) -> list[int]:
+def _allowed(r: Range) -> list[int]:
     """Return the numbers that an integer, Boolean or enumeration may have; empty if there are many."""
     if r.items:
         return sorted(n for _, n in r.items if r.low <= n <= r.high)
@@ -318,7 +317,7 @@ def _allowed(r: InputRecord) -> list[int]:
     return list(range(first, last + 1)) if last - first < PARTS else []
 
 
-def edges_of(r: InputRecord) -> list[tuple[float, float]]:
+def edges_of(r: Range) -> list[tuple[float, float]]:
     """Return both ends of each part of a range; they are equal if a part is one whole number of a few."""
     if r.kind != "real" and (numbers := _allowed(r)):
         return [(float(n), float(n)) for n in numbers]
@@ -327,7 +326,7 @@ def edges_of(r: InputRecord) -> list[tuple[float, float]]:
     return list(pairwise(np.linspace(r.low, r.high, PARTS + 1).tolist()))
 
 
-def cells_of(r: InputRecord, values: Array) -> Cells:
+def cells_of(r: Range, values: Array) -> Cells:
     """Return the part of the range in which each value is, in the shape of the values."""
     edges = np.array(edges_of(r))
     between = (edges[1:, 0] + edges[:-1, 1]) / 2
@@ -341,7 +340,7 @@ def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
     return {number: label for label, number in items}
 
 
-def pace_of(signal: Signal, r: InputRecord, stop_time: float) -> str:
+def pace_of(signal: Signal, r: Range, stop_time: float) -> str:
     """Return which of PACES an input had at its fastest.
 
     A signal that is sampled and held counts as what is sampled: its period is the model's, not the search's.

@@ -1,7 +1,7 @@
 """Candidates: input signals and parameter values by name, in the same form for every engine."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from falsifier.core.arguments import finite, instance
@@ -47,15 +47,7 @@ class Candidate:
     def to_json(self) -> dict[str, Any]:
         """Return the JSON form used in journals and exports."""
         return {
-            "signals": {
-                name: {
-                    "times": list(s.times),
-                    "values": list(s.values),
-                    "interpolation": s.interpolation,
-                    "hold": s.hold,
-                }
-                for name, s in self.signals.items()
-            },
+            "signals": {name: asdict(signal) for name, signal in self.signals.items()},
             "parameters": dict(self.parameters),
             "origin": self.origin,
             "rationale": self.rationale,

@@ -48,7 +48,7 @@ class Freedom:
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """What inputs and parameters have in common; see there."""
+    """What inputs and parameters have in common; the items are names and numbers of an enumeration's."""
 
     name: str
     low: float

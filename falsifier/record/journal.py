@@ -251,16 +251,16 @@ class JournalReader:
             for line in file:
                 if not line.endswith(b"\n"):  # cut off by a crash, or still being written
                     return
-                self.line += 1
+                number = self.line + 1
                 try:
                     check_seal(line)
-                    record = parse_line(line, self.line, self.run)
+                    record = parse_line(line, number, self.run)
                 except ValueError as error:
                     raise JournalError(
-                        f"{self.path}: line {self.line} is damaged: {error}; to drop what is damaged: "
+                        f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
                         f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
                     ) from error
-                self.offset += len(line)
+                self.line, self.offset = number, self.offset + len(line)
                 yield record
 
 
@@ -344,7 +344,7 @@ def repair(directory: Path) -> list[str]:
             with path.open("r+b") as file:
                 file.truncate(reader.offset)
             found.append(
-                f"{path}: line {reader.line} is damaged: {error.__cause__}; {counted(lost, 'line')} from "
+                f"{path}: line {reader.line + 1} is damaged: {error.__cause__}; {counted(lost, 'line')} from "
                 f"there on dropped, kept as {copy.name}; to resume the run repeats what is missing"
             )
         for path in sorted((directory / files.TRAJECTORIES).glob("*.npz")):

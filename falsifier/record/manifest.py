@@ -10,12 +10,12 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any, NamedTuple
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
-from falsifier.core.space import ValueKind
+from falsifier.core.space import Range, ValueKind
 from falsifier.errors import JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import source_file
@@ -30,18 +30,6 @@ MANIFEST = "manifest.json"
 # Runs of a folder that are named where one of them is expected.
 _NAMED = 3
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
-
-
-class InputRecord(Strict):
-    """One searched input or parameter, so that reports can draw a run without its model."""
-
-    name: str
-    low: float
-    high: float
-    unit: str = ""
-    description: str = ""
-    kind: ValueKind = "real"
-    items: tuple[tuple[str, int], ...] = Field((), description="Names and numbers of an enumeration's items.")
 
 
 class ModeRecord(Strict):
@@ -95,6 +83,9 @@ class Surroundings(Strict):
 class Manifest(Surroundings):
     """Content of manifest.json: everything needed to repeat the run and to report on it."""
 
+    # Of inputs and parameters their ranges alone are recorded.
+    model_config = ConfigDict(revalidate_instances="subclass-instances")
+
     run: str = Field("", description="Random name of the run, which every line of its journal repeats.")
     request: RunRequest
     engine: str = Field(description="Name of the engine, even if it was made in Python.")
@@ -107,8 +98,8 @@ class Manifest(Surroundings):
     parameterization: Parameterization = Field(
         description="free: the engine could choose the control points of at least one input."
     )
-    inputs: tuple[InputRecord, ...]
-    parameters: tuple[InputRecord, ...]
+    inputs: tuple[Range, ...] = Field(description="So that reports can draw a run without its model.")
+    parameters: tuple[Range, ...]
     not_searched: tuple[Held, ...] = Field(
         description="The other inputs and the parameters, with the values at which they are held."
     )
@@ -215,8 +206,8 @@ def describe(
         model=problem.info.name,
         components=problem.info.components,
         parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
-        inputs=tuple(InputRecord.model_validate(r, from_attributes=True) for r in space.inputs),
-        parameters=tuple(InputRecord.model_validate(p, from_attributes=True) for p in space.parameters),
+        inputs=space.inputs,
+        parameters=space.parameters,
         not_searched=problem.held,
         modes=tuple(_modes(problem)),
         stop_time=space.stop_time,

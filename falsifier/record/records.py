@@ -1,6 +1,6 @@
 """The lines of a journal as typed records."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -66,6 +66,9 @@ class ExchangeRecord(_Record):
 class ConfirmedRecord(_Record):
     """A violation was simulated again and judged by a second monitor."""
 
+    # What it has of a confirmation.
+    shared: ClassVar[tuple[str, ...]] = ("outcome", "robustness", "reference", "reason", "halved")
+
     kind: Literal["confirmed"] = "confirmed"
     index: int
     requirement: str
@@ -79,28 +82,13 @@ class ConfirmedRecord(_Record):
     @classmethod
     def of(cls, confirmation: Confirmation, *, index: int, spent: Spent) -> "ConfirmedRecord":
         """Return the record of a confirmation."""
-        return cls(
-            index=index,
-            requirement=confirmation.problem.name,
-            outcome=confirmation.outcome,
-            robustness=confirmation.robustness,
-            reference=confirmation.reference,
-            reason=confirmation.reason,
-            halved=confirmation.halved,
-            spent=spent,
-        )
+        shared = {name: getattr(confirmation, name) for name in cls.shared}
+        return cls(index=index, requirement=confirmation.problem.name, spent=spent, **shared)
 
     def confirmation(self, problem: Problem, evaluation: Evaluation) -> Confirmation:
         """Return what was recorded, given the problem and the evaluation that violates its requirement."""
-        return Confirmation(
-            problem=problem,
-            evaluation=evaluation,
-            outcome=self.outcome,
-            robustness=self.robustness,
-            reference=self.reference,
-            reason=self.reason,
-            halved=self.halved,
-        )
+        shared = {name: getattr(self, name) for name in self.shared}
+        return Confirmation(problem=problem, evaluation=evaluation, **shared)
 
 
 class EndedRecord(_Record):

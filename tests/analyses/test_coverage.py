@@ -8,8 +8,9 @@ import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
 from falsifier.analyses.coverage import Coverage, coverage_of, pace_of
+from falsifier.core.space import Range
 from falsifier.errors import SpecError
-from falsifier.record.manifest import InputRecord, Manifest, ModeRecord, describe
+from falsifier.record.manifest import Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.analyses_text import coverage_json, coverage_text
@@ -18,14 +19,14 @@ from tests.problems import mostly_broken
 TIMES = np.linspace(0.0, 10.0, 11)
 
 
-def described(*inputs: InputRecord, parameters: tuple[InputRecord, ...] = ()) -> Manifest:
+def described(*inputs: Range, parameters: tuple[Range, ...] = ()) -> Manifest:
     made = describe(RunRequest(problems=()), [lag_problem()], "uniform")
     modes = (ModeRecord(name="gear", kind="enumeration", items=(("N", 0), ("D", 1), ("R", 2))),)
     return made.model_copy(update={"inputs": inputs, "parameters": parameters, "modes": modes})
 
 
 def tried(*signals: Signal, trajectory: Trajectory | None = None) -> Coverage:
-    u = InputRecord(name="u", low=0.0, high=100.0)
+    u = Range(name="u", low=0.0, high=100.0)
     return coverage_of(described(u), [(Candidate({"u": s}), trajectory) for s in signals])
 
 
@@ -37,8 +38,8 @@ def test_parts_of_a_range_that_no_value_was_in_are_gaps() -> None:
 
 
 def test_before_the_first_simulation_nothing_was_tried() -> None:
-    p = InputRecord(name="p", low=0.0, high=1.0)
-    found = coverage_of(described(InputRecord(name="u", low=0.0, high=1.0), parameters=(p,)), [])
+    p = Range(name="p", low=0.0, high=1.0)
+    found = coverage_of(described(Range(name="u", low=0.0, high=1.0), parameters=(p,)), [])
     assert [(r.low, r.tried, r.gaps) for r in found.ranges] == [(None, 0, ((0.0, 1.0),))] * 2
 
 
@@ -50,9 +51,9 @@ def test_values_are_counted_where_they_were_in_time() -> None:
 
 
 def test_combinations_are_of_values_at_the_same_time() -> None:
-    ranges = [InputRecord(name=name, low=0.0, high=10.0) for name in "uv"]
+    ranges = [Range(name=name, low=0.0, high=10.0) for name in "uv"]
     steps = Signal((0.0, 5.0), (0.5, 9.5), "constant")
-    p = InputRecord(name="p", low=0.0, high=1.0)
+    p = Range(name="p", low=0.0, high=1.0)
     found = coverage_of(
         described(*ranges, parameters=(p,)), [(Candidate({"u": steps, "v": steps}, {"p": 0.55}), None)]
     )
@@ -64,7 +65,7 @@ def test_combinations_are_of_values_at_the_same_time() -> None:
 
 def test_many_simulations_of_many_inputs_take_little_memory() -> None:
     names = [f"u{k}" for k in range(12)]
-    ranges = [InputRecord(name=name, low=0.0, high=1.0) for name in names]
+    ranges = [Range(name=name, low=0.0, high=1.0) for name in names]
     candidate = Candidate(dict.fromkeys(names, Signal((0.0,), (0.5,))))
     tracemalloc.start()
     coverage_of(described(*ranges), [(candidate, None)] * 500)
@@ -74,7 +75,7 @@ def test_many_simulations_of_many_inputs_take_little_memory() -> None:
 
 
 def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
-    u = InputRecord(name="u", low=0, high=2, kind="integer")
+    u = Range(name="u", low=0, high=2, kind="integer")
     found = coverage_of(described(u), [(Candidate({"u": Signal((0.0, 5.0), (0.0, 2.0), "constant")}), None)])
     assert found.ranges[0].parts.tolist() == [1, 0, 1]
     assert found.ranges[0].gaps == ((1.0, 1.0),)
@@ -85,7 +86,7 @@ def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
 def test_outputs_and_modes_are_read_from_trajectories() -> None:
     first = Trajectory(TIMES, {"x": TIMES, "gear": np.where(TIMES > 4, 1.0, 0.0), "u": TIMES}, {"x": "m"})
     second = Trajectory(TIMES, {"x": -TIMES, "gear": np.zeros(11), "u": TIMES}, {"x": "m"})
-    u = InputRecord(name="u", low=0.0, high=100.0)
+    u = Range(name="u", low=0.0, high=100.0)
     candidate = Candidate({"u": Signal((0.0,), (1.0,))})
     found = coverage_of(described(u), [(candidate, first), (candidate, second), (candidate, None)])
     assert (found.simulations, found.trajectories) == (3, 2)
@@ -134,4 +135,4 @@ def test_causes_of_failed_simulations_are_counted(tmp_path: Path) -> None:
     ],
 )
 def test_how_fast_an_input_changed(signal: Signal, pace: str) -> None:
-    assert pace_of(signal, InputRecord(name="u", low=0.0, high=100.0), 10.0) == pace
+    assert pace_of(signal, Range(name="u", low=0.0, high=100.0), 10.0) == pace

@@ -5,9 +5,9 @@ import numpy as np
 from falsifier import Candidate, Signal
 from falsifier.analyses.coverage import coverage_of
 from falsifier.analyses.formalize import formalize
+from falsifier.core.space import Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.record.manifest import InputRecord
 from falsifier.views.analyses_text import (
     coverage_json,
     coverage_text,
@@ -17,8 +17,8 @@ from falsifier.views.analyses_text import (
 from tests.analyses.test_coverage import described
 
 RANGES = (
-    InputRecord(name="throttle", low=0.0, high=100.0, unit="%"),
-    InputRecord(name="brake", low=0.0, high=10.0),
+    Range(name="throttle", low=0.0, high=100.0, unit="%"),
+    Range(name="brake", low=0.0, high=10.0),
 )
 STEP = Signal((0.0, 5.0), (0.0, 95.0), "constant")
 FOUND = coverage_of(

@@ -11,10 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from falsifier.analyses.coverage import labels_of
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import InputRange
+from falsifier.core.space import Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import with_unit
-from falsifier.record.manifest import InputRecord
 from falsifier.stl import Formula
 from falsifier.stl.breach import compared_sides
 from falsifier.stl.expression import Expression, unit_of
@@ -23,8 +22,6 @@ from falsifier.stl.monitor import Verdict
 
 Array = NDArray[np.float64]
 
-# A searched input, of a model or of a record.
-Range = InputRange | InputRecord
 # Values beyond this are drawn at this level: the height of a picture must not overflow.
 _LARGEST_DRAWN = 1e300
 

@@ -7,10 +7,9 @@ from falsifier import Trajectory
 from falsifier.analyses.coverage import coverage_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom
+from falsifier.core.space import Freedom, Range
 from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.record.manifest import InputRecord
 from falsifier.testing import START, lag_problem
 from falsifier.views.plotting import plot_coverage, plot_robustness_map, png, save_figure
 from falsifier.views.plotting.axes import wrapped
@@ -19,8 +18,8 @@ from tests.pictures import CRITICAL, OUTPUT, colours
 from tests.views.plotting.support import xs, ys
 
 NEVER = "#f2b8b0"
-U = InputRecord(name="u", low=0.0, high=10.0)
-P = InputRecord(name="p", low=0.0, high=1.0)
+U = Range(name="u", low=0.0, high=10.0)
+P = Range(name="p", low=0.0, high=1.0)
 
 
 def test_lines_do_not_end_within_the_name_of_an_option() -> None:
@@ -41,7 +40,7 @@ def test_there_is_a_panel_of_each_input_parameter_pair_and_output() -> None:
 
 
 def test_red_is_what_was_never_tried() -> None:
-    halves = InputRecord(name="u", low=0, high=1, kind="boolean")
+    halves = Range(name="u", low=0, high=1, kind="boolean")
     one = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
     both = Candidate({"u": Signal((0.0,), (0.0,), "constant")})
     found = [coverage_of(described(halves), [(c, None) for c in cs]) for cs in ([one], [one, both])]
