@@ -298,8 +298,8 @@ class Hybrid:
         for verdict in self.surrogate.foresee([self._next]):
             lines.append(
                 f"The model that it fits to the samples expects of this: {briefing.foretold(verdict)}; "
-                f"its recent predictions erred by {100 * self.surrogate.recent_error:.2g} % of the signals' "
-                "usual spread."
+                f"its recent predictions erred by {100 * self.surrogate.forecasts.recent_error:.2g} % of the "
+                "signals' usual spread."
             )
         return lines
 

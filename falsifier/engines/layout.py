@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, nearest_value
+from falsifier.core.space import Freedom, InputRange, SearchSpace, nearest_value
 from falsifier.problem.problem import Problem
 
 # Single precision in the rollout of learnt dynamics, double precision elsewhere.
@@ -17,7 +17,7 @@ Array = NDArray[np.floating[Any]]
 # Engines learn from numbers up to this one: products of larger ones overflow in single precision.
 _LARGEST = 1e25
 # Cells over the formula's horizon on which free inputs are held and outputs predicted: enough for pieces of
-# 1 % of the horizon.
+# 1 % of the horizon, few enough for a roll-out in milliseconds.
 CELLS = 100
 # Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
 _MAX_HORIZONS = 20
@@ -71,11 +71,6 @@ class Layout:
     space: SearchSpace
     codings: tuple[Coding, ...]  # one coding per input
 
-    @property
-    def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
-        """Ranges of the inputs, then of the parameters."""
-        return self.space.ranges
-
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
         """Indices of the coordinates of each input and each parameter."""
@@ -108,7 +103,7 @@ class Layout:
     @cached_property
     def has_gaps(self) -> bool:
         """Whether some points stand for the same candidate, because not every level of a range is a value."""
-        return any(r.kind != "real" or r.low == r.high for r in self.ranges)
+        return any(r.kind != "real" or r.low == r.high for r in self.space.ranges)
 
     def settled(self, points: Array) -> Array:
         """Return the points, shape (..., d), that the candidates of these points have.
@@ -118,7 +113,7 @@ class Layout:
         if not self.has_gaps:
             return points
         result = np.array(points, dtype=np.float64)
-        for r, group in zip(self.ranges, self.groups, strict=True):
+        for r, group in zip(self.space.ranges, self.groups, strict=True):
             if r.low == r.high:
                 result[..., group] = 0.0
             elif r.kind != "real":

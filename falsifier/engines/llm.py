@@ -191,8 +191,7 @@ def reason_in_remark(reason: str) -> str:
 def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int, ...]) -> Candidate:
     """Return a random change of a candidate in at least one number; without one, any point of the space."""
     rng = np.random.default_rng(seed)
-    low = np.array([d.low for d in space.dimensions])
-    high = np.array([d.high for d in space.dimensions])
+    low, high = space.bounds.T
     if best is None:
         return space.decode(low + rng.random(len(low)) * (high - low))
     changed = rng.random(len(low)) < _SHARE

@@ -52,7 +52,7 @@ class Corners(BoxEngine):
 
     def __init__(self, problem: Problem, *, seed: int) -> None:
         super().__init__(problem, seed=seed)
-        ranges = zip(self.box.ranges, self.box.groups, strict=True)
+        ranges = zip(self.box.space.ranges, self.box.groups, strict=True)
         self._groups = {r.name: group for r, group in ranges if r.low < r.high}
         self._flips = np.zeros(len(self._groups), dtype=int)
         self._costs: dict[Levels, float] = {}

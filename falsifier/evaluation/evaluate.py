@@ -193,7 +193,7 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     space, experiment = problem.space, problem.experiment
     brief = replace(experiment, stop_time=_shortest(problem))
     found: list[dict[str, float]] = []
-    for corner in ([d.low for d in space.dimensions], [d.high for d in space.dimensions]):
+    for corner in space.bounds.T:
         try:
             candidate = space.decode(corner)
             outputs = problem.model.simulate(

@@ -48,9 +48,9 @@ class Programs:
 
     def __init__(self, layout: Layout, levels: Mapping[str, Sequence[float]] = MappingProxyType({})) -> None:
         self._layout = layout
-        self._levels = [_levels(r) for r in layout.ranges]
-        self._cuts = [_cuts(r, levels.get(r.name, ())) for r in layout.ranges]
-        self._telling: list[list[float]] = [[] for _ in layout.ranges]
+        self._levels = [_levels(r) for r in layout.space.ranges]
+        self._cuts = [_cuts(r, levels.get(r.name, ())) for r in layout.space.ranges]
+        self._telling: list[list[float]] = [[] for _ in layout.space.ranges]
         # Slices, so that what is written to the values of a group is written to the point.
         self._groups = [slice(int(group[0]), int(group[-1]) + 1) for group in layout.groups]
         self._times = [np.asarray(coding.times) for coding in layout.codings]

@@ -33,15 +33,6 @@ class GaussianProcess:
     factor: Array  # lower Cholesky factor of the covariance, shape (n, n)
     weights: Array  # covariance^-1 targets, shape (n,)
 
-    @classmethod
-    def fit(cls, points: Array, targets: Array, lengths: Array, *, noise: float) -> "GaussianProcess":
-        """Condition on targets, shape (n,), observed at points, shape (n, d), with this noise variance."""
-        scaled = points / lengths
-        covariance = _correlation(scaled, scaled) + noise * np.eye(len(points))
-        factor = np.tril(cho_factor(covariance, lower=True)[0])
-        weights = cho_solve((factor, True), targets)
-        return cls(points, lengths, factor, weights)
-
     def predict(self, points: Array) -> tuple[Array, Array]:
         """Return mean and standard deviation, shape (m,) each, at points, shape (m, d)."""
         cross = _correlation(points / self.lengths, self.points / self.lengths)
@@ -51,7 +42,9 @@ class GaussianProcess:
 
 
 def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProcess:
-    """Fit with the length scales that are most probable given the data.
+    """Condition on targets, shape (n,), observed at points, shape (n, d), with this noise variance.
+
+    The length scales are those that are most probable given the data.
 
     Before the data, their logarithms are normal; the centre grows with the square root of the number of
     coordinates, as distances in the unit box do (Hvarfner et al., ICML 2024).
@@ -76,4 +69,8 @@ def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProce
     found = minimize(
         loss_and_slope, centre, jac=True, method="L-BFGS-B", bounds=limits, options={"maxiter": _STEPS}
     )
-    return GaussianProcess.fit(points, targets, np.exp(found.x), noise=noise)
+    lengths = np.exp(found.x)
+    scaled = points / lengths
+    covariance = _correlation(scaled, scaled) + noise * np.eye(count)
+    factor = np.tril(cho_factor(covariance, lower=True)[0])
+    return GaussianProcess(points, lengths, factor, cho_solve((factor, True), targets))

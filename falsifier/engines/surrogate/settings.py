@@ -2,14 +2,14 @@
 
 from dataclasses import dataclass
 
+from falsifier.engines.layout import CELLS
+
 
 @dataclass(frozen=True, slots=True)
 class Settings:
     """How the engine opens, learns, plans and chooses who proposes."""
 
-    # Number of grid cells over the formula's horizon, on which outputs are predicted and free inputs are
-    # held; enough for pieces of 1 % of the horizon, few enough for a roll-out in milliseconds.
-    cells: int = 100
+    cells: int = CELLS  # number of grid cells over the formula's horizon
     # Number of constant extremes and of random programs among the first simulations of a formula that a
     # single extreme can violate: an extreme often does, and a program shows more of the dynamics.
     constants: int = 1

@@ -166,11 +166,6 @@ class Surrogate:
         """Add candidates to those from which the next plan is bred."""
         self._suggested = [self.layout.point(c) for c in candidates]
 
-    @property
-    def recent_error(self) -> float:
-        """Error of recent predictions, as a share of the margins' spread; inf if there are none."""
-        return self.forecasts.recent_error
-
     def _first_kinds(self) -> list[str]:
         """Return the kinds of the first inputs, in order.
 
