@@ -1,10 +1,12 @@
 """Reading and writing the record of a run."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from falsifier.errors import JournalError
+from falsifier.record import journal
 from falsifier.record.files import set_aside
 from falsifier.record.journal import (
     JournalReader,
@@ -32,6 +34,18 @@ def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> Non
     assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
     path.write_bytes(lines[0])
     assert reader.shrank
+
+
+def test_a_journal_is_read_on_from_the_line_at_which_reading_was_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "journal.jsonl").write_bytes(line_of(evaluated(0, 0.0), 1))
+    reader = JournalReader(tmp_path)
+    with monkeypatch.context() as stopped:
+        stopped.setattr(journal, "parse_line", Mock(side_effect=KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            list(reader.new())
+    assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
 
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:
