@@ -15,7 +15,6 @@ from falsifier.llm.formalizing import ReadingReply
 from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement
 from falsifier.problem.unit_check import defined_units, factor_and_offset
 from falsifier.problem.writing import Subject, subject_of
 from falsifier.search.budget import Spent
@@ -166,7 +165,7 @@ def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Rea
     except SpecError as error:
         raise RejectedReplyError(str(error)) from None
     _check_units(reply, formula, problem)
-    problem = replace(problem, requirement=Requirement(problem.name, formula))
+    problem = problem.with_requirement(formula)
     for found in static_findings(problem):
         if found.kind in ("always", "never", "units"):
             raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
@@ -185,10 +184,7 @@ def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Rea
     for number, other in enumerate(others, start=1):
         if implies(formula, other.formula) and implies(other.formula, formula):
             raise RejectedReplyError(f"it requires the same as reading {number}; leave it out")
-    recorded = (name for name in formula.signals if problem.info[name].causality != "input")
-    outputs = tuple(dict.fromkeys((*problem.experiment.outputs, *recorded)))
-    stated = replace(problem, experiment=replace(problem.experiment, outputs=outputs))
-    return Reading(formula, reply.meaning, in_words(formula), stated)
+    return Reading(formula, reply.meaning, in_words(formula), problem)
 
 
 def _check_units(reply: ReadingReply, formula: Formula, problem: Problem) -> None:

@@ -14,7 +14,7 @@ from falsifier.errors import SimulationError, SpecError, setting, written
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.problem.problem import Problem, check_problem
-from falsifier.problem.requirement import Requirement, formula_of
+from falsifier.problem.requirement import formula_of
 from falsifier.problem.shorthand import requirement_of
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
@@ -220,7 +220,7 @@ class _Bisection:
     def _at(self, k: int) -> Problem:
         """Return the problem with the formula that has this threshold."""
         formula = formula_at(self.problem, self.vary, self.thresholds[k])
-        return replace(self.problem, requirement=Requirement(self.problem.name, formula), source=None)
+        return replace(self.problem.with_requirement(formula), source=None)
 
     def _judged(self, k: int) -> list[Evaluation]:
         problem = self._at(k)

@@ -19,7 +19,6 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import FmuModel, System
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -96,12 +95,7 @@ class Case:
         """Return the problem with the formula that this was judged by: it is about no other one."""
         if str(problem.requirement.formula) == self.origin.formula:
             return problem
-        requirement = Requirement(problem.name, self.origin.formula, problem.requirement.description)
-        experiment = problem.experiment
-        known = {*experiment.outputs, *problem.space.names, *(v.name for v in problem.info.inputs)}
-        more = (name for name in requirement.formula.signals if name not in known)
-        experiment = replace(experiment, outputs=(*experiment.outputs, *more))
-        return replace(problem, requirement=requirement, experiment=experiment)
+        return problem.with_requirement(self.origin.formula, problem.requirement.description)
 
     def admitted(self, problem: Problem) -> Candidate:
         """Return the candidate as the problem simulates it; CandidateError if the problem has changed."""

@@ -15,6 +15,7 @@ from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import STL_NAME, ProblemSource
+from falsifier.stl import Formula
 
 if TYPE_CHECKING:
     from falsifier.problem.joining import Joined
@@ -153,6 +154,14 @@ class Problem:
     def of(joined: "Joined") -> "Problem":
         """Return the problem that a spec, or a model and a formula, was joined to."""
         return Problem(**joined._asdict())
+
+    def with_requirement(self, formula: Formula | str, description: str = "") -> "Problem":
+        """Return the problem with another formula, of which all signals are recorded."""
+        requirement = Requirement(self.name, formula, description)
+        inputs = [v.name for v in self.info.inputs]
+        more = (name for name in requirement.formula.signals if name not in inputs)
+        outputs = tuple(dict.fromkeys((*self.experiment.outputs, *more)))
+        return replace(self, requirement=requirement, experiment=replace(self.experiment, outputs=outputs))
 
     @property
     def info(self) -> ModelInfo:
