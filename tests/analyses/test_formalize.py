@@ -172,6 +172,12 @@ def test_whole_numbers_may_be_equal(server: Server, target: str) -> None:
     assert [r.formula for r in found.readings] == [parse(formula)]
 
 
+def test_a_reading_may_name_what_is_no_output(server: Server, target: str) -> None:
+    found = ask(server, target, replying(answer(target, "G[0,20] (engine <= 5000)", units=[])))
+    assert found.rejected == ()
+    assert found.readings[0].problem.experiment.outputs[-1] == "engine"
+
+
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
