@@ -8,13 +8,6 @@ import pytest
 from falsifier.errors import JournalError
 from falsifier.record import journal
 from falsifier.record.files import set_aside
-from falsifier.record.journal import (
-    JournalReader,
-    open_journal,
-    read_journal,
-    recorded_evaluations,
-    repair,
-)
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
 from falsifier.views.report.page import html_report
@@ -24,7 +17,7 @@ from tests.record.test_summary import evaluated
 
 
 def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
-    reader = JournalReader(tmp_path)
+    reader = journal.JournalReader(tmp_path)
     assert list(reader.new()) == []
     path = tmp_path / "journal.jsonl"
     lines = [line_of(evaluated(i, float(i)), i + 1) for i in range(3)]
@@ -40,7 +33,7 @@ def test_a_journal_is_read_on_from_the_line_at_which_reading_was_interrupted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "journal.jsonl").write_bytes(line_of(evaluated(0, 0.0), 1))
-    reader = JournalReader(tmp_path)
+    reader = journal.JournalReader(tmp_path)
     with monkeypatch.context() as stopped:
         stopped.setattr(journal, "parse_line", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
@@ -50,7 +43,7 @@ def test_a_journal_is_read_on_from_the_line_at_which_reading_was_interrupted(
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:
     busy = pytest.raises(JournalError, match="another process is writing")
-    with open_journal(tmp_path), busy, open_journal(tmp_path):
+    with journal.open_journal(tmp_path), busy, journal.open_journal(tmp_path):
         pass
 
 
@@ -62,7 +55,7 @@ def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(t
     others = [folder / f"mine.npz.{dead}.partial", folder / "3-0123456789abcdef.npz.1.partial.txt"]
     for path in (*left, *others):
         path.touch()
-    with open_journal(tmp_path):
+    with journal.open_journal(tmp_path):
         pass
     assert not any(path.exists() for path in left)
     assert all(path.exists() for path in others)
@@ -79,7 +72,7 @@ def test_a_trajectory_that_is_damaged_is_told_once(
     else:
         first.write_bytes(first.read_bytes()[:-1] + b"?")
     for _ in range(2):
-        found = recorded_evaluations(tmp_path, read_journal(tmp_path))
+        found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
     assert found[0].trajectory is None
     assert caplog.text.count(f"{first.name} is damaged") == 1
     assert "not shown: its file is damaged or missing" in html_report(tmp_path)
@@ -87,8 +80,8 @@ def test_a_trajectory_that_is_damaged_is_told_once(
 
 def test_a_run_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
     Standing().run(tmp_path)
-    with open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
-        repair(tmp_path)
+    with journal.open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
+        journal.repair(tmp_path)
 
 
 def test_what_is_set_aside_replaces_nothing(tmp_path: Path) -> None:
@@ -106,5 +99,5 @@ def test_trajectories_that_a_better_one_has_replaced_are_not_told_as_damaged(
     for path in kept[:-1]:
         path.unlink()
     (tmp_path / "trajectories" / "mine.npz").touch()
-    found = recorded_evaluations(tmp_path, read_journal(tmp_path))
+    found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
     assert found[0].trajectory is None and "is damaged" not in caplog.text

@@ -1,11 +1,6 @@
 from falsifier.evaluation.confirm import Outcome
 from falsifier.llm.messages import ChatReply, Exchange, Message, Usage
-from falsifier.record.records import (
-    AskedRecord,
-    ConfirmedRecord,
-    EvaluatedRecord,
-    ExchangeRecord,
-)
+from falsifier.record import records
 from falsifier.record.summary import Summary
 from falsifier.search.budget import Spent
 from falsifier.stl.monitor import Verdict
@@ -16,18 +11,18 @@ def status(summary: Summary) -> str:
     return summary.status
 
 
-def evaluated(index: int, robustness: float | None) -> EvaluatedRecord:
+def evaluated(index: int, robustness: float | None) -> records.EvaluatedRecord:
     verdict = None
     if robustness is not None:
         verdict = Verdict(robustness=robustness, critical_time=1.0, predicate="x <= 1", values={"x": 2.0})
     status = "ok" if verdict else "failed"
-    return EvaluatedRecord(
+    return records.EvaluatedRecord(
         index=index, status=status, verdicts={"R": verdict}, seconds=0.5, elapsed=index + 1
     )
 
 
-def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> ConfirmedRecord:
-    return ConfirmedRecord(
+def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> records.ConfirmedRecord:
+    return records.ConfirmedRecord(
         index=index,
         requirement="R",
         outcome=outcome,
@@ -41,7 +36,7 @@ def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> Confir
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     summary = Summary()
     assert status(summary) == "waiting"
-    summary.add(AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", elapsed=0.1))
+    summary.add(records.AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", elapsed=0.1))
     assert status(summary) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         summary.add(evaluated(i, robustness))
@@ -66,5 +61,5 @@ def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
     )
     unanswered = exchange.model_copy(update={"reply": None, "problem": "timeout"})
     for each in (exchange, unanswered, exchange):
-        summary.add(ExchangeRecord(exchange=each, elapsed=1.0))
+        summary.add(records.ExchangeRecord(exchange=each, elapsed=1.0))
     assert (summary.spent.tokens, summary.spent.reasoning_tokens, summary.spent.cost) == (240, 10, 0.5)

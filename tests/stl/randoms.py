@@ -5,22 +5,8 @@ import random
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.stl import formula as stl
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Comparison,
-    Eventually,
-    Formula,
-    Iff,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-)
 
 STEP = 0.5
 SIGNALS = ("x", "y", "der(b)")
@@ -44,15 +30,15 @@ def negative(operand: Expression) -> Expression:
     return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
 
 
-def random_formula(rng: random.Random, depth: int, *, windows: bool = True) -> Formula:
+def random_formula(rng: random.Random, depth: int, *, windows: bool = True) -> stl.Formula:
     """Formula of at most this depth; operators without a window have no window inside."""
     if depth == 0 or rng.random() < 0.15:
-        operator: Comparison = rng.choice(("<", "<=", ">", ">=", "==", "!="))
-        return Predicate(operator, random_expression(rng, 2), random_expression(rng, 1))
+        operator: stl.Comparison = rng.choice(("<", "<=", ">", ">=", "==", "!="))
+        return stl.Predicate(operator, random_expression(rng, 2), random_expression(rng, 1))
     choice = rng.choice(["not", "and", "or", "->", "<->", "G", "F", "U", "X"])
     window = random_window(rng) if windows and rng.random() < 0.8 else None
 
-    def below() -> Formula:
+    def below() -> stl.Formula:
         part = random_formula(rng, depth - 1, windows=windows)
         while choice in "GFU" and window is None and part.horizon(STEP) > 0:
             part = random_formula(rng, depth - 1, windows=windows)
@@ -60,22 +46,22 @@ def random_formula(rng: random.Random, depth: int, *, windows: bool = True) -> F
 
     match choice:
         case "not":
-            return Not(below())
+            return stl.Not(below())
         case "X":
-            return Next(below())
+            return stl.Next(below())
         case "G":
-            return Always(below(), window)
+            return stl.Always(below(), window)
         case "F":
-            return Eventually(below(), window)
+            return stl.Eventually(below(), window)
         case "U":
-            return Until(below(), below(), window)
-    joined = {"and": And, "or": Or, "->": Implies, "<->": Iff}[choice]
+            return stl.Until(below(), below(), window)
+    joined = {"and": stl.And, "or": stl.Or, "->": stl.Implies, "<->": stl.Iff}[choice]
     return joined(below(), below())
 
 
-def random_window(rng: random.Random) -> Window:
+def random_window(rng: random.Random) -> stl.Window:
     start = rng.randint(0, 3)
-    return Window(start * STEP, (start + rng.randint(0, 4)) * STEP)
+    return stl.Window(start * STEP, (start + rng.randint(0, 4)) * STEP)
 
 
 def random_trajectory(rng: random.Random, samples: int) -> Trajectory:
@@ -90,7 +76,7 @@ def random_trajectory(rng: random.Random, samples: int) -> Trajectory:
     return Trajectory(np.arange(samples, dtype=np.float64) * STEP, columns)
 
 
-def random_case(seed: int, *, depth: int = 4) -> tuple[Formula, Trajectory]:
+def random_case(seed: int, *, depth: int = 4) -> tuple[stl.Formula, Trajectory]:
     """Formula and a trajectory that is just long enough, or a little longer."""
     rng = random.Random(seed)
     formula = random_formula(rng, rng.randint(0, depth))

@@ -6,58 +6,45 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from falsifier.errors import FormulaError
+from falsifier.stl import formula as stl
 from falsifier.stl import parse
 from falsifier.stl.expression import Arithmetic, Name, Number
-from falsifier.stl.formula import (
-    Always,
-    And,
-    Eventually,
-    Flag,
-    Iff,
-    Implies,
-    Next,
-    Not,
-    Or,
-    Predicate,
-    Until,
-    Window,
-)
 from falsifier.stl.lexer import name_text
 from tests.stl.randoms import random_formula
 
-A, B, C = (Flag.of(Name(n)) for n in "abc")
-X3 = Predicate("<=", Name("x"), Number(3.0))
+A, B, C = (stl.Flag.of(Name(n)) for n in "abc")
+X3 = stl.Predicate("<=", Name("x"), Number(3.0))
 
 
 @pytest.mark.parametrize(
     ("text", "tree"),
     [
-        ("a -> b -> c", Implies(A, Implies(B, C))),
-        ("a => b", Implies(A, B)),
-        ("a <-> b <=> c", Iff(Iff(A, B), C)),
-        ("a or b and c", Or(A, And(B, C))),
-        ("a | b & c", Or(A, And(B, C))),
-        ("a || b && c", Or(A, And(B, C))),
-        ("a and b and c", And(And(A, B), C)),
-        ("not a and b", And(Not(A), B)),
-        ("!a -> b", Implies(Not(A), B)),
-        ("not x <= 3", Not(X3)),
-        ("a U b U c", Until(A, Until(B, C))),
-        ("a U[0,1] b and c", And(Until(A, B, Window(0, 1)), C)),
-        ("not a U b", Until(Not(A), B)),
-        ("G[0,5] x <= 3 -> a", Implies(Always(X3, Window(0, 5)), A)),
-        ("always[0,5] a", Always(A, Window(0, 5))),
-        ("eventually a", Eventually(A)),
-        ("a until[1,2] b", Until(A, B, Window(1, 2))),
-        ("next X a", Next(Next(A))),
-        ("G F a", Always(Eventually(A))),
-        ("1 <= x <= 3", And(Predicate("<=", Number(1), Name("x")), X3)),
+        ("a -> b -> c", stl.Implies(A, stl.Implies(B, C))),
+        ("a => b", stl.Implies(A, B)),
+        ("a <-> b <=> c", stl.Iff(stl.Iff(A, B), C)),
+        ("a or b and c", stl.Or(A, stl.And(B, C))),
+        ("a | b & c", stl.Or(A, stl.And(B, C))),
+        ("a || b && c", stl.Or(A, stl.And(B, C))),
+        ("a and b and c", stl.And(stl.And(A, B), C)),
+        ("not a and b", stl.And(stl.Not(A), B)),
+        ("!a -> b", stl.Implies(stl.Not(A), B)),
+        ("not x <= 3", stl.Not(X3)),
+        ("a U b U c", stl.Until(A, stl.Until(B, C))),
+        ("a U[0,1] b and c", stl.And(stl.Until(A, B, stl.Window(0, 1)), C)),
+        ("not a U b", stl.Until(stl.Not(A), B)),
+        ("G[0,5] x <= 3 -> a", stl.Implies(stl.Always(X3, stl.Window(0, 5)), A)),
+        ("always[0,5] a", stl.Always(A, stl.Window(0, 5))),
+        ("eventually a", stl.Eventually(A)),
+        ("a until[1,2] b", stl.Until(A, B, stl.Window(1, 2))),
+        ("next X a", stl.Next(stl.Next(A))),
+        ("G F a", stl.Always(stl.Eventually(A))),
+        ("1 <= x <= 3", stl.And(stl.Predicate("<=", Number(1), Name("x")), X3)),
         ("(((x))) <= (3)", X3),
         ("((a))", A),
-        ("(x) + 1 <= 3", Predicate("<=", Arithmetic("+", Name("x"), Number(1)), Number(3))),
-        ("x^2<=9", Predicate("<=", Arithmetic("^", Name("x"), Number(2)), Number(9))),
-        ("x<-3", Predicate("<", Name("x"), Number(-3))),
-        ("a\n  and b", And(A, B)),
+        ("(x) + 1 <= 3", stl.Predicate("<=", Arithmetic("+", Name("x"), Number(1)), Number(3))),
+        ("x^2<=9", stl.Predicate("<=", Arithmetic("^", Name("x"), Number(2)), Number(9))),
+        ("x<-3", stl.Predicate("<", Name("x"), Number(-3))),
+        ("a\n  and b", stl.And(A, B)),
     ],
 )
 def test_precedence_and_spellings(text: str, tree: object) -> None:
@@ -83,27 +70,27 @@ def test_precedence_and_spellings(text: str, tree: object) -> None:
 )
 def test_arithmetic(text: str, value: float) -> None:
     formula = parse(f"{text} <= x")
-    assert isinstance(formula, Predicate)
+    assert isinstance(formula, stl.Predicate)
     assert float(formula.left.evaluate({})) == pytest.approx(value)
 
 
 @pytest.mark.parametrize(
     ("text", "window"),
     [
-        ("[0,500ms]", Window(0, 0.5)),
-        ("[100 ms, 2 s]", Window(0.1, 2)),
-        ("[0.5min,1h]", Window(30, 3600)),
-        ("[7min, 8min]", Window(420, 480)),
-        ("[0.29min,17.4s]", Window(17.4, 17.4)),
-        ("[1.1s,1100ms]", Window(1.1, 1.1)),
-        ("[1.3333333s,0.0222222min]", Window(1.3333333, 1.3333333)),
-        ("[0.0222223min,1.3333333s]", Window(1.3333333, 1.3333333)),
-        ("[0,250us]", Window(0, 0.00025)),
-        ("[1e1, 2E1]", Window(10, 20)),
+        ("[0,500ms]", stl.Window(0, 0.5)),
+        ("[100 ms, 2 s]", stl.Window(0.1, 2)),
+        ("[0.5min,1h]", stl.Window(30, 3600)),
+        ("[7min, 8min]", stl.Window(420, 480)),
+        ("[0.29min,17.4s]", stl.Window(17.4, 17.4)),
+        ("[1.1s,1100ms]", stl.Window(1.1, 1.1)),
+        ("[1.3333333s,0.0222222min]", stl.Window(1.3333333, 1.3333333)),
+        ("[0.0222223min,1.3333333s]", stl.Window(1.3333333, 1.3333333)),
+        ("[0,250us]", stl.Window(0, 0.00025)),
+        ("[1e1, 2E1]", stl.Window(10, 20)),
     ],
 )
-def test_windows_in_units(text: str, window: Window) -> None:
-    assert parse(f"G{text} b") == Always(B, window)
+def test_windows_in_units(text: str, window: stl.Window) -> None:
+    assert parse(f"G{text} b") == stl.Always(B, window)
 
 
 @pytest.mark.parametrize(
@@ -136,10 +123,10 @@ def test_names_as_models_have_them(text: str, name: str) -> None:
 
 def test_a_signal_alone_is_a_boolean_one() -> None:
     formula = parse("b")
-    assert isinstance(formula, Flag)
+    assert isinstance(formula, stl.Flag)
     assert formula == B and str(formula) == "b"
     compared = parse("b >= 0.5")
-    assert not isinstance(compared, Flag) and str(compared) == "b >= 0.5"
+    assert not isinstance(compared, stl.Flag) and str(compared) == "b >= 0.5"
 
 
 @pytest.mark.parametrize(
