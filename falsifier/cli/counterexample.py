@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from falsifier.cli import options
+from falsifier.cli import files, options
 from falsifier.cli.command import command, refuse
-from falsifier.cli.files import (
-    DRAWN,
-    check_ending,
-    check_out,
-    checked_picture,
-    draw,
-    draw_evaluation,
-    made_folder,
-    saved,
-)
 from falsifier.cli.output import FAILED, INTERRUPTED, as_shown, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
@@ -166,7 +156,7 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
     assert case.stored is not None, "a counterexample has a file"
     directory = out or beside(case.file, "export")
     if store is None:
-        made_folder(directory)
+        files.made_folder(directory)
     with _loaded(case, rights) as problem:
         evaluation, stored = case.simulated(problem), case.stored
         if case.changes(problem):  # the files are about one simulation
@@ -192,13 +182,13 @@ def _shrink(
 
     ending = ".csv" if case.is_miss else ".json"
     file = out or beside(case.file, f"shrunk{ending}")
-    check_ending(file, (ending,))
+    files.check_ending(file, (ending,))
     file = file.resolve() if file.is_symlink() else file  # a link is followed, not replaced
     if case.is_miss:
-        check_out(file)
-    check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)
-    check_out(file.with_suffix(".npz"), begins=b"PK")
-    check_out(file.with_suffix(".png"), holds=DRAWN)
+        files.check_out(file)
+    files.check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)
+    files.check_out(file.with_suffix(".npz"), begins=b"PK")
+    files.check_out(file.with_suffix(".png"), holds=files.DRAWN)
 
     def said(simpler: Evaluation, n: int) -> None:
         if not quiet:
@@ -213,12 +203,12 @@ def _shrink(
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
             confirmation = None  # else case.content says so
         table, data = input_table(problem, found.candidate), file.with_suffix(".json")
-        files = saved(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
+        paths = files.saved(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
         if confirmation is not None:
-            files += saved(data, partial(save, case.content(confirmation)))
+            paths += files.saved(data, partial(save, case.content(confirmation)))
             if found.trajectory is not None:  # for reports, which simulate nothing
-                saved(file.with_suffix(".npz"), found.trajectory.save)
-        files += draw_evaluation(problem, found, file.with_suffix(".png"))
+                files.saved(file.with_suffix(".npz"), found.trajectory.save)
+        paths += files.draw_evaluation(problem, found, file.with_suffix(".png"))
         with suppress(OSError):
             beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
     content = {
@@ -229,7 +219,7 @@ def _shrink(
         "minimal": shrunk.minimal,
         "simulations": shrunk.simulations,
         "at_most": shrunk.at_most,
-        "files": list(map(str, files)),
+        "files": list(map(str, paths)),
     }
     lines = [case.text] if case.is_miss else []
     end = "no simpler one found nearby" if shrunk.minimal else "the budget is used up"
@@ -247,7 +237,7 @@ def _shrink(
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
     if confirmation is not None and case.changes(problem):
         lines.append("  note           not of the run's FMU and spec: its reports show the original")
-    lines += [f"  files          {', '.join(map(str, files))}"] if files else []
+    lines += [f"  files          {', '.join(map(str, paths))}"] if paths else []
     return list(map(one_line, lines)), content
 
 
@@ -260,7 +250,7 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
         evaluation = case.simulated(problem)
         explanation = explain(problem, evaluation)
         if case.is_miss:
-            pictures = draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
+            pictures = files.draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
         about = "\n".join([*case.changes(problem), explanation.text])  # reports repeat it
     with suppress(OSError):  # it is printed anyway
         write_whole(beside(case.file, EXPLANATION), f"{about}\n")
@@ -279,10 +269,10 @@ def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Pat
     """Draw the robustness around it."""
     from falsifier.views.plotting import plot_robustness_map
 
-    picture = beside(case.file, "robustness-map.png") if out is None else checked_picture(out)
+    picture = beside(case.file, "robustness-map.png") if out is None else files.checked_picture(out)
     with _loaded(case, rights) as problem:
         found = robustness_map(problem, case.simulated(problem), budget=budget)
-    drawn = draw(lambda: plot_robustness_map(found, problem.name), picture)
+    drawn = files.draw(lambda: plot_robustness_map(found, problem.name), picture)
     labels = (coordinate.label for coordinate in found.coordinates)
     content = {
         "original": found.original,

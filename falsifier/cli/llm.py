@@ -6,14 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from falsifier.cli import llm_options
 from falsifier.cli.command import command, refuse
-from falsifier.cli.llm_options import (
-    anonymous_option,
-    connection_options,
-    context_option,
-    llm_settings,
-    variant_option,
-)
 from falsifier.cli.options import PATH, json_option, problem_source, requirement_options
 from falsifier.cli.output import FAILED, as_shown, conclude, say
 from falsifier.core.words import counted
@@ -34,9 +28,9 @@ _CHECK_ATTEMPTS = 2
 
 @command()
 @requirement_options
-@variant_option()
-@anonymous_option
-@context_option
+@llm_options.variant_option()
+@llm_options.anonymous_option
+@llm_options.context_option
 @click.option(
     "--after",
     "directory",
@@ -160,7 +154,7 @@ def _headed(heading: str, text: str) -> str:
 
 @command()
 @click.argument("name")
-@connection_options
+@llm_options.connection_options
 def check(*, name: str, **options: Any) -> None:
     """Check the name and key of a language model and the features that runs need, with a few short requests.
 
@@ -171,7 +165,7 @@ def check(*, name: str, **options: Any) -> None:
     from falsifier.llm.providers import key_variable
     from falsifier.search.make_engines import open_chat, price_of
 
-    settings = llm_settings({"llm": name, **options})
+    settings = llm_options.llm_settings({"llm": name, **options})
     assert settings is not None
     alone = {"cache": False, "timeout": settings.timeout or _CHECK_TIMEOUT}
     features, usage = check_chat(open_chat(settings.model_copy(update=alone), attempts=_CHECK_ATTEMPTS))

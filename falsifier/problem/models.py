@@ -4,21 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from falsifier import fmu
 from falsifier.core.files import absent
 from falsifier.core.model import Interface, Model, ModelInfo
 from falsifier.errors import SpecError, in_section
-from falsifier.fmu import (
-    Component,
-    Connection,
-    Coupling,
-    FmuModel,
-    Rights,
-    System,
-    is_package,
-    read_info,
-    read_package,
-    resolved,
-)
 from falsifier.problem.sections import ModelChanges, ModelSection
 from falsifier.problem.spec import Spec, read_spec
 
@@ -44,9 +33,9 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
                 key="model.interface",
             )
         return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
-    fmu = _existing(path, spec.model.fmu or "", "model.fmu")
-    return FmuModel(
-        fmu, interface=_interface(interface, read_info(fmu)), logging=logging, allow=allow, deny=deny
+    file = _existing(path, spec.model.fmu or "", "model.fmu")
+    return fmu.FmuModel(
+        file, interface=_interface(interface, fmu.read_info(file)), logging=logging, allow=allow, deny=deny
     )
 
 
@@ -63,14 +52,14 @@ def rights_of(
     if section is None:
         section = read_spec(path).model if path is not None else ModelSection()
     words = (*section.allow, *(word for layer in layers for word in layer.allow))
-    allow = resolved(words, path.parent if path is not None else Path())
+    allow = fmu.resolved(words, path.parent if path is not None else Path())
     deny = (*section.deny, *(word for layer in layers for word in layer.deny))
     with in_section(*((str(path), "model") if path is not None else ())):
-        Rights.of(allow, deny)
+        fmu.Rights.of(allow, deny)
     return allow, deny
 
 
-def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
+def make_system(spec: Spec, path: Path, *, logging: bool = False) -> fmu.System:
     """Return the system of a spec that has one.
 
     Raises:
@@ -78,27 +67,29 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> System:
         ModelError: if an FMU cannot be read.
     """
     with in_section(str(path)):
-        coupling = Coupling(**spec.coupling.model_dump())
+        coupling = fmu.Coupling(**spec.coupling.model_dump())
         if spec.model.fmu is not None:
-            package = read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
+            package = fmu.read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
             return replace(package, logging=logging)
         components = {
-            name: Component(_existing(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface)
+            name: fmu.Component(
+                _existing(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface
+            )
             for name, part in spec.components.items()
         }
         connections = {
-            target: Connection(each.source, each.factor, each.offset, each.extrapolation)
+            target: fmu.Connection(each.source, each.factor, each.offset, each.extrapolation)
             for target, each in spec.connections.items()
         }
-        return System(components, connections, coupling=coupling, name=path.stem, logging=logging)
+        return fmu.System(components, connections, coupling=coupling, name=path.stem, logging=logging)
 
 
-def _existing(path: Path, fmu: str, key: str) -> Path:
-    if is_package(fmu) and key != "model.fmu":
+def _existing(path: Path, named: str, key: str) -> Path:
+    if fmu.is_package(named) and key != "model.fmu":
         raise SpecError(
             "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here", key=key
         )
-    found = path.parent / fmu
+    found = path.parent / named
     if not found.is_file():
         raise SpecError(f"{absent(found.resolve())}; give an FMU's path relative to the spec file", key=key)
     return found

@@ -12,23 +12,15 @@ import numpy as np
 
 from falsifier.core.literals import shortest
 from falsifier.errors import FormulaError
+from falsifier.stl import expression
 from falsifier.stl import formula as stl
 from falsifier.stl import program as op
-from falsifier.stl.expression import (
-    FUNCTIONS_OF,
-    OPERATORS,
-    Arithmetic,
-    Call,
-    Expression,
-    Name,
-    Negative,
-)
 from falsifier.stl.margins import on_limit
 from falsifier.stl.program import CompiledPart, Location, Program
 
 _BOUND_TOLERANCE = 1e-6  # as a fraction of one sampling step
 # Of numbers that are all floating-point, power is the faster one.
-_ARITHMETIC = OPERATORS | {"^": np.power}
+_ARITHMETIC = expression.OPERATORS | {"^": np.power}
 _NEGATION = op.scaled(-1.0)
 _CONNECTIVES: dict[type[stl.Formula], op.Function] = {
     stl.Not: _NEGATION,
@@ -123,7 +115,7 @@ class _Compiler:
         """Emit the steps of a part, only once, and return the location of its values."""
         if node not in self.locations:
             first, last = self.needs[node]
-            if isinstance(node, Expression):
+            if isinstance(node, expression.Expression):
                 self.locations[node] = self._expression(node, first, last)
             else:
                 self.locations[node] = self._formula(node, first, last)
@@ -153,25 +145,26 @@ class _Compiler:
         self.steps.append(op.calculating(function, slice(result.at(first), self.size), *reads))
         return result
 
-    def _expression(self, node: Expression, first: int, last: int) -> Location:
-        if isinstance(node, Name):
+    def _expression(self, node: expression.Expression, first: int, last: int) -> Location:
+        if isinstance(node, expression.Name):
             return Location(self.formula.signals.index(node.name) * self.samples, 0, self.samples - 1)
         if not node.signals:
             return self._emit(op.constant(_constant(node)), first, last)
         match node:
-            case Arithmetic():
+            case expression.Arithmetic():
                 return self._arithmetic(node, first, last)
-            case Negative(operand):
+            case expression.Negative(operand):
                 return self._emit(_NEGATION, first, last, self.location(operand))
-            case Call(name, operands):
-                function, sides = FUNCTIONS_OF[name], [self.location(operand) for operand in operands]
+            case expression.Call(name, operands):
+                function = expression.FUNCTIONS_OF[name]
+                sides = [self.location(operand) for operand in operands]
                 result = self._emit(function, first, last, *sides[:2])
                 for other in sides[2:]:
                     result = self._emit(function, first, last, result, other)
                 return result
         raise TypeError(f"not an expression: {node!r}")
 
-    def _arithmetic(self, node: Arithmetic, first: int, last: int) -> Location:
+    def _arithmetic(self, node: expression.Arithmetic, first: int, last: int) -> Location:
         left, right, operator = node.left, node.right, node.operator
         if operator == "^" and not right.signals and _constant(right) == 2:
             # One multiplication is much faster than pow, and squares are frequent.
@@ -189,7 +182,7 @@ class _Compiler:
 
     def _predicate(self, node: stl.Predicate, first: int, last: int) -> Location:
         left, right = (node.right, node.left) if node.operator in ("<", "<=") else (node.left, node.right)
-        margin = self._expression(Arithmetic("-", left, right), first, last)
+        margin = self._expression(expression.Arithmetic("-", left, right), first, last)
         if node.operator in ("==", "!="):
             margin = self._emit(np.absolute, first, last, margin)
         if node.operator == "==":
@@ -256,7 +249,7 @@ class _Compiler:
         return CompiledPart(node, str(node), self.locations[node], window, self.samples, children)
 
 
-def _constant(node: Expression) -> float:
+def _constant(node: expression.Expression) -> float:
     value = float(node.evaluate({}))
     if not math.isfinite(value):
         raise FormulaError(

@@ -26,22 +26,8 @@ from decimal import Decimal
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
+from falsifier.stl import expression, lexer
 from falsifier.stl import formula as stl
-from falsifier.stl import lexer
-from falsifier.stl.expression import (
-    POWER,
-    PRODUCT,
-    SIGN,
-    SUM,
-    Arithmetic,
-    Call,
-    Expression,
-    Function,
-    Name,
-    Negative,
-    Number,
-    Operator,
-)
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100
@@ -52,7 +38,8 @@ _ROUNDED = 1e-5
 
 _LEVELS: dict[str, int] = {
     "<->": stl.EQUIVALENCE, "->": stl.IMPLICATION, "or": stl.DISJUNCTION, "and": stl.CONJUNCTION,
-    "U": stl.UNTIL, "+": SUM, "-": SUM, "*": PRODUCT, "/": PRODUCT, "^": POWER,
+    "U": stl.UNTIL, "+": expression.SUM, "-": expression.SUM, "*": expression.PRODUCT,
+    "/": expression.PRODUCT, "^": expression.POWER,
     **{symbol: stl.COMPARISON for symbol in stl.OPPOSITE},
 }  # fmt: skip
 _RIGHT_ASSOCIATIVE = {"->", "U", "^"}
@@ -142,7 +129,9 @@ class _Parser:
                 left = self._chain(self._as_expression(left, start), token)
             else:
                 term = self._as_expression(left, start)
-                left = Arithmetic(cast(Operator, token.text), term, self._expression_at(after))
+                left = expression.Arithmetic(
+                    cast(expression.Operator, token.text), term, self._expression_at(after)
+                )
         self.depth -= 1
         return left
 
@@ -150,16 +139,16 @@ class _Parser:
         start = self._next.position
         return self._as_formula(self._climb(level), start)
 
-    def _expression_at(self, level: int) -> Expression:
+    def _expression_at(self, level: int) -> expression.Expression:
         start = self._next.position
         return self._as_expression(self._climb(level), start)
 
-    def _chain(self, left: Expression, token: lexer.Token) -> stl.Formula:
-        right = self._expression_at(SUM)
+    def _chain(self, left: expression.Expression, token: lexer.Token) -> stl.Formula:
+        right = self._expression_at(expression.SUM)
         formula: stl.Formula = stl.Predicate(cast(stl.Comparison, token.text), left, right)
         while self._next.kind == "symbol" and _LEVELS.get(self._next.text) == stl.COMPARISON:
             token = self._take()
-            left, right = right, self._expression_at(SUM)
+            left, right = right, self._expression_at(expression.SUM)
             formula = stl.And(formula, stl.Predicate(cast(stl.Comparison, token.text), left, right))
         return formula
 
@@ -169,7 +158,7 @@ class _Parser:
             value = float(token.text)
             if not math.isfinite(value):
                 self._fail(f"the number {token.text} is too large", token.position, "the maximum is 1e308")
-            return Number(value)
+            return expression.Number(value)
         if token.kind == "name":
             return self._named(token)
         if token.text == "(":
@@ -177,8 +166,10 @@ class _Parser:
             self._close(token)
             return inside
         if token.text == "-":
-            operand = self._expression_at(SIGN)
-            return Number(0.0 - operand.value) if isinstance(operand, Number) else Negative(operand)
+            operand = self._expression_at(expression.SIGN)
+            if isinstance(operand, expression.Number):
+                return expression.Number(0.0 - operand.value)
+            return expression.Negative(operand)
         if token.text in ("true", "false"):
             return stl.Constant(token.text == "true")
         if token.text in lexer.FUNCTIONS:
@@ -197,7 +188,7 @@ class _Parser:
             problem = "the formula ends too early"
         self._fail(problem, token.position, lexer.hint_at(self.tokens, self.index - 1))
 
-    def _named(self, token: lexer.Token) -> Name:
+    def _named(self, token: lexer.Token) -> expression.Name:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
                 hint = lexer.hint_for(token) or did_you_mean(token.text, lexer.FUNCTIONS)
@@ -209,13 +200,13 @@ class _Parser:
                     lexer.hint_for(token)
                     or "indices are integers, as in x[1,2]; put any other name in double quotes",
                 )
-        return Name(token.text)
+        return expression.Name(token.text)
 
-    def _call(self, token: lexer.Token) -> Call:
+    def _call(self, token: lexer.Token) -> expression.Call:
         opening = self._take()
-        operands = [self._expression_at(SUM)]
+        operands = [self._expression_at(expression.SUM)]
         while self._accept(","):
-            operands.append(self._expression_at(SUM))
+            operands.append(self._expression_at(expression.SUM))
         self._close(opening)
         is_pair = token.text in ("min", "max")
         if is_pair != (len(operands) > 1):
@@ -223,7 +214,7 @@ class _Parser:
             self._fail(
                 f"{token.text} expects {wanted}, got {len(operands)}", token.position, "check the commas"
             )
-        return Call(cast(Function, token.text), tuple(operands))
+        return expression.Call(cast(expression.Function, token.text), tuple(operands))
 
     def _close(self, opening: lexer.Token) -> None:
         if not self._accept(")"):
@@ -300,16 +291,16 @@ class _Parser:
     def _as_formula(self, node: stl.Node, start: int) -> stl.Formula:
         if isinstance(node, stl.Formula):
             return node
-        if isinstance(node, Name):
+        if isinstance(node, expression.Name):
             return stl.Flag.of(node)
-        what = "a number" if isinstance(node, Number) else "an expression"
+        what = "a number" if isinstance(node, expression.Number) else "an expression"
         hint = f"compare it, for example {node} >= 0"
         if "=>" in self.text:
             hint += "; => is an implication, greater or equal is >="
         self._fail(f"expected a formula, got {what}, {node}", start, hint)
 
-    def _as_expression(self, node: stl.Node, start: int) -> Expression:
-        if isinstance(node, Expression):
+    def _as_expression(self, node: stl.Node, start: int) -> expression.Expression:
+        if isinstance(node, expression.Expression):
             return node
         hint = "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->"
         if isinstance(node, stl.Constant):
