@@ -47,27 +47,29 @@ def test_long_facts_are_wrapped_on_a_terminal_only(monkeypatch: pytest.MonkeyPat
     assert json.loads(as_shown(text, {"a": "b " * 90}, as_json=True)) == {"a": "b " * 90}
 
 
+# A minute; a signal that arrives just before a sleep is handled after it, so that each is short.
+REST = "for _ in range(600): time.sleep(0.1)"
 # A command that takes the first Ctrl-C badly: it goes on for a minute.
-STUBBORN = """
+STUBBORN = f"""
 import sys, time
 from falsifier.cli import output
 
 output.stop_at_interrupts()
 try:
     print("ready", flush=True)
-    time.sleep(60)
+    {REST}
 except KeyboardInterrupt:
     print("stopping", flush=True)
-    time.sleep(60)
+    {REST}
 """
-ENDED = """
+ENDED = f"""
 import time
 from falsifier.cli import output
 
 output.stop_at_interrupts()
 output.end_at_interrupts(1)
 print("ready", flush=True)
-time.sleep(60)
+{REST}
 """
 CLOSED = """
 import os, sys
@@ -107,7 +109,7 @@ def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: in
 
 
 def test_a_signal_that_comes_twice_at_once_counts_once() -> None:
-    process = started(STUBBORN.replace("    time.sleep(60)\n", "    time.sleep(2)\n    print('summary')\n"))
+    process = started(STUBBORN.replace(f"    {REST}\n", "    time.sleep(2)\n    print('summary')\n"))
     assert process.stdout is not None
     for _ in range(2):
         process.stdout.readline()
