@@ -28,7 +28,7 @@ from falsifier.record.journal import STOP, holds_run, open_journal
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import check_names, told_problems
+from falsifier.search.make_engines import check_names, check_price, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
@@ -94,6 +94,7 @@ def resume_campaign(
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
             )
+            _check_prices(record.request)
         return _work(directory, record, problems, jobs, tuple(listeners))
 
 
@@ -166,7 +167,8 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         The problems, without what context files say.
 
     Raises:
-        SpecError: for an unknown engine or prompt variant, or a problem or context file that is not valid.
+        SpecError: for an unknown engine or prompt variant, a problem or context file that is not valid, or a
+            cost limit although the price is unknown.
         ChatError: for an unknown provider, an option that it does not have, or a missing key.
         ModelError: if an FMU cannot be used.
     """
@@ -180,10 +182,20 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         preflight(llm.name, api_base=llm.api_base, options=llm.options)
         if is_model_file(llm.name):
             served(llm.name)  # by this process, so that those that it starts share the server
+    _check_prices(request)
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})
     return problems
+
+
+def _check_prices(request: CampaignRequest) -> None:
+    """Reject limits of the cost of language models whose price is unknown, before anything is paid for."""
+    total = request.limits.cost if request.limits else None
+    asked = {repr((run.llm, run.budget.cost)): run for run in request.runs}.values()
+    for run in asked:
+        if run.llm is not None:
+            check_price(run.llm, run.budget.cost or total)
 
 
 def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:

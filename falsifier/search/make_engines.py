@@ -115,9 +115,14 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         attempts=attempts or DEFAULT_ATTEMPTS,
         cache=cache_directory() / "replies" if llm.cache else None,
     )
+    check_price(llm, max_cost)
+    return chat
+
+
+def check_price(llm: LLMSettings, max_cost: float | None) -> None:
+    """Reject a limit of the cost that cannot hold; SpecError if the price is unknown."""
     if max_cost is not None and price_of(llm) is None:
         raise SpecError(UNKNOWN_PRICE.format(llm.name, stated_price()))
-    return chat
 
 
 def price_of(llm: LLMSettings) -> "Price | None":

@@ -1,9 +1,16 @@
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+from falsifier.campaigns.directory import CampaignRecord, write_campaign
 from falsifier.campaigns.request import CampaignRequest, Searcher, ceiling, cross
+from falsifier.campaigns.runner import check_request, resume_campaign, run_campaign
+from falsifier.errors import SpecError
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
+from falsifier.record.manifest import environment
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import price_of
 from falsifier.search.request import LLMSettings
@@ -52,3 +59,22 @@ def test_the_listed_price_is_not_that_of_another_server() -> None:
     assert price_of(listed) is not None
     assert price_of(elsewhere) is None
     assert price_of(elsewhere.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    "limits", [{"cost": 0.5}, {"limits": Budget(None, cost=0.5)}, {"cost": 0.5, "limits": Budget(9)}]
+)
+def test_a_cost_that_cannot_be_known_is_not_limited(limits: dict[str, Any], tmp_path: Path) -> None:
+    unknown = LLMSettings(name="hosted_vllm/x", api_base="http://127.0.0.1:9")
+    with pytest.raises(SpecError, match=r"the price of hosted_vllm/x is unknown.*state it \(price="):
+        run_campaign(asked(unknown, **limits), tmp_path / "c")
+    assert not (tmp_path / "c").exists()
+    check_request(asked(unknown.model_copy(update={"price": (1.0, 2.0)}), **limits))
+
+
+def test_a_resumed_campaign_is_not_given_a_limit_that_cannot_hold(tmp_path: Path) -> None:
+    unknown = LLMSettings(name="hosted_vllm/x", api_base="http://127.0.0.1:9")
+    record = CampaignRecord(**environment(), request=asked(unknown), hashes={})
+    write_campaign(tmp_path, record)
+    with pytest.raises(SpecError, match="the price of hosted_vllm/x is unknown"):
+        resume_campaign(tmp_path, limits=Budget(None, cost=0.5))

@@ -27,6 +27,14 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
 
+@pytest.mark.parametrize("limit", [("--max-cost", "1"), ("--total", "cost=1")])
+def test_a_cost_that_cannot_be_known_is_not_limited(limit: tuple[str, str], tmp_path: Path) -> None:
+    asked = ("--llm", "hosted_vllm/x", "--api-base", "http://127.0.0.1:9", "--yes", "--out", "c", *limit)
+    done = falsifier("bench", NEVER, "--runs", "1", *asked, cwd=tmp_path)
+    assert (done.code, "--llm-option price=SENT:RECEIVED" in done.err) == (2, True), done.err
+    assert "limited to" not in done.err and not (tmp_path / "c").exists()
+
+
 def test_tables_of_language_models_need_one(command: Any) -> None:
     refused = bench(command, "--table", "llms")
     assert (refused.exit_code, "--table llms: shows language models" in refused.output) == (2, True)
