@@ -102,6 +102,7 @@ def results_text(results: Sequence[Result]) -> str:
     falsified = sum(result.counterexample is not None for result in results)
     spent = spent_together((result.directory, result.spent) for result in results)
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(spent)})")
+    lines += [f"language model: {llm_use(spent)}"] if spent.questions else []
     directories = {result.directory for result in results}
     if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
         lines.append(_continue_line(results[0].directory))

@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 
 from falsifier.engines.llm import LLMEngine
+from falsifier.llm.messages import ChatReply, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
+from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 from tests.searches import stop_after
@@ -161,3 +163,15 @@ def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:
     assert data["failures"][0]["count"] == cause.count
     held = {each["name"]: each["value"] for each in data["not_searched"]}
     assert (held["v"], held["bias"]) == (0.0, 0.25)
+
+
+def test_what_several_results_asked_together_is_told_once(tmp_path: Path) -> None:
+    usage = Usage(prompt_tokens=100, completion_tokens=50, cost=0.15)
+    chat = ScriptedChat(lambda _: ChatReply(text='{"point": [0.1, 0.2, 0.3, 0.4]}', usage=usage))
+    problems = [impossible(), lag_problem("G[0,10] (x <= 60)", points=4, name="OTHER")]
+    results = falsify(problems, llm=chat, budget=1, directory=tmp_path)
+    line = "anguage model: 1 request, 150 tokens, 0.1500 US dollars"
+    assert results_text(results).count(f"\nl{line}") == 1
+    assert f"\n\nL{line}.\n" in markdown_report(tmp_path)
+    assert f"l{line}, started " in html_report(tmp_path)
+    assert "anguage model" not in results_text([replace(r, spent=Spent(simulations=1)) for r in results])

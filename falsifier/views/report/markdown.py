@@ -5,8 +5,8 @@ from pathlib import Path
 
 from falsifier.core.literals import markdown_code, markdown_text, one_line
 from falsifier.views.report import wording
-from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather
-from falsifier.views.text import Fact
+from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
+from falsifier.views.text import Fact, llm_use
 
 
 def markdown_report(*directories: Path) -> str:
@@ -31,6 +31,8 @@ def markdown_report(*directories: Path) -> str:
             parts += [f"## Statistics: {markdown_text(side.title)}", side.table.markdown().rstrip()]
     for side in sides:
         whose = f"{markdown_text(side.title)}: " if len(sides) > 1 else ""
+        if (spent := spent_on(side.runs)).questions:
+            parts.append(f"{whose}Language model: {llm_use(spent)}.")
         parts.append(f"{whose}{_environment(side)}")
     return "\n\n".join(parts) + "\n"
 

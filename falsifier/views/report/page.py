@@ -17,7 +17,7 @@ from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report import wording
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
 from falsifier.views.report.wording import run_name
-from falsifier.views.text import Fact
+from falsifier.views.text import Fact, llm_use
 
 if TYPE_CHECKING:
     from falsifier.views.plotting import Figure
@@ -81,7 +81,7 @@ def document(title: str, *body: str) -> str:
 
 def overview(side: Side) -> str:
     """Say in one line what a directory contains."""
-    runs = side.runs
+    runs, spent = side.runs, spent_on(side.runs)
     failed = sum(run.status == "failed" for run in runs)
     open_ = sum(not run.finished for run in runs) - failed
     violated = sum(section.status == "violated" for section in side.sections)
@@ -90,7 +90,8 @@ def overview(side: Side) -> str:
         counted(len(runs), "run"),
         *([f"{failed} failed"] if failed else []),
         *([f"{open_} not finished"] if open_ else []),
-        spent_on(runs).simulations_text,
+        spent.simulations_text,
+        *([f"language model: {llm_use(spent)}"] if spent.questions else []),
     ]
     if runs:
         started = min(run.manifest.started for run in runs)  # such as 2026-03-01T10:20:30+00:00
