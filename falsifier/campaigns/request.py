@@ -106,7 +106,7 @@ def cross(
         problems: what is searched; for engines that choose no control points, with fixed parameterizations.
         searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
-        budget: limits of each run.
+        budget: limits of each run; those of tokens and cost hold for language models.
     """
     runs: dict[str, RunRequest] = {}
     for problem, searcher, seed in product(problems, searchers, seeds):
@@ -117,7 +117,8 @@ def cross(
         used = ProblemSource(target=problem) if isinstance(problem, str) else problem
         if used.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
             used = used.model_copy(update={"parameterization": "fixed"})
-        run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=budget, keep="best")
+        limits = budget if llm else replace(budget, tokens=None, cost=None)
+        run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=limits, keep="best")
         runs[run_name(run)] = run
     return tuple(runs.values())
 

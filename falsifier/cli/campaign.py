@@ -32,7 +32,7 @@ from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import price_of
+from falsifier.search.make_engines import LLM_ENGINES, price_of
 from falsifier.search.request import LLMSettings
 from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
 from falsifier.views.terminal import warn
@@ -43,11 +43,13 @@ _WATCH_PERIOD = 0.5
 _BENCH_HELP = """Run requirements x methods x seeds and print a table in the format of the ARCH-COMP category.
 
 TARGETS are requirements (AT1) or specs with all their requirements (my.toml); without targets, give --suite.
-Each run has the defaults of falsifier run; with --suite, those of the competition.
+Each run has the defaults of falsifier run; with --suite, those of the competition. With --llm, the engines
+llm and hybrid ask it, and the others run as they are.
 
 \b
 falsifier bench --suite arch-comp --engine surrogate --runs 10 --budget 1500 --jobs 2
 falsifier bench AT CC --llm openai/gpt-5-nano@low --variant MP1 --variant MP4 --table ablation
+falsifier bench AT1 --llm openai/gpt-5-mini --engine llm --engine uniform --engine surrogate
 
 Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or were stopped.
 """
@@ -239,7 +241,7 @@ def _kinds(
 def _searchers(
     engines: Sequence[str], llms: Sequence[str], variants: Sequence[str], how: LLMSettings | None
 ) -> list[Searcher]:
-    """Engines alone, or engines x LLMs x variants if an LLM is named."""
+    """Engines, those that ask an LLM once for each LLM and variant; without engines, the LLMs alone."""
     if how is None:
         refuse("requires --llm NAME", variant=variants)
         return [*(engines or (DEFAULT_ENGINE,))]
@@ -248,4 +250,9 @@ def _searchers(
         name, effort = llm_options.name_and_effort(llm)
         decided = {"name": name, "effort": effort, "variant": variant}
         models.append(LLMSettings.model_validate(how.model_dump() | decided))
-    return [*product(engines, models)] if engines else [*models]
+    # If no engine asks one, all are paired with it, which is refused where requests are checked.
+    asking = {*engines} & {*LLM_ENGINES} or {*engines}
+    searchers: list[Searcher] = [] if engines else [*models]
+    for engine in engines:
+        searchers += product([engine], models) if engine in asking else [engine]
+    return searchers

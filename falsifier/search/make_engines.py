@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from falsifier.llm.usage import Price
 
 # Engines that ask a language model.
-_LLM_ENGINES = ("llm", "hybrid")
+LLM_ENGINES = ("llm", "hybrid")
 # Distance between the seeds of the engines in one search, so that they do not draw the same points; larger
 # than the consecutive seeds that users choose.
 _SEED_STRIDE = 1_000_003
@@ -79,13 +79,13 @@ def check_names(engine: str | None, llm: LLMSettings | None) -> None:
             model.
     """
     if llm is None:
-        if engine in _LLM_ENGINES:
+        if engine in LLM_ENGINES:
             raise SpecError(
                 f"the engine {engine!r} needs a language model: name one ({setting('llm', 'NAME')})"
             )
         check_engine(engine or DEFAULT_ENGINE)
         return
-    if (engine or "llm") not in _LLM_ENGINES:
+    if (engine or "llm") not in LLM_ENGINES:
         raise SpecError(f"the engine {engine!r} does not use a language model: drop one of the two")
     from falsifier.llm.prompts.view import variant_named
 

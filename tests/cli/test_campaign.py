@@ -122,6 +122,25 @@ def test_methods_are_all_combinations(command: Any, requested: list[Any]) -> Non
     assert {(r.llm.price, r.llm.anonymous) for r in request.runs} == {((1.0, 2.0), True)}
 
 
+def test_engines_that_ask_no_language_model_run_beside_those_that_do(
+    command: Any, requested: list[Any]
+) -> None:
+    engines = ("--engine", "llm", "--engine", "uniform", "--engine", "hybrid")
+    command("bench", HARD, "--runs", "1", *engines, "--llm", "x/y", "--llm", "x/z", "--max-cost", "2")
+    (request,) = requested
+    asked = [(r.engine, r.llm and r.llm.name, r.budget.cost) for r in request.runs]
+    assert asked == [
+        *(("llm", "x/y", 2.0), ("llm", "x/z", 2.0), ("uniform", None, None)),
+        *(("hybrid", "x/y", 2.0), ("hybrid", "x/z", 2.0)),
+    ]
+
+
+def test_a_language_model_that_no_engine_asks_is_refused(tmp_path: Path) -> None:
+    engines = ("--engine", "uniform", "--engine", "corners", "--llm", "hosted_vllm/x")
+    done = falsifier("bench", NEVER, *engines, "--api-base", "http://127.0.0.1:9", "--out", "c", cwd=tmp_path)
+    assert (done.code, "does not use a language model" in done.err) == (2, True), done.err
+
+
 def test_suites_and_instances(command: Any, requested: list[Any]) -> None:
     command("bench", "--suite", "arch-comp", "--engine", "uniform")
     command("bench", "--suite", "arch-comp", "--parameterization", "instance2", "--engine", "uniform")
