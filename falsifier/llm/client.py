@@ -6,7 +6,7 @@ on disk, keyed by the content of the request.
 
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -117,28 +117,33 @@ class LiteLLMChat:
                 free = {"usage": Usage(cost=0.0, kept=1), "seconds": 0.0, "source": "cache"}
                 return kept.model_copy(update=free)
         lost: list[Usage] = []
-        attempt = 1
+        failures: list[TransientChatError] = []
         try:
             while True:
                 try:
                     reply = self._asked(request)
-                    return reply.model_copy(update={"attempts": attempt, "usage": sum(lost, reply.usage)})
+                    attempts = len(failures) + 1
+                    return reply.model_copy(update={"attempts": attempts, "usage": sum(lost, reply.usage)})
                 except TransientChatError as error:
                     lost += [error.lost] if error.lost else []
-                    self._wait(error, attempt, request)
-                    attempt += 1
+                    failures.append(error)
+                    self._wait(failures, request)
         except BaseException as error:  # Ctrl-C, too
             if lost:
                 error.lost = sum(lost[1:], lost[0])  # type: ignore[attr-defined]
             raise
 
-    def _wait(self, error: TransientChatError, attempt: int, request: ChatRequest) -> None:
+    def _wait(self, failures: Sequence[TransientChatError], request: ChatRequest) -> None:
         """Wait before the next request: as the server asks, else twice as long as before, with jitter.
+
+        Failures whose patience is limited are counted apart from the others, such as those of a busy server.
 
         Raises:
             ChatError: if there is no next request, or if it is not worth waiting for.
         """
-        limit = min(self.attempts, error.patience or self.attempts)
+        error, attempt = failures[-1], len(failures)
+        others = sum(failure.patience is None for failure in failures)
+        limit = min(self.attempts, others + (error.patience or self.attempts))
         if attempt >= limit:
             raise ChatError(f"{counted(attempt, 'attempt')} failed, the last one so: {error}") from None
         delay = error.retry_after

@@ -58,7 +58,7 @@ class TransientChatError(ChatError):
         self, message: str, *, retry_after: float | None = None, patience: int | None = None
     ) -> None:
         self.retry_after = retry_after  # in s, as the server asked to wait
-        self.patience = patience  # maximum number of requests worth sending; None: no limit of its own
+        self.patience = patience  # number of such failures that end a question; None: no limit of its own
         super().__init__(message)
 
 
@@ -146,7 +146,7 @@ def classify(
     if isinstance(error, RefusedReplyError):
         return ChatError(where + said)
     if isinstance(error, BrokenReplyError) and error.status_code is None:
-        return TransientChatError(where + said)
+        return TransientChatError(where + said, patience=error.patience)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")

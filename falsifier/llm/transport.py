@@ -40,6 +40,8 @@ _TOO_LONG = f"the reply has more than {_MOST_BYTES >> 20} MiB"
 
 # Maximum number of characters of a reply that an error repeats.
 _LONGEST_BEGINNING = 80
+# Malformed replies to a question after which no other is to be expected; each takes time and tokens.
+_MOST_MALFORMED = 3
 _WITHIN = "the connection was cut within the reply"
 _CUT = "the server or a proxy before it ended it; its log says why"
 _ADDRESS = "check host, port and http or https in the server's address"
@@ -79,6 +81,7 @@ class BrokenReplyError(Exception):
     """No reply came, or not one of an LLM's server; the message says what is wrong, and what to do."""
 
     status_code: int | None = None  # as the server reports it within a reply that has none
+    patience: int | None = None  # number of such replies after which none is better; None: no limit
 
 
 class UnusableReplyError(BrokenReplyError):
@@ -265,8 +268,10 @@ class _Limited(httpx.SyncByteStream):
         body = bytes(received)
         if self._is_success:
             self._call.fault = _unreadable(body)
+            if self._call.fault.status_code is None:
+                self._call.fault.patience = _MOST_MALFORMED
         is_answer = isinstance(self._call.fault, UnusableReplyError)
-        yield _with_possible_counts(body) if is_answer else body
+        yield _mended(body) if is_answer else body
 
     def close(self) -> None:
         self._inner.close()
@@ -337,12 +342,30 @@ def _reported(error: Any) -> BrokenReplyError:
     return fault
 
 
-def _with_possible_counts(body: bytes) -> bytes:
-    """The body without counts of tokens that cannot be true: the client library would reject all of it."""
+def _mended(body: bytes) -> bytes:
+    """The body without what the client library would reject all of it for, but what can be read.
+
+    These are counts of tokens that cannot be true, and texts in parts.
+    """
     sent = json.loads(body)
-    usage = sent.get("usage")
-    possible = _possible(usage) if isinstance(usage, dict) else None
-    return body if possible == usage else json.dumps({**sent, "usage": possible}).encode()
+    usage, choices = sent.get("usage"), sent.get("choices")
+    mended = dict(sent)
+    if "usage" in sent:
+        mended["usage"] = _possible(usage) if isinstance(usage, dict) else None
+    if isinstance(choices, list):
+        mended["choices"] = list(map(_with_one_text, choices))
+    return body if mended == sent else json.dumps(mended).encode()
+
+
+def _with_one_text(choice: Any) -> Any:
+    """A choice whose content is one text; some servers send it as a list of parts."""
+    message = choice.get("message") if isinstance(choice, dict) else None
+    if not isinstance(message, dict) or not isinstance(parts := message.get("content"), list):
+        return choice
+    if not all(isinstance(part, dict) and part.get("type") == "text" for part in parts):
+        return choice
+    text = "".join(str(part.get("text") or "") for part in parts)
+    return {**choice, "message": {**message, "content": text}}
 
 
 def _possible(usage: dict[str, Any]) -> dict[str, Any]:

@@ -208,6 +208,16 @@ def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> No
     assert reply.text == '{"rationale": ""}' and reply.finish_reason == "call of the tool 'json'"
 
 
+def test_a_text_in_parts_is_read_as_one() -> None:
+    parts = [{"type": "text", "text": '{"ration'}, {"type": "text", "text": 'ale": ""}'}]
+    with serving(Step(None, extra={"content": parts}), Step(None, extra={"content": [7]})) as server:
+        chat = LiteLLMChat("openai/mine", api_base=server.url)
+        reply = chat.send(REQUEST)
+        with pytest.raises(TransientChatError, match="does not have the form"):
+            chat.send(REQUEST)
+    assert (reply.text, reply.usage.prompt_tokens) == ('{"rationale": ""}', 100)
+
+
 _TEXTS = [message.content for message in REQUEST.messages]
 
 

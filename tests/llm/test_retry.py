@@ -5,9 +5,11 @@ from time import monotonic
 import pytest
 
 from falsifier.errors import ChatError
+from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.scripted import ScriptedChat
+from tests.llm.server import Step, serving
 from tests.llm.support import Served
 
 QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
@@ -51,6 +53,22 @@ def test_it_ends_where_waiting_does_not_help(failure: ChatError, said: str, aske
         asked(chat, attempts=3)
     assert not isinstance(caught.value, TransientChatError)
     assert len(chat.requests) == asked_for
+
+
+@pytest.mark.parametrize(
+    "raw", ["<html>Sign in</html>", "null", "[]", '{"choices": [{"message": {"content": 5}}]}'], ids=str
+)
+def test_malformed_replies_are_asked_for_three_times(raw: str) -> None:
+    with serving(*[Step(status=503)] * 3, *[Step(raw=raw)] * 4) as server:
+        with pytest.raises(ChatError, match=r"6 attempts failed, the last one so: .*the reply"):
+            LiteLLMChat("openai/mine", api_base=server.url).complete(QUESTION)
+        assert len(server.received) == 6
+
+
+@pytest.mark.parametrize("step", [Step(status=503), Step(raw='{"error": {"message": "busy"}}')], ids=str)
+def test_a_server_that_says_it_is_busy_is_given_more_time(step: Step) -> None:
+    with serving(*[step] * 6, Step("done")) as server:
+        assert LiteLLMChat("openai/mine", api_base=server.url).complete(QUESTION).text == "done"
 
 
 def test_a_wait_beyond_the_deadline_is_not_begun(naps: list[float]) -> None:
