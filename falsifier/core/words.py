@@ -108,6 +108,15 @@ def aligned(
     return lines
 
 
+def without_full_stop(text: str) -> str:
+    """Return a text that others follow, without the full stop at its end; three of them are kept.
+
+    >>> without_full_stop("It ends."), without_full_stop("and so on ...")
+    ('It ends', 'and so on ...')
+    """
+    return text[:-1] if text.endswith(".") and not text.endswith("..") else text
+
+
 def shortened(text: str, most: int) -> str:
     """Return a text; of one with more characters than this the beginning, marked as such.
 

@@ -1,6 +1,7 @@
 """A language model as a search engine."""
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
 from textwrap import shorten
@@ -62,8 +63,8 @@ class LLMEngine:
         self._on_exchange: OnExchange = lambda _: None
         self._sample = sample
         self._without_answer = 0
-        # Random changes in place of an answer, and why the first of them was needed.
-        self._changes: set[Hashable] = set()
+        # Where samples in place of an answer are from, and why the first of them was needed.
+        self._instead_of: dict[Hashable, str] = {}
         self._reason = ""
 
     @property
@@ -86,18 +87,19 @@ class LLMEngine:
 
     def remarks(self, evaluations: Sequence[Evaluation]) -> tuple[str, ...]:
         """Return how many samples are not the LLM's, and why."""
-        count = sum(e.candidate.key in self._changes for e in evaluations)
-        if not count:
+        found = (self._instead_of.get(e.candidate.key) for e in evaluations)
+        if not (counts := Counter(filter(None, found))):
             return ()
-        samples = counted(len(evaluations), "sample")
-        return (f"{count} of {samples} from random changes of the best sample, because {self._reason}",)
+        told = " and ".join(f"{count} {where}" for where, count in counts.items())
+        return (f"of {counted(len(evaluations), 'sample')}, {told}, because {self._reason}",)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n new candidates.
 
         Raises:
             ChatError: if the LLM cannot be reached, or gave no valid reply to several questions in a row;
-                after a single one a random change of the best sample is returned.
+                after a single one a random change of the best sample, or without one a random sample, is
+                returned.
         """
         candidates: list[Candidate] = []
         while len(candidates) < n:
@@ -163,7 +165,8 @@ class LLMEngine:
         real = briefing.revealed(changed)
         _LOG.warning("%s. Continuing with %s.", error, what)
         self._reason = self._reason or reason_in_remark(str(error))
-        self._changes.add(real.key)
+        where = "from random changes of the best sample" if briefing.best else "drawn at random"
+        self._instead_of[real.key] = where
         return real
 
     def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from falsifier.core.literals import printable
-from falsifier.core.words import counted, shortened
+from falsifier.core.words import counted, shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, FalsifierError, written
 from falsifier.llm.messages import (
     LONGEST_REPLY,
@@ -35,7 +35,8 @@ class RejectedReplyError(FalsifierError):
     """A reply cannot be used; the message is sent to the LLM."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(shortened(printable(message[: 2 * _LONGEST_PROBLEM]), _LONGEST_PROBLEM))
+        told = shortened(printable(message[: 2 * _LONGEST_PROBLEM]).rstrip(), _LONGEST_PROBLEM)
+        super().__init__(without_full_stop(told))  # more follows in all messages
 
 
 class NoValidReplyError(ChatError):

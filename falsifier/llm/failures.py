@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact
-from falsifier.core.words import shortened
+from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address
@@ -39,7 +39,6 @@ _UNREADABLE_WORDS = (
     "failed to validate json",
 )
 _LONGEST_DETAIL = 600
-_FULL_STOP = re.compile(r"(?<!\.)\.$")
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
 _TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
@@ -180,7 +179,7 @@ def _detail(text: str, status: int | None) -> str:
     if title := _TITLE.search(said):
         told = title[1]
     told = told if isinstance(told, str) and told.strip() else text
-    detail = _FULL_STOP.sub("", shortened(" ".join(told.split()), _LONGEST_DETAIL))
+    detail = without_full_stop(shortened(" ".join(told.split()), _LONGEST_DETAIL))
     if status is not None and not _LETTERS.search(detail):
         return f"the server answers with the HTTP status {status} and without a reason"
     return detail

@@ -108,3 +108,10 @@ def test_a_question_that_outgrows_the_context_when_asked_again_has_no_valid_repl
         asked("x", ContextExceededError("too long"))
     with pytest.raises(ContextExceededError):
         asked(ContextExceededError("too long"))
+
+
+def test_more_can_follow_a_reason_that_ends_with_a_full_stop() -> None:
+    chat = ScriptedChat(lambda _: ChatReply(text="I cannot attack systems.", finish_reason="refusal"))
+    with pytest.raises(NoValidReplyError, match=r"attack systems$"):
+        converse(chat, QUESTION, str, lambda _: None)
+    assert "attack systems.\nReply again" in chat.requests[1].messages[-1].content

@@ -137,7 +137,7 @@ def test_random_changes_in_place_of_answers_are_told_with_the_reason(tmp_path: P
     chat = ScriptedChat(lambda _: "nothing")
     run = tmp_path / "run"
     result = falsify(impossible(), LLMEngine(impossible(), chat), budget=1, directory=run)
-    remark = "1 of 1 sample from random changes of the best sample, because scripted gave no valid reply in 3"
+    remark = "of 1 sample, 1 drawn at random, because scripted gave no valid reply in 3"
     (line,) = (x for x in result_text(result).splitlines() if remark in x)
     assert line.startswith("  note ")
     assert remark in results_text([result])
@@ -145,7 +145,8 @@ def test_random_changes_in_place_of_answers_are_told_with_the_reason(tmp_path: P
     # A resumed run counts what is recorded too.
     again = LLMEngine(impossible(), chat)
     (resumed,) = resume(run, problems=[impossible()], engine=again, budget=2)
-    assert resumed.remarks[0].startswith(remark.replace("1 of 1 sample", "2 of 2 samples"))
+    both = "of 2 samples, 1 drawn at random and 1 from random changes of the best sample, because scripted"
+    assert resumed.remarks[0].startswith(both)
 
 
 def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:
