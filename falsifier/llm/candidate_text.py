@@ -5,9 +5,20 @@ What is read here is not compared with a search space yet; ``replies`` does that
 
 import json
 import re
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, FailFast, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    FailFast,
+    Field,
+    ValidationError,
+    ValidationInfo,
+)
 
 from falsifier.core.literals import printable
 from falsifier.core.signals import Interpolation
@@ -51,11 +62,11 @@ def _unrolled(found: Any) -> Any:
     return numbers
 
 
-def _signals_by_name(found: Any) -> Any:
+def _signals_by_name(found: Any, info: ValidationInfo) -> Any:
     """Convert ``{name: values}`` and [time, value] pairs, which LLMs also write, to the listed form."""
     if isinstance(found, dict):
         found = [{"name": k, **(v if isinstance(v, dict) else {"values": v})} for k, v in found.items()]
-    return [_pairs_apart(s) for s in found] if isinstance(found, list) else found
+    return [_in_numbers(_pairs_apart(s), info) for s in found] if isinstance(found, list) else found
 
 
 def _pairs_apart(signal: Any) -> Any:
@@ -63,7 +74,7 @@ def _pairs_apart(signal: Any) -> Any:
         return signal
     signal = _plain_keys(signal)
     values = signal.get("values", signal.get("points"))
-    if isinstance(values, int | float):
+    if isinstance(values, int | float | str):
         return {**signal, "values": [values]}
     if isinstance(values, list) and values and all(isinstance(v, list) and len(v) == 2 for v in values):
         rest = {k: v for k, v in signal.items() if k != "points"}
@@ -71,10 +82,24 @@ def _pairs_apart(signal: Any) -> Any:
     return signal
 
 
-def _parameters_by_name(found: Any) -> Any:
+def _parameters_by_name(found: Any, info: ValidationInfo) -> Any:
     if isinstance(found, dict):
-        return [{"name": k, "value": v} for k, v in found.items()]
-    return [_plain_keys(p) if isinstance(p, dict) else p for p in found] if isinstance(found, list) else found
+        found = [{"name": k, "value": v} for k, v in found.items()]
+    plain = [_plain_keys(p) if isinstance(p, dict) else p for p in found] if isinstance(found, list) else []
+    return [_in_numbers(p, info) for p in plain] if isinstance(found, list) else found
+
+
+def _in_numbers(part: Any, info: ValidationInfo) -> Any:
+    """A signal or parameter with numbers in place of the words that stand for its values."""
+    name = part.get("name") if isinstance(part, dict) else None
+    words: Mapping[str, float] = (info.context or {}).get(name, {}) if isinstance(name, str) else {}
+
+    def number(value: Any) -> Any:
+        return words.get(value, value) if isinstance(value, str) else value
+
+    given = {key: part[key] for key in ("value", "values") if words and key in part}
+    found = {k: list(map(number, v)) if isinstance(v, list) else number(v) for k, v in given.items()}
+    return {**part, **found} if found else part
 
 
 def _storable(text: str) -> str:
@@ -160,10 +185,15 @@ def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
     return {names.get(key, str(key)): value for key, value in found.items()}
 
 
-def written_candidate(found: dict[str, Any]) -> WrittenCandidate:
-    """Read one candidate; RejectedReplyError stating what is wrong first."""
+def written_candidate(
+    found: dict[str, Any], words: Mapping[str, Mapping[str, float]] = MappingProxyType({})
+) -> WrittenCandidate:
+    """Read one candidate; RejectedReplyError stating what is wrong first.
+
+    Words stand for numbers, by the name of an input or parameter.
+    """
     try:
-        return WrittenCandidate.model_validate(found)
+        return WrittenCandidate.model_validate(found, context=words)
     except ValidationError as error:
         raise RejectedReplyError(defect(error)) from None
 

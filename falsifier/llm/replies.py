@@ -6,11 +6,12 @@ too.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import INTERPOLATIONS, Signal
-from falsifier.core.space import Dimension, InputRange, Range, SearchSpace
+from falsifier.core.space import Dimension, InputRange, Range, SearchSpace, nearest_value
 from falsifier.core.words import counted
 from falsifier.errors import CandidateError, SpecError, did_you_mean
 from falsifier.llm.candidate_text import (
@@ -28,6 +29,7 @@ from falsifier.llm.json_text import schema_of_list, schema_of_object
 _MOST_OUTSIDE = 5
 # Share of a range by which a value may exceed it: prompts show values with few digits.
 _ROUNDING = 1e-3
+_BOOLEAN = {"false": 0, "true": 1}
 _TEXT = {"type": "string"}
 _NUMBERS = schema_of_list({"type": "number"})
 
@@ -88,9 +90,10 @@ class ReplyForm:
             RejectedReplyError: if none is valid; states what is wrong with each.
         """
         written, valid, defects = candidates_in(text), list[Candidate](), list[str]()
+        words = {r.name: _BOOLEAN if r.kind == "boolean" else dict(r.items) for r in self.space.ranges}
         for number, found in enumerate(written, start=1):
             try:
-                valid.append(self._candidate(written_candidate(found), origin))
+                valid.append(self._candidate(written_candidate(found, words), origin))
             except RejectedReplyError as rejection:
                 defects.append(f"candidate {number}: {rejection}" if len(written) > 1 else str(rejection))
         if not valid:
@@ -112,7 +115,7 @@ class ReplyForm:
         for p in written.parameters:
             if p.name in parameters:
                 raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
-            parameters[p.name] = _clamped(p.value, ranges[p.name]) if p.name in ranges else p.value
+            parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
         try:
             return self.space.admit(Candidate(signals, parameters, origin, written.rationale))
         except CandidateError as error:
@@ -124,7 +127,7 @@ class ReplyForm:
             near = did_you_mean(written.name[:LONGEST_NUMBER], ranges)
             raise RejectedReplyError(f"unknown input {quoted(written.name)}; {near}")
         chosen = ranges[written.name]
-        values = [_clamped(v, chosen) for v in written.values]
+        values = [_possible(v, chosen) for v in written.values]
         times = written.times or ()
         interpolation = written.interpolation or chosen.interpolation
         if not values:
@@ -154,6 +157,9 @@ class ReplyForm:
         if outside and not self.named:
             more = f"; and {len(outside) - _MOST_OUTSIDE} more" if len(outside) > _MOST_OUTSIDE else ""
             raise RejectedReplyError("; ".join(outside[:_MOST_OUTSIDE]) + more)
+        ranges = {r.name: r for r in self.space.ranges}
+        for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1):
+            _check_possible(value, ranges[d.name], f"number {place}")
         try:
             return self.space.decode(numbers, origin=origin, rationale=rationale)
         except CandidateError as error:
@@ -167,6 +173,20 @@ def _clamped(value: float, ranged: Range | Dimension) -> float:
     if ranged.low - slack <= value <= ranged.high + slack:
         return min(max(value, ranged.low), ranged.high)
     return value
+
+
+def _possible(value: float, ranged: Range) -> float:
+    """The value, clamped; RejectedReplyError for one between those that can be taken."""
+    value = _clamped(value, ranged)
+    _check_possible(value, ranged, ranged.label)
+    return value
+
+
+def _check_possible(value: float, ranged: Range, label: str) -> None:
+    nearest = nearest_value(ranged, value) if isfinite(value) else value
+    if value != nearest and (ranged.items or value != round(value)):
+        what = "none of its numbers" if ranged.items else "no whole number"
+        raise RejectedReplyError(f"{label}: {value:g} is {what}; the nearest is {nearest:g}")
 
 
 def _range(ranges: Sequence[Range]) -> dict[str, float]:

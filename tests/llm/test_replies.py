@@ -176,6 +176,53 @@ def test_interpolations_are_those_that_are_possible() -> None:
         form(smooth, gear).read(json.dumps({"rationale": "", "signals": signals}))
 
 
+def discrete(door: Any = 0, on: Any = 0, gear: Any = 1, **reply: Any) -> Any:
+    """Read values of an enumeration, a Boolean and an integer."""
+    items = (("Open", 0), ("Lock", 2))
+    kinds: dict[str, Any] = {"control_points": 2, "interpolation": "constant"}
+    door_, on_ = (
+        InputRange("door", 0.0, 2.0, kind="enumeration", items=items, **kinds),
+        InputRange("on", 0.0, 1.0, kind="boolean", **kinds),
+    )
+    space = SearchSpace((door_, on_), (ParameterRange("gear", 1.0, 5.0, kind="integer"),), 10.0)
+    signals = [{"name": "door", "values": door}, {"name": "on", "values": on}]
+    reply = reply or {"signals": signals, "parameters": [{"name": "gear", "value": gear}]}
+    (candidate,) = ReplyForm(space).read(json.dumps(reply), origin="me")
+    return {n: list(s.values) for n, s in candidate.signals.items()} | dict(candidate.parameters)
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        {"door": ["Lock", "Open"], "on": ["true", False], "gear": 3.0},
+        {"door": ["2", 0], "on": [True, "false"], "gear": "3"},
+        {"signals": {"door": ["Lock", 0], "on": [[0, "true"], [5, 0]]}, "parameters": {"gear": 3}},
+    ],
+    ids=str,
+)
+def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
+    assert discrete(**reply) == {"door": [2, 0], "on": [1, 0], "gear": 3}
+
+
+@pytest.mark.parametrize(
+    ("reply", "problem"),
+    [
+        ({"door": ["lock", 0]}, "'lock' is neither a number"),
+        ({"on": ["Lock", 0]}, "'Lock' is neither a number"),
+        ({"door": [1, 0]}, "input 'door': 1 is none of its numbers; the nearest is 0"),
+        ({"on": [0.5, 0]}, "input 'on': 0.5 is no whole number; the nearest is 0"),
+        ({"gear": 2.7}, "parameter 'gear': 2.7 is no whole number; the nearest is 3"),
+        ({"gear": 5.3}, "parameter 'gear': 5.3 is no whole number; the nearest is 5"),
+        ({"gear": 6}, "parameter 'gear': 6 is outside its range"),
+        ({"point": [0, 0, 0.4, 0, 1]}, "number 3: 0.4 is no whole number; the nearest is 0"),
+    ],
+    ids=str,
+)
+def test_values_that_cannot_be_taken_are_told(reply: dict[str, Any], problem: str) -> None:
+    with pytest.raises(RejectedReplyError, match=re.escape(problem)):
+        discrete(**reply)
+
+
 def test_several_candidates() -> None:
     other = changed(parameters=[{"name": "mass", "value": 901}])
     found = form_of(count=2).read(json.dumps({"candidates": [GOOD, other]}))
