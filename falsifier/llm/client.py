@@ -172,6 +172,8 @@ class LiteLLMChat:
             "parameters": dict(self.parameters),
             "request": request.model_dump(mode="json"),
         }
+        if self.api_base and not self.content:  # whole, where parameters have it without a password
+            asked["server"] = sha256(self.api_base.encode()).hexdigest()
         digest = sha256(json.dumps(asked, sort_keys=True, default=str).encode()).hexdigest()
         return cache / digest[:2] / f"{digest}.json"
 

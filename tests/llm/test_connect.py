@@ -211,12 +211,12 @@ class TestCache:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         places = []
-        for port in (1, 2):
-            monkeypatch.setenv("OPENAI_API_BASE", f"http://127.0.0.1:{port}/v1")
+        for server in ("127.0.0.1:1", "127.0.0.1:2", "me:word@127.0.0.1:1", "me:word@127.0.0.1:2"):
+            monkeypatch.setenv("OPENAI_API_BASE", f"http://{server}/v1")
             chat = connect("openai/mine", cache=tmp_path)
             assert isinstance(chat, LiteLLMChat)
             places.append(chat._place(tmp_path, QUESTION))
-        assert len(set(places)) == 2
+        assert len(set(places)) == 4
 
     def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
         inner = ScriptedChat([PAID, "never"])
