@@ -1,24 +1,14 @@
 """Five machines and controllers as Python functions, and what they must not do.
 
-They belong to the collection that ``bench/function_plants.py`` searches, which uses the helpers here, too.
+They belong to the collection that ``bench/function_plants.py`` searches.
 """
 
 from collections.abc import Mapping
 from math import copysign, exp
 
 from bench.example_systems import Array
-from bench.function_machines import columns, held, requirements, switch, whole
-from falsifier.core.space import InputRange, ParameterRange
-
-
-def line(name: str, low: float, high: float, points: int) -> InputRange:
-    """Return an input of real numbers, straight between control points."""
-    return InputRange(name, low, high, control_points=points, interpolation="linear")
-
-
-def numbers(name: str, low: float, high: float, points: int) -> InputRange:
-    """Return an input of integers."""
-    return InputRange(name, low, high, kind="integer", control_points=points, interpolation="constant")
+from bench.function_machines import columns, held, line, numbers, requirements, switch, whole
+from falsifier.core.space import ParameterRange
 
 
 def parking(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

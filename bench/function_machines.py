@@ -21,6 +21,16 @@ def held(name: str, low: float, high: float, points: int) -> InputRange:
     return InputRange(name, low, high, control_points=points, interpolation="constant")
 
 
+def line(name: str, low: float, high: float, points: int) -> InputRange:
+    """Return an input of real numbers, straight between control points."""
+    return InputRange(name, low, high, control_points=points, interpolation="linear")
+
+
+def numbers(name: str, low: float, high: float, points: int) -> InputRange:
+    """Return an input of integers."""
+    return InputRange(name, low, high, kind="integer", control_points=points, interpolation="constant")
+
+
 def switch(name: str, points: int) -> InputRange:
     """Return an input that is 0 or 1."""
     return InputRange(name, 0, 1, kind="integer", control_points=points, interpolation="constant")

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from math import copysign, exp, log10, sin
 
 from bench.example_systems import Array, compare
-from bench.function_controllers import CROSSROADS, HEATPUMP, LANEKEEPER, PARKING, VOTER, line, numbers
-from bench.function_machines import columns, held, requirements, switch, whole
+from bench.function_controllers import CROSSROADS, HEATPUMP, LANEKEEPER, PARKING, VOTER
+from bench.function_machines import columns, held, line, numbers, requirements, switch, whole
 from falsifier.core.space import ParameterRange
 
 

@@ -1,7 +1,7 @@
 """Options of the command line about language models: which one, how to ask it, and what they make."""
 
 from collections.abc import Sequence
-from math import isfinite
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, get_args
 
 import click
@@ -187,9 +187,7 @@ def _name_and_value(text: str) -> tuple[str, str]:
 
 def _number_or_text(value: str) -> str | float:
     """Return the value of an option for the provider, as a number if it is one."""
-    try:
-        number = int(value) if value.isdigit() else float(value)
-    except ValueError:
-        return value
-    is_text = isinstance(number, float) and not isfinite(number)  # a JSON file has no such numbers
-    return value if is_text else number
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(value)
+    return value

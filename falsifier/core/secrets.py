@@ -119,6 +119,16 @@ def holds_credentials(address: str) -> bool:
     return bool(_CREDENTIALS.match(address) or _KEY_IN_QUERY.search(address))
 
 
+def without_credentials(address: str) -> str:
+    """Return an address as it may be recorded: without a user name, a password and a query with a key.
+
+    >>> without_credentials("http://me:word@host/v1"), without_credentials("http://host/v1?key=k")
+    ('http://host/v1', 'http://host/v1')
+    """
+    plain = re.sub(r"(?<=://)[^\s/?#]+@", "", address, count=1)
+    return re.sub(r"[?#].*", "", plain) if _KEY_IN_QUERY.search(plain) else plain
+
+
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
     """Return a message with secrets replaced: given ones, held ones and whatever looks like a known key."""
     return _IN_TEXT.sub(_REDACTED, redact_held(text, secrets))

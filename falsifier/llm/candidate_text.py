@@ -95,7 +95,9 @@ def _in_numbers(part: Any, info: ValidationInfo) -> Any:
     words: Mapping[str, float] = (info.context or {}).get(name, {}) if isinstance(name, str) else {}
 
     def number(value: Any) -> Any:
-        return words.get(value, value) if isinstance(value, str) else value
+        if not isinstance(value, str) or value in words or not value[:1].isalpha():
+            return words.get(value, value) if isinstance(value, str) else value
+        raise RejectedReplyError(f"{name}: {quoted(value)} is none of {', '.join(map(quoted, words))}")
 
     given = {key: part[key] for key in ("value", "values") if words and key in part}
     found = {k: list(map(number, v)) if isinstance(v, list) else number(v) for k, v in given.items()}

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 from urllib.parse import urlsplit
 
-from falsifier.core.secrets import holds_credentials
+from falsifier.core.secrets import holds_credentials, without_credentials
 from falsifier.errors import ChatSetupError, setting, written
 from falsifier.llm.messages import Mode
 
@@ -170,19 +170,39 @@ def key_variable(llm: str) -> str:
 def stated_address(llm: str, api_base: str | None) -> str | None:
     """Address of an LLM's server as the user states it, here or in the environment; None: the provider's.
 
+    If both name the same server, that of the environment, which may have a password.
+
     Raises:
-        ChatSetupError: if the environment states none; naming the variable.
+        ChatSetupError: if that of the environment cannot be used; naming the variable.
     """
-    # An address of Azure is the provider's own: there is no other.
-    if api_base or provider_of(llm) == "azure":
+    # A model file has a server of its own, and an address of Azure is the provider's own: there is no other.
+    if provider_of(llm) in ("", "azure"):
         return api_base
-    variable = next((name for name in _address_variables(llm) if os.environ.get(name, "").strip()), None)
-    if variable is None:
-        return None
-    address = os.environ[variable].strip()
-    if not _is_address(address):
-        raise ChatSetupError(f"{variable} in the environment: expected {_ADDRESS_FORM}")
-    return address
+    variables = (name for name in _address_variables(llm) if os.environ.get(name, "").strip())
+    variable = next(variables, "")
+    address = os.environ.get(variable, "").strip()
+    if api_base and without_credentials(address) != api_base:
+        return api_base
+    if address and (not _is_address(address) or holds_credentials(without_credentials(address))):
+        raise ChatSetupError(
+            f"{variable} in the environment: expected {_ADDRESS_FORM}, "
+            "with / ? # in a password as %2F %3F %23"
+        )
+    return address or None
+
+
+def check_recorded(llm: str, api_base: str | None) -> None:
+    """Refuse to ask another server than the settings were made with, which name it or the provider's own.
+
+    Raises:
+        ChatSetupError: naming both.
+    """
+    if api_base is None and (now := stated_address(llm, None)):
+        variables = " and ".join(_address_variables(llm))
+        raise ChatSetupError(
+            f"{llm}: the provider's own server was asked so far, and the environment names "
+            f"{without_credentials(now)} now: unset {variables}, or start a new run"
+        )
 
 
 def server_address(llm: str, api_base: str | None) -> str | None:

@@ -10,6 +10,7 @@ from math import isfinite
 from typing import Any
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import shortest
 from falsifier.core.signals import INTERPOLATIONS, Signal
 from falsifier.core.space import Dimension, InputRange, Range, SearchSpace, nearest_value
 from falsifier.core.words import counted
@@ -186,7 +187,7 @@ def _check_possible(value: float, ranged: Range, label: str) -> None:
     nearest = nearest_value(ranged, value) if isfinite(value) else value
     if value != nearest and (ranged.items or value != round(value)):
         what = "none of its numbers" if ranged.items else "no whole number"
-        raise RejectedReplyError(f"{label}: {value:g} is {what}; the nearest is {nearest:g}")
+        raise RejectedReplyError(f"{label}: {shortest(value)} is {what}; the nearest is {shortest(nearest)}")
 
 
 def _range(ranges: Sequence[Range]) -> dict[str, float]:

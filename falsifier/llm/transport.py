@@ -45,7 +45,6 @@ _MOST_MALFORMED = 3
 _WITHIN = "the connection was cut within the reply"
 _CUT = "the server or a proxy before it ended it; its log says why"
 _ADDRESS = "check host, port and http or https in the server's address"
-_OWN_ADDRESS = "state the address of your server"
 _NO_LLM = f"that is no server of a language model; {_ADDRESS}"
 # How httpx and what it stands on tell a failure, by words of it, and what causes and cures it.
 _FAULTS = (
@@ -227,7 +226,8 @@ class _Guarded(httpx.BaseTransport):
         if call.has_ended:  # litellm looks up prices and the like in threads that outlive the call
             raise httpx.TransportError("the call has ended")
         if request.url.host in call.never:
-            call.refuse(f"nothing was sent: it would have gone to {request.url.host}; {_OWN_ADDRESS}")
+            own = f"the address of your server: {setting('api_base', 'URL')}"
+            call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.
@@ -362,10 +362,10 @@ def _with_one_text(choice: Any) -> Any:
     message = choice.get("message") if isinstance(choice, dict) else None
     if not isinstance(message, dict) or not isinstance(parts := message.get("content"), list):
         return choice
-    if not all(isinstance(part, dict) and part.get("type") == "text" for part in parts):
-        return choice
-    text = "".join(str(part.get("text") or "") for part in parts)
-    return {**choice, "message": {**message, "content": text}}
+    # Other parts, such as what was thought before, have no text of their own.
+    texts = [part.get("text") if isinstance(part, dict) else part for part in parts]
+    said = [text for text in texts if isinstance(text, str)]
+    return {**choice, "message": {**message, "content": "".join(said)}} if said else choice
 
 
 def _possible(usage: dict[str, Any]) -> dict[str, Any]:

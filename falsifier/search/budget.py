@@ -86,9 +86,11 @@ class Spent:
         return cls(calls=count, cost=usage.cost, **{name: getattr(usage, name) for name in USED})
 
     def __add__(self, other: "Spent") -> "Spent":
-        counts = [f.name for f in fields(self) if f.name != "cost"]
         cost = None if self.cost is None or other.cost is None else self.cost + other.cost
-        return Spent(**{name: getattr(self, name) + getattr(other, name) for name in counts}, cost=cost)
+        return Spent(**{name: getattr(self, name) + getattr(other, name) for name in _COUNTS}, cost=cost)
+
+
+_COUNTS = tuple(field.name for field in fields(Spent) if field.name != "cost")
 
 
 @dataclass(frozen=True, slots=True)

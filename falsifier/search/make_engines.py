@@ -100,11 +100,13 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
 
     Raises:
         SpecError: if the cost is limited although the price is unknown.
-        ChatError: for an unknown provider or a missing key.
+        ChatError: for an unknown provider, a missing key, or another server than that of the settings.
     """
     from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, connect
+    from falsifier.llm.providers import check_recorded
     from falsifier.llm.usage import Price
 
+    check_recorded(llm.name, llm.api_base)
     chat = connect(
         llm.name,
         effort=llm.effort,

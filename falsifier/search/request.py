@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from falsifier.core.secrets import holds_credentials, is_secret_option
+from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
 from falsifier.llm import Effort
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address, check_option_values, stated_address
@@ -52,7 +52,7 @@ class LLMSettings(Strict):
     @model_validator(mode="before")
     @classmethod
     def _address_of_environment(cls, given: Any, info: ValidationInfo) -> Any:
-        """Take the address from the environment, unless it is read from a record or contains a password.
+        """Take the address from the environment, without its password, unless this is read from a record.
 
         So a run that is continued, or repeated elsewhere, asks the same server.
         """
@@ -60,8 +60,7 @@ class LLMSettings(Strict):
         if not (is_new and isinstance(name := given.get("name"), str) and name):
             return given
         address = stated_address(name, None)
-        is_secret = address is not None and holds_credentials(address)
-        return given if is_secret else {**given, "api_base": address}
+        return {**given, "api_base": address and without_credentials(address)}
 
     @model_validator(mode="after")
     def _without_password(self) -> Self:

@@ -55,10 +55,8 @@ def test_options_that_cannot_be_used_are_wrong_usage(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("value", "passed"), [("4000", 4000), ("0.5", 0.5), ("low", "low"), ("nan", "nan"), ("-inf", "-inf")]
-)
-def test_options_are_passed_as_finite_numbers_or_as_text(value: str, passed: str | float) -> None:
+@pytest.mark.parametrize(("value", "passed"), [("4000", 4000), ("-1", -1), ("0.5", 0.5), ("low", "low")])
+def test_options_are_passed_as_numbers_or_as_text(value: str, passed: str | float) -> None:
     found = llm_settings({"llm": "x/y", "llm_options": [f"name={value}"]})
     assert found is not None and found.options == {"name": passed}
 

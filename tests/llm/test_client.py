@@ -209,7 +209,11 @@ def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> No
 
 
 def test_a_text_in_parts_is_read_as_one() -> None:
-    parts = [{"type": "text", "text": '{"ration'}, {"type": "text", "text": 'ale": ""}'}]
+    parts = [
+        {"type": "thinking", "thinking": []},
+        {"type": "text", "text": '{"ration'},
+        {"type": "text", "text": 'ale": ""}'},
+    ]
     with serving(Step(None, extra={"content": parts}), Step(None, extra={"content": [7]})) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         reply = chat.send(REQUEST)

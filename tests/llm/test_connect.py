@@ -11,7 +11,7 @@ from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.search.make_engines import price_of
+from falsifier.search.make_engines import open_chat, price_of
 from falsifier.search.request import LLMSettings
 from tests.llm.support import Served
 
@@ -182,8 +182,28 @@ def test_an_address_of_the_environment_is_recorded_and_has_its_own_price(
     there = LLMSettings(name="openai/gpt-5-mini")
     assert there.api_base == "http://127.0.0.1:1/v1" and price_of(there) is None
     assert LLMSettings.model_validate_json(own.model_dump_json()) == own  # what was recorded stays
-    monkeypatch.setenv("OPENAI_API_BASE", "http://me:word@127.0.0.1:1/v1")
-    assert LLMSettings(name="openai/gpt-5-mini").api_base is None
+    with pytest.raises(ChatSetupError, match=r"names http://127\.0\.0\.1:1/v1 now: unset OPENAI_BASE_URL"):
+        open_chat(own)
+
+
+def test_an_address_is_recorded_without_its_password_and_used_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    private, plain = "http://me:word@127.0.0.1:1/v1", "http://127.0.0.1:1/v1"
+    monkeypatch.setenv("OPENAI_API_BASE", private)
+    settings = LLMSettings(name="openai/mine")
+    assert settings.api_base == plain
+    chats = [open_chat(settings)]
+    monkeypatch.setenv("OPENAI_API_BASE", "http://me:word@127.0.0.1:2/v1")
+    chats.append(open_chat(settings))
+    monkeypatch.delenv("OPENAI_API_BASE")
+    chats.append(open_chat(settings))
+    assert [chat.api_base for chat in chats] == [private, plain, plain]  # type: ignore[attr-defined]
+    monkeypatch.setenv("OPENAI_API_BASE", "http://me:a/word@127.0.0.1:2/v1")
+    with pytest.raises(ChatSetupError, match=r"OPENAI_API_BASE in the environment: .* as %2F") as caught:
+        LLMSettings(name="openai/mine")
+    assert "word@" not in str(caught.value)
+    assert LLMSettings(name="/some/model.gguf").api_base is None  # it has a server of its own
 
 
 @pytest.mark.parametrize(

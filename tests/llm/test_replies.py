@@ -207,8 +207,8 @@ def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("reply", "problem"),
     [
-        ({"door": ["lock", 0]}, "'lock' is neither a number"),
-        ({"on": ["Lock", 0]}, "'Lock' is neither a number"),
+        ({"door": ["lock", 0]}, "door: 'lock' is none of 'Open', 'Lock'"),
+        ({"on": ["Lock", 0]}, "on: 'Lock' is none of 'false', 'true'"),
         ({"door": [1, 0]}, "input 'door': 1 is none of its numbers; the nearest is 0"),
         ({"on": [0.5, 0]}, "input 'on': 0.5 is no whole number; the nearest is 0"),
         ({"gear": 2.7}, "parameter 'gear': 2.7 is no whole number; the nearest is 3"),
