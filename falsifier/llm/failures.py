@@ -14,7 +14,7 @@ from falsifier.core.secrets import redact
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
-from falsifier.llm.providers import known, server_address
+from falsifier.llm.providers import key_variables, known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
@@ -77,6 +77,12 @@ class _RefusedOptionError(ChatError):
 # (none listed: whatever it says), the class of the error, and cause and cure, with the server's own words as
 # ``{detail}``. The first one that fits counts.
 _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...] = (
+    (
+        (),
+        ("missing credentials",),  # of OpenAI's client, before anything is sent
+        ChatError,
+        "no API key: set {keys} in the environment, to any text if the server needs none",
+    ),
     (
         (403,),
         # A key that is right may belong to an account that is not.
@@ -150,7 +156,7 @@ def classify(
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     filled = {
-        "keys": " or ".join(provider.keys) or "the API key",
+        "keys": " or ".join(key_variables(llm)),
         "longer": _LONGER if api_base is not None or provider.local else "",
         "option": refused,
         "detail": _detail(text, status),

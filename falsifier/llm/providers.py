@@ -164,7 +164,12 @@ def _sendable(variable: str) -> str:
 
 def key_variable(llm: str) -> str:
     """Environment variable that contains a key for this LLM; empty if none does."""
-    return next((name for name in known(llm).keys if os.environ.get(name, "").strip()), "")
+    return next((name for name in key_variables(llm) if os.environ.get(name, "").strip()), "")
+
+
+def key_variables(llm: str) -> tuple[str, ...]:
+    """Environment variables that may contain a key for this LLM, the usual one first."""
+    return known(llm).keys or (f"{provider_of(llm).upper()}_API_KEY",)
 
 
 def stated_address(llm: str, api_base: str | None) -> str | None:
