@@ -8,22 +8,37 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.runs import (
-    Run as Run,
-    columns as columns,
-    frame as frame,
-    load as load,
-    load_run as load_run,
-)
-from falsifier.campaigns.statistics import Statistics as Statistics, group as group, statistics as statistics
+from falsifier.campaigns.runs import Run, columns, frame, load, load_run
+from falsifier.campaigns.statistics import Statistics, group, statistics
 from falsifier.campaigns.tables import (
-    COLUMNS as COLUMNS,
-    Published as Published,
-    Score as Score,
-    Table as Table,
-    ablation_table as ablation_table,
-    llms_table as llms_table,
-    main_table as main_table,
-    read_published as read_published,
+    COLUMNS,
+    Published,
+    Score,
+    Table,
+    ablation_table,
+    llms_table,
+    main_table,
+    read_published,
 )
-from falsifier.record.summary import Summary as Summary
+from falsifier.record.summary import Summary
+
+# The documentation shows what is listed.
+__all__ = [
+    "COLUMNS",
+    "Published",
+    "Run",
+    "Score",
+    "Statistics",
+    "Summary",
+    "Table",
+    "ablation_table",
+    "columns",
+    "frame",
+    "group",
+    "llms_table",
+    "load",
+    "load_run",
+    "main_table",
+    "read_published",
+    "statistics",
+]

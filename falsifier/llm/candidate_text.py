@@ -93,13 +93,22 @@ def _in_numbers(part: Any, info: ValidationInfo) -> Any:
     """A signal or parameter with numbers in place of the words that stand for its values."""
     name = part.get("name") if isinstance(part, dict) else None
     words: Mapping[str, float] = (info.context or {}).get(name, {}) if isinstance(name, str) else {}
+    in_any_case = {word.lower(): number for word, number in words.items()}
+    if len(in_any_case) < len(words):  # the case tells items apart
+        in_any_case = {}
 
     def number(value: Any) -> Any:
-        if not isinstance(value, str) or value in words or not value[:1].isalpha():
-            return words.get(value, value) if isinstance(value, str) else value
-        raise RejectedReplyError(f"{name}: {quoted(value)} is none of {', '.join(map(quoted, words))}")
+        word = str(value).lower() if isinstance(value, bool) else value
+        if not isinstance(word, str) or word in words:
+            return words[word] if isinstance(word, str) else value
+        if isinstance(value, str) and not (words and word[:1].isalpha()):
+            return value  # a number, a run of one, or nothing that can be read
+        if (found := in_any_case.get(word.strip().lower())) is not None:
+            return found
+        expected = f"none of {', '.join(map(quoted, words))}" if words else "no number"
+        raise RejectedReplyError(f"{name}: {quoted(word)} is {expected}")
 
-    given = {key: part[key] for key in ("value", "values") if words and key in part}
+    given = {key: part[key] for key in ("value", "values") if name and key in part}
     found = {k: list(map(number, v)) if isinstance(v, list) else number(v) for k, v in given.items()}
     return {**part, **found} if found else part
 

@@ -111,7 +111,8 @@ def check_address(llm: str, api_base: str | None) -> None:
 def _is_address(text: str) -> bool:
     try:
         parts = urlsplit(text)
-        return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+        is_whole = text.split() == [text]  # a blank is none of its characters
+        return is_whole and parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:
         return False
 

@@ -196,6 +196,7 @@ def discrete(door: Any = 0, on: Any = 0, gear: Any = 1, **reply: Any) -> Any:
     [
         {"door": ["Lock", "Open"], "on": ["true", False], "gear": 3.0},
         {"door": ["2", 0], "on": [True, "false"], "gear": "3"},
+        {"door": ["LOCK", "open"], "on": ["True", "FALSE"], "gear": 3},
         {"signals": {"door": ["Lock", 0], "on": [[0, "true"], [5, 0]]}, "parameters": {"gear": 3}},
     ],
     ids=str,
@@ -207,7 +208,10 @@ def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("reply", "problem"),
     [
-        ({"door": ["lock", 0]}, "door: 'lock' is none of 'Open', 'Lock'"),
+        ({"door": ["look", 0]}, "door: 'look' is none of 'Open', 'Lock'"),
+        ({"door": [True, 0]}, "door: 'true' is none of 'Open', 'Lock'"),
+        ({"gear": True}, "gear: 'true' is no number"),
+        ({"door": [{"value": 1}, 0]}, "signals.0.values"),
         ({"on": ["Lock", 0]}, "on: 'Lock' is none of 'false', 'true'"),
         ({"door": [1, 0]}, "input 'door': 1 is none of its numbers; the nearest is 0"),
         ({"on": [0.5, 0]}, "input 'on': 0.5 is no whole number; the nearest is 0"),
