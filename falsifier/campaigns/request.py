@@ -127,7 +127,7 @@ def method_of(request: RunRequest) -> Method:
     """Method of a run."""
     problem, llm = request.source or ProblemSource(target=""), request.llm or LLMSettings(name="")
     return Method(
-        engine=request.engine or ("" if request.llm else DEFAULT_ENGINE),
+        engine="" if request.llm and request.engine in (None, "llm") else request.engine or DEFAULT_ENGINE,
         llm=llm.name,
         effort=llm.effort or "",
         variant=llm.variant or "",
