@@ -4,6 +4,7 @@ A page asks for one by a comment on a line of its own: ``<!-- keys InputSection 
 ``<!-- variants -->``.
 """
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, get_args
@@ -76,7 +77,11 @@ def _keys(section: str) -> str:
 
 def _meaning(key: str, said: Mapping[str, Any]) -> str:
     inherited = ModelSection.model_fields.get(key)
-    return said.get("description") or (inherited and inherited.description) or ""
+    meaning = said.get("description") or (inherited and inherited.description) or ""
+    default = said.get("default")
+    if default in (None, "", [], {}, False) or "default" in meaning.lower():
+        return meaning
+    return f"{meaning.removesuffix('.')}; default: `{json.dumps(default)}`.".removeprefix("; ")
 
 
 def _type(said: Mapping[str, Any]) -> str:

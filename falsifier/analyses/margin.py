@@ -16,6 +16,7 @@ from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.problem.problem import Problem, check_problem
 from falsifier.problem.requirement import formula_of
 from falsifier.problem.shorthand import requirement_of
+from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.loop import search
@@ -75,7 +76,7 @@ def margin(
     between: tuple[float, float],
     *,
     engine: str = DEFAULT_ENGINE,
-    budget: int = 300,
+    budget: int = DEFAULT_SIMULATIONS,
     seed: int = 0,
     searched: OnSearch | None = None,
 ) -> Margin:

@@ -47,7 +47,9 @@ Told = tuple[list[str], dict[str, Any]]
 @click.option(
     "--map", "mapped", is_flag=True, help="Change all inputs at random; draw which changes still violate."
 )
-@options.budget_option(shown=f"{SHRINK_BUDGET}; with --map {MAP_BUDGET}", note=" of --shrink or --map")
+@options.budget_option(
+    shown=f"{SHRINK_BUDGET}; with --map {MAP_BUDGET}, at least 7", note=" of --shrink or --map"
+)
 @click.option(
     "--at-most",
     type=float,

@@ -48,9 +48,9 @@ context_option = click.option(
     "context",
     multiple=True,
     metavar="FILE|fmu|none|checked:FILE",
-    help="File that the language model may read: a Simulink file (.slx, .mdl), a source (.mo, .c), or a "
-    "text. fmu: also documentation and sources inside the FMU; none: not the files that the spec names; "
-    "checked:FILE: a line of this file looks like a key but is not. Repeatable.",
+    help="File that the language model, or the engine surrogate, may read: a Simulink file (.slx, .mdl), a "
+    "source (.mo, .c), or a text. fmu: also documentation and sources inside the FMU; none: not the files "
+    "that the spec names; checked:FILE: a line of this file looks like a key but is not. Repeatable.",
 )
 
 

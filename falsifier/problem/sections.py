@@ -218,13 +218,13 @@ class CouplingSection(Strict):
     )
     isolation: Isolation = Field(
         "together",
-        description="together: all components run in one process; each: each in a process of its own (Linux, "
-        "co-simulation), for libraries that cannot be loaded into one process.",
+        description="together: all components run in one process; each: each in a process of its own, "
+        "for libraries that cannot be loaded into one process.",
     )
 
 
 class ContextSection(Strict):
-    """What a language model may read about the model; nothing else is sent."""
+    """What a language model, and the engine surrogate, may read about the model; nothing else is sent."""
 
     files: tuple[str, ...] = Field(
         (), description="Simulink files, sources and documents, relative to the spec file."
@@ -279,5 +279,7 @@ class RequirementSection(ModelChanges):
 class ProfileSection(ModelChanges):
     """An alternative parameterization of the spec's problems."""
 
-    description: str = ""
-    requirements: dict[str, ModelChanges] = Field(default_factory=dict)
+    description: str = Field("", description="What it is for.")
+    requirements: dict[str, ModelChanges] = Field(
+        default_factory=dict, description="What it changes for single requirements, by their names."
+    )

@@ -70,7 +70,7 @@ def test_what_says_nothing_is_found_with_its_place(
     tmp_path: Path, formula: str, kind: str, place: str, words: str
 ) -> None:
     text = f"{SPEC}[requirements.R]\nformula = '{formula}'\n"
-    found = lint(spec(tmp_path, text), simulations=0)
+    found = lint(spec(tmp_path, text))
     assert [(f.requirement, f.kind, f.place) for f in found] == ([("R", kind, place)] if kind else [])
     assert all(words in f"{f.text} {f.advice}" for f in found)
 
@@ -94,7 +94,7 @@ control_points = 2
 )
 def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formula: str, told: str) -> None:
     path = spec(tmp_path, f"{HEATER}[requirements.R]\nformula = '{formula}'\n")
-    found = [f for f in lint(path, simulations=0) if f.kind == "margin"]
+    found = [f for f in lint(path) if f.kind == "margin"]
     assert len(found) == bool(told)
     assert all(told in f.text and "temperature and power" in f.advice for f in found)
     said = CliRunner().invoke(check, [path]).output
@@ -117,13 +117,13 @@ def test_requirements_that_repeat_others_are_found(tmp_path: Path) -> None:
         "D": "G[0,20] (rpm <= 4750)",
     }
     text = SPEC + "".join(f"[requirements.{n}]\nformula = '{f}'\n" for n, f in formulas.items())
-    found = lint(spec(tmp_path, text), simulations=0)
+    found = lint(spec(tmp_path, text))
     assert [(f.requirement, f.kind) for f in found] == [
         ("B", "duplicate"), ("C", "implied"), ("C", "implied")
     ]  # fmt: skip
     # With another input range the same formula is another requirement.
     other = text.replace("[requirements.C]", "[requirements.C]\ninputs.throttle.range = [0, 50]")
-    assert [f.requirement for f in lint(spec(tmp_path, other), simulations=0)] == ["B"]
+    assert [f.requirement for f in lint(spec(tmp_path, other))] == ["B"]
 
 
 def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
@@ -151,7 +151,7 @@ def test_what_the_fmu_declares_counts_unless_a_simulation_contradicts_it(tmp_pat
     text = (
         SPEC.replace(AT.as_posix(), fmu.as_posix()) + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
     )
-    (declared,) = lint(spec(tmp_path, text), simulations=0)
+    (declared,) = lint(spec(tmp_path, text))
     assert declared.text.startswith("declared: the FMU's structure has no path")
     assert lint(str(tmp_path / "my.toml"), simulations=2) == []
 
@@ -164,5 +164,5 @@ def test_a_spec_that_cannot_be_read_is_an_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("formula", "kind"), [("G[0,10] (5 < 3)", "never"), ("5 > 3", "always")])
 def test_a_formula_without_signals_is_decided(formula: str, kind: str) -> None:
-    (found,) = lint(ProblemSource(target="AT1", stl=formula), simulations=0)
+    (found,) = lint(ProblemSource(target="AT1", stl=formula))
     assert (found.kind, found.text.endswith(", whatever happens")) == (kind, True)
