@@ -7,8 +7,10 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import InputRange, Range, SearchSpace
+from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
 from falsifier.errors import CandidateError
+
+_ROUNDED = "{} is rounded to the nearest numbers that it can have"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,8 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
             raise _missing(p)
         if p.name not in candidate.parameters:
             notes.append(f"{p.name} is not given: {value:g}, its value if it is not searched")
+        if nearest_value(p, value) != value:
+            notes.append(_ROUNDED.format(p.name))
         parameters[p.name] = value
     return Fitted(
         space.admit(replace(candidate, signals=signals, parameters=parameters)), tuple(dict.fromkeys(notes))
@@ -57,7 +61,9 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
 def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[Signal, list[str]]:
     alone = SearchSpace((r,), (), space.stop_time)
     try:
-        return alone.admit(Candidate({r.name: signal})).signals[r.name], []
+        admitted = alone.admit(Candidate({r.name: signal})).signals[r.name]
+        is_rounded = r.kind != "real" and admitted.values != signal.values
+        return admitted, [_ROUNDED.format(r.name)] if is_rounded else []
     except CandidateError as error:
         reason = str(error)
     for time, value in zip(signal.times, signal.values, strict=True):

@@ -1,6 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
@@ -13,7 +13,7 @@ import numpy as np
 
 from falsifier.core.arguments import finite, instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING, Variable
+from falsifier.core.model import GRID_ROUNDING, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
@@ -70,12 +70,14 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
     A simulation that fails, crashes or hangs is returned as an evaluation with a status and a reason.
 
     Raises:
-        CandidateError: if something that is searched has no value, or one outside its range.
+        CandidateError: if something that is searched has no value, or one outside its range, or one that the
+            variable's type does not have.
         ModelError: if the model cannot be used at all.
     """
     check_problem(problem)
     instance("candidate", candidate, Candidate, "a Candidate")
     problem.space.check(candidate)
+    _check_types(problem.info, candidate.signals, candidate.parameters)
     return evaluate_any(problem, candidate)
 
 
@@ -145,22 +147,22 @@ def simulate(
     signals = {name: _signal(name, given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
     numbers = {name: finite(f"parameters.{name}", _plain(value)) for name, value in values.items()}
+    _check_types(info, signals, numbers)
+    return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
+
+
+def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mapping[str, float]) -> None:
+    """Refuse values that a variable's type does not have: the FMU would get others."""
     for name, signal in signals.items():
         kind, interpolation = info[name].kind, signal.interpolation
         if kind != "real" and interpolation != "constant" and len(signal.values) > 1:
             raise CandidateError(
                 f"{name}: values of type {kind} cannot have {interpolation} interpolation; use 'constant'"
             )
-        _check_type(info[name], signal.values)
-    for name, number in numbers.items():
-        _check_type(info[name], (number,))
-    return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
-
-
-def _check_type(variable: Variable, values: Sequence[float]) -> None:
-    for value in values:
-        if expected := variable.expected(value):
-            raise CandidateError(f"{variable.name} = {value:g}: {expected}")
+    values = [(name, value) for name, signal in signals.items() for value in signal.values]
+    for name, value in (*values, *numbers.items()):
+        if expected := info[name].expected(value):
+            raise CandidateError(f"{name} = {value:g}: {expected}")
 
 
 def _signal(name: str, given: Signal | float) -> Signal:

@@ -14,7 +14,7 @@ from falsifier.errors import SpecError, did_you_mean, in_section, naming, settin
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
-from falsifier.problem.ranges import search_space, string_values
+from falsifier.problem.ranges import check_number, search_space, string_values
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 from falsifier.problem.shorthand import searching, stated_as
@@ -242,6 +242,8 @@ def _recording(
         if name not in info:
             names = [v.name for v in info.variables]
             raise SpecError(f"unknown variable {name!r}; {did_you_mean(name, names)}", key="model.record")
+        if info[name].kind == "string":
+            raise SpecError(f"{name!r} is a string; only numbers can be recorded", key="model.record")
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     return replace(experiment, outputs=tuple(outputs))
@@ -280,6 +282,7 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                     f"{did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
+            check_number(variable)
             if isinstance(section.value, str) and section.value in variable.literals:
                 stated["value"] = variable.literals[section.value]
             elif isinstance(section.value, str) and variable.kind != "string":

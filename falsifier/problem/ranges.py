@@ -62,7 +62,17 @@ def _input(name: str, info: ModelInfo) -> Variable:
     if name in info and info[name].alias_of:
         raise SpecError(f"the {info.noun} has one input with two names: use {info[name].alias_of!r} instead")
     _check_unconnected(name, info)
-    return _variable(name, info.inputs, f"the {info.noun} has no such input")
+    variable = _variable(name, info.inputs, f"the {info.noun} has no such input")
+    check_number(variable)
+    return variable
+
+
+def check_number(variable: Variable) -> None:
+    """Refuse an input that is a string: it keeps its start value."""
+    if variable.causality == "input" and variable.kind == "string":
+        raise SpecError(
+            "this input is a string; it keeps its start value, and can be neither set nor searched"
+        )
 
 
 def _parameter(name: str, info: ModelInfo) -> Variable:

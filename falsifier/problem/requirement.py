@@ -75,6 +75,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             )
         if name not in info:
             raise SpecError(_unknown(name, info))
+        if info[name].kind == "string":
+            raise SpecError(f"{name!r} is a string, and formulas compare numbers")
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]
     numbers = [Flag.of(Name(v.name)) for v in variables if v.kind != "boolean" and v.limits != (0.0, 1.0)]
@@ -118,7 +120,7 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
 
 def _unknown(name: str, info: ModelInfo) -> str:
     """Say that a signal is unknown: the most similar one, and what is usually named."""
-    usual = [v.name for v in (*info.observables, *info.inputs)]
+    usual = [v.name for v in (*info.observables, *info.inputs) if v.kind != "string"]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))
     if listing.startswith("known") and not near.startswith("known"):

@@ -1,5 +1,6 @@
 """The entry points of the search: ``falsify`` starts a run, ``resume`` continues one."""
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -11,6 +12,7 @@ from falsifier.core.arguments import list_of, path_of, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.fitting import fit
+from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
@@ -37,6 +39,8 @@ from falsifier.search.steps import Steps
 
 Falsifiable = Problem | ProblemSource | str | Path
 LLM = LLMSettings | Chat | str
+
+_LOG = logging.getLogger(__name__)
 
 # Minimum time in s between two looks for a stop file.
 _STOP_PERIOD = 0.2
@@ -101,7 +105,7 @@ def falsify(
         directory: where to record the run, so that it can be resumed; None: no record.
         jobs: number of simulations at a time.
         start_from: known candidates, which are simulated first and count in the budget; they are fitted to
-            the search space.
+            the search space, and a warning of the log says what was changed.
         listeners: called with every event.
 
     Returns:
@@ -144,7 +148,7 @@ def falsify(
             seed=seed,
             budget=limits,
             jobs=jobs,
-            start_from=tuple(fit(group[0].space, each).candidate.to_json() for each in known),
+            start_from=tuple(_fitted(group[0].space, each).to_json() for each in known),
         )
         place = None if directory is None else path_of("directory", directory)
         if place is not None and len(groups) > 1:
@@ -362,6 +366,13 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
             f"{given.simulations}: give at least {spent}"
         )
     return given
+
+
+def _fitted(space: SearchSpace, candidate: Candidate) -> Candidate:
+    fitted = fit(space, candidate)
+    for note in fitted.notes:
+        _LOG.warning("start_from: %s", note)
+    return fitted.candidate
 
 
 def _settings(llm: LLM | None) -> LLMSettings | None:

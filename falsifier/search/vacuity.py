@@ -139,8 +139,8 @@ class Vacuity:
         elif all(name in info and info[name].kind == "real" for name in signals):
             text = (
                 f"The robustness was {signed(value)} {self._in_all}, although "
-                f"{listed(sorted(self._moved))} changed: what decides the requirement was never reached by "
-                "what was searched."
+                f"{listed(sorted(self._moved))} changed: the value that decides it was the same each "
+                "time. Search longer, or vary more."
             )
         else:
             return

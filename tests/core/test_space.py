@@ -259,3 +259,13 @@ def test_values_outside_the_range_and_missing_inputs_are_refused() -> None:
         fit(space, Candidate({"u": peak}))
     with pytest.raises(CandidateError, match="'u' is searched and missing"):
         fit(space, Candidate())
+
+
+def test_what_is_rounded_to_fit_is_said() -> None:
+    gear = InputRange(
+        "u", 1.0, 7.0, kind="enumeration", items=(("Off", 1), ("On", 7)), interpolation="constant"
+    )
+    space = SearchSpace((gear,), (ParameterRange("n", 0.0, 5.0, kind="integer"),), 10.0)
+    fitted = fit(space, Candidate({"u": Signal((0.0,), (6.0,), "constant")}, {"n": 2.6}))
+    assert (fitted.candidate.signals["u"].values, fitted.candidate.parameters) == ((7,), {"n": 3})
+    assert [note.split(" is ")[0] for note in fitted.notes if "rounded" in note] == ["u", "n"]

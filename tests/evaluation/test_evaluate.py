@@ -8,6 +8,7 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import FunctionModel, Variable
 from falsifier.core.signals import Signal
+from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
 from falsifier.problem.loading import load_problem
@@ -204,3 +205,24 @@ def test_values_that_a_type_does_not_have_are_refused(variable: Variable, value:
     changed = replace(problem, model=replace(problem.model, info=info))
     with pytest.raises(CandidateError, match=message):
         simulate(changed, {"n": value})
+
+
+@pytest.mark.parametrize(
+    ("signal", "message"),
+    [
+        (Signal((0.0,), (2.0,), "constant"), "u = 2: .*one of 1 = Off, 7 = On"),
+        (Signal((0.0, 1.0), (1.0, 7.0), "linear"), "cannot have linear"),
+    ],
+)
+def test_what_is_searched_has_values_of_its_type(signal: Signal, message: str) -> None:
+    problem = lag_problem()
+    assert isinstance(problem.model, FunctionModel)
+    items = {"Off": 1, "On": 7}
+    others = [v for v in problem.info.variables if v.name != "u"]
+    info = replace(problem.info, variables=(*others, Variable("u", "enumeration", "input", literals=items)))
+    ranged = InputRange("u", 1, 7, kind="enumeration", items=tuple(items.items()), interpolation="constant")
+    changed = replace(
+        problem, model=replace(problem.model, info=info), space=SearchSpace((ranged,), (), 10.0)
+    )
+    with pytest.raises(CandidateError, match=message):
+        evaluate(changed, Candidate({"u": signal}))

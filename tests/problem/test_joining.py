@@ -7,11 +7,14 @@ from zipfile import ZipFile
 import pytest
 
 from falsifier.core.files import bundled
+from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
-from falsifier.problem.joining import Joined, join, join_formula
+from falsifier.problem.joining import Joined, join, join_formula, placed
 from falsifier.problem.problem import Problem
-from falsifier.problem.sections import RequirementSection
+from falsifier.problem.ranges import search_space
+from falsifier.problem.requirement import parse_requirement
+from falsifier.problem.sections import InputSection, ModelChanges, RequirementSection
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import path as fixture
@@ -190,3 +193,16 @@ def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None
         join_formula(fixture("Ball_2"), low, changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
         join_formula(tmp_path / "gone.fmu", low, changes=changes_from_options())
+
+
+def test_strings_are_no_numbers() -> None:
+    variables = Variable("out", "string", "output"), Variable("in", "string", "input"), Variable("x")
+    info = ModelInfo("m", variables=variables)
+    with pytest.raises(SpecError, match="'out' is a string, and formulas compare numbers"):
+        parse_requirement("G (out > 1)", info, Experiment(1.0, 0.1, ()))
+    for stated in ({"value": 1}, {"range": [0, 1]}):
+        section = {"in": InputSection.model_validate(stated)}
+        with pytest.raises(SpecError, match="this input is a string; it keeps its start value"):
+            search_space(section, {}, info, 1.0, ModelChanges())
+    with pytest.raises(SpecError, match="this input is a string"):
+        placed(changes_from_options(values=["in=boom"]), info)

@@ -110,7 +110,10 @@ class Disguise:
     def _range(self, r: Ranged) -> Ranged:
         """What may be chosen, in neutral words."""
         kind: ValueKind = "real" if r.kind == "real" else "integer"
-        return replace(r, name=self.names[r.name], unit="", description="", kind=kind, items=())
+        numbers = sorted(n for _, n in r.items if r.low <= n <= r.high)
+        has_gaps = bool(numbers) and numbers[-1] - numbers[0] >= len(numbers)
+        items = tuple((str(n), n) for n in numbers) if has_gaps else ()
+        return replace(r, name=self.names[r.name], unit="", description="", kind=kind, items=items)
 
     def _kind(self, name: str) -> Kind:
         """Whether a signal is discrete, which is told by its changes; no type is told but that."""

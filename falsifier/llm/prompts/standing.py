@@ -248,7 +248,8 @@ def _control_times(view: View, r: InputRange) -> str:
 
 def _values(ranged: InputRange | ParameterRange) -> str:
     """The values that may be chosen."""
-    items = [f"{n} = {name}" for name, n in ranged.items if ranged.low <= n <= ranged.high]
+    possible = [(name, str(n)) for name, n in ranged.items if ranged.low <= n <= ranged.high]
+    items = [n if name == n else f"{n} = {name}" for name, n in possible]  # neutral names are the numbers
     if items:
         return f"one of the numbers {', '.join(items)}"
     if ranged.kind == "boolean":

@@ -13,10 +13,12 @@ from falsifier.core.space import InputRange, SearchSpace
 from falsifier.engines.briefing import preview
 from falsifier.engines.llm import LLMEngine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.standing import standing
+from falsifier.llm.replies import ReplyForm
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.testing import FREE, START, lag_problem
@@ -124,3 +126,16 @@ def test_a_doubt_is_told() -> None:
     sent = "\n".join(message.content for request in chat.requests for message in request.messages)
     assert "a second simulation gave robustness +0.585. " in sent
     assert "y1: " in sent.replace("- y1;", "y1: ") and "p1" in sent
+
+
+def test_numbers_of_an_enumeration_with_gaps_are_told_and_no_others_taken() -> None:
+    problem = lag_problem(limit=5.0)
+    mode = InputRange("u", 1, 7, kind="enumeration", items=(("Off", 1), ("Eco", 3), ("On", 7)),
+                      interpolation="constant", control_points=2)  # fmt: skip
+    view = Disguise.of(View.of(replace(problem, space=SearchSpace((mode,), (), 10.0)))).view
+    assert "input signal u1; one of the numbers 1, 3, 7; " in standing(view, VARIANTS["MP5"])
+    form = ReplyForm(view.space)
+    (candidate,) = form.read(json.dumps({"signals": {"u1": [3, "7"]}}))
+    assert candidate.signals["u1"].values == (3, 7)
+    with pytest.raises(RejectedReplyError, match="2 is none of its numbers"):
+        form.read(json.dumps({"signals": {"u1": [2, 7]}}))
