@@ -234,7 +234,7 @@ def _bindings(element: Element, system: System, files: Iterable[str]) -> None:
     bindings = Element(f"{_SSD}ParameterBindings")
     if system.frame.values:
         values = SubElement(SubElement(bindings, f"{_SSD}ParameterBinding"), f"{_SSD}ParameterValues")
-        values.append(tables.parameter_set(dict(system.frame.values), system.name))
+        values.append(tables.parameter_set(dict(system.frame.values), system.name, system.info))
     for source in files:
         SubElement(bindings, f"{_SSD}ParameterBinding", {"source": source})
     if len(bindings):

@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
+from falsifier.counterexamples.export.tables import text_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
@@ -149,8 +150,8 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
     """OpenModelica script; None if the model is not an FMU."""
     if not isinstance(problem.model, FmuModel):
         return None
-    texts = {name: value if isinstance(value, str) else repr(value) for name, value in start.items()}
-    overrides = ",".join(f"{name}={text}" for name, text in texts.items())
+    info = problem.info
+    overrides = ",".join(f"{name}={text_of(value, info[name].kind)}" for name, value in start.items())
     flags = ["-csvInput=input.csv"] if any(v.kind != "string" for v in problem.info.inputs) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
-from falsifier.core.model import Model, Variable
+from falsifier.core.model import Kind, Model, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
@@ -112,23 +112,34 @@ def write_json(start: Mapping[str, float | str], path: Path, model: Model) -> Pa
     return path
 
 
-def write_ssv(start: Mapping[str, float | str], name: str, path: Path) -> Path:
+def text_of(value: float | str, kind: Kind) -> str:
+    """Return a start value as scripts and parameter sets have it: a whole number, ``true``, a text."""
+    if isinstance(value, str) or kind == "real":
+        return value if isinstance(value, str) else repr(float(value))
+    return str(bool(value)).lower() if kind == "boolean" else str(round(value))
+
+
+def write_ssv(start: Mapping[str, float | str], name: str, path: Path, info: ModelInfo) -> Path:
     """Write the start values as a parameter set of System Structure and Parameterization 1.0."""
-    root = parameter_set(start, name)
+    root = parameter_set(start, name, info)
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
     return path
 
 
-def parameter_set(start: Mapping[str, float | str], name: str) -> ElementTree.Element:
-    """Return the start values as an XML element of that standard."""
+def parameter_set(start: Mapping[str, float | str], name: str, info: ModelInfo) -> ElementTree.Element:
+    """Return the start values as an XML element of that standard; of enumerations the names of items."""
     ElementTree.register_namespace("ssv", _SSV)
     root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": plain(name)})
     parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
     for key, value in start.items():
         parameter = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", {"name": plain(key)})
-        kind, text = ("String", plain(value)) if isinstance(value, str) else ("Real", repr(float(value)))
-        ElementTree.SubElement(parameter, f"{{{_SSV}}}{kind}", {"value": text})
+        variable = info[key] if key in info else Variable(key, "string" if isinstance(value, str) else "real")
+        items = {number: item for item, number in variable.literals.items()}
+        text = items.get(round(value), "") if items and not isinstance(value, str) else ""
+        kind = "integer" if variable.kind == "enumeration" and not text else variable.kind
+        written = {"value": plain(text or text_of(value, kind))}
+        ElementTree.SubElement(parameter, f"{{{_SSV}}}{kind.capitalize()}", written)
     return root
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.export.components import FOLDER, write_components, write_package
 from falsifier.counterexamples.export.tables import write_ssv
@@ -114,7 +115,7 @@ def test_trajectories_conversions_and_the_stop_time_stay(tmp_path: Path) -> None
     model = built({"plant": "Plant_2", "pi": "Gain_3"}, links)
     csv = tmp_path / "input.csv"
     csv.write_text("time\n")
-    ssv = write_ssv({"plant.T": 3.0, "plant.x": 0.2}, "R", tmp_path / "start_values.ssv")
+    ssv = write_ssv({"plant.T": 3.0, "plant.x": 0.2}, "R", tmp_path / "start_values.ssv", model.info)
     found = again(model, tmp_path, {csv.name: csv, ssv.name: ssv})
     assert found.info.stop_time == 3.0 and found.info.connections == model.info.connections
     given = {"plant.T": 3.0, "plant.x": 0.2}
@@ -141,7 +142,7 @@ def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
     from fmpy.ssp.ssd import read_ssd
 
     links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5)}
-    ssv = write_ssv({"plant.T": 3.0}, "R", tmp_path / "start_values.ssv")
+    ssv = write_ssv({"plant.T": 3.0}, "R", tmp_path / "start_values.ssv", ModelInfo("m"))
     file = write_package(
         built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
     )

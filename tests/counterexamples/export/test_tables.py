@@ -1,11 +1,13 @@
 import csv
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from scipy.io import loadmat
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.tables import (
@@ -21,10 +23,28 @@ from falsifier.testing import lag_problem
 
 def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:
     fmpy_ssd = pytest.importorskip("fmpy.ssp.ssd")
-    path = write_ssv({"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}, "A & B", tmp_path / "s.ssv")
+    path = write_ssv({"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}, "A & B", tmp_path / "s.ssv", ModelInfo("m"))
     read = fmpy_ssd.read_ssv(str(path))  # validates against the schema of SSP 1.0
     assert read.name == "A & B"
     assert {p.name: float(p.value) for p in read.parameters} == {"x.y[1]": 0.1 + 0.2, "phi<0": -1.5}
+
+
+def test_parameter_sets_have_the_types_of_the_model(tmp_path: Path) -> None:
+    kinds: dict[str, Kind] = {"b": "boolean", "n": "integer", "m": "enumeration", "x": "real", "s": "string"}
+    literals = {"Off": 1, "Eco mode": 7}
+    info = ModelInfo(
+        "m", variables=tuple(Variable(n, k, literals=literals if n == "m" else {}) for n, k in kinds.items())
+    )
+    start: dict[str, float | str] = {"b": 1.0, "n": 3.0, "m": 7.0, "x": 2.0, "s": "a"}
+    root = ElementTree.parse(write_ssv(start, "m", tmp_path / "s.ssv", info)).getroot()
+    found = {p.get("name"): (p[0].tag.rpartition("}")[2], p[0].get("value")) for p in root[0]}
+    assert found == {
+        "b": ("Boolean", "true"),
+        "n": ("Integer", "3"),
+        "m": ("Enumeration", "Eco mode"),
+        "x": ("Real", "2.0"),
+        "s": ("String", "a"),
+    }
 
 
 def test_the_mat_file_holds_a_matrix_of_inputs_and_the_models_own_names(tmp_path: Path) -> None:
