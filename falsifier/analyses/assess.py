@@ -17,8 +17,7 @@ from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem, check_limits, check_problem
-from falsifier.search.findings import Failure, Finding
-from falsifier.search.findings import failures as by_cause
+from falsifier.search.findings import Failure, Finding, failures as by_cause
 from falsifier.search.vacuity import Vacuity
 from falsifier.stl.margins import margin_words, signed
 

@@ -26,8 +26,7 @@ from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.record.manifest import Manifest
 from falsifier.record.records import EvaluatedRecord
-from falsifier.search.findings import Failure
-from falsifier.search.findings import failures as by_cause
+from falsifier.search.findings import Failure, failures as by_cause
 from falsifier.stl import parse
 
 # Parts of a range: enough to see gaps, few enough that a hundred simulations can try most pairs of them.

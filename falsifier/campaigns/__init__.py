@@ -9,25 +9,19 @@ A campaign is a directory with one run directory per run. These run directories 
 finished, so a campaign that was killed can be resumed from them.
 """
 
-from falsifier.campaigns.archcomp import suite
-from falsifier.campaigns.directory import is_worked_on
-from falsifier.campaigns.progress import Follower, Progress
-from falsifier.campaigns.request import CampaignRequest, Method, cross, method_of, run_name
-from falsifier.campaigns.runner import CampaignEnd, resume_campaign, run_campaign
-from falsifier.campaigns.runs import RunProgress
-
-__all__ = [
-    "CampaignEnd",
-    "CampaignRequest",
-    "Follower",
-    "Method",
-    "Progress",
-    "RunProgress",
-    "cross",
-    "is_worked_on",
-    "method_of",
-    "resume_campaign",
-    "run_campaign",
-    "run_name",
-    "suite",
-]
+from falsifier.campaigns.archcomp import suite as suite
+from falsifier.campaigns.directory import is_worked_on as is_worked_on
+from falsifier.campaigns.progress import Follower as Follower, Progress as Progress
+from falsifier.campaigns.request import (
+    CampaignRequest as CampaignRequest,
+    Method as Method,
+    cross as cross,
+    method_of as method_of,
+    run_name as run_name,
+)
+from falsifier.campaigns.runner import (
+    CampaignEnd as CampaignEnd,
+    resume_campaign as resume_campaign,
+    run_campaign as run_campaign,
+)
+from falsifier.campaigns.runs import RunProgress as RunProgress

@@ -16,8 +16,7 @@ from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunFollower, Summary
-from falsifier.search.result import Columns, evaluation_columns
-from falsifier.search.result import frame as as_frame
+from falsifier.search.result import Columns, evaluation_columns, frame as as_frame
 
 if TYPE_CHECKING:
     import pandas

@@ -19,9 +19,8 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
+from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
-from falsifier.record.manifest import MANIFEST, check_in_sight, check_no_folder, check_unchanged, file_hashes
-from falsifier.record.manifest import read as read_manifest
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -94,8 +93,7 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT
-    from falsifier.analyses.margin import margin as find_margin
+    from falsifier.analyses.margin import LIMIT, margin as find_margin
 
     low, high = _between(between)
     if stl is None or LIMIT not in stl:
@@ -134,10 +132,10 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, li
         except SpecError:
             if not place.is_dir():
                 raise
-            check_no_folder(place)
+            manifest.check_no_folder(place)
             raise JournalError(
-                f"{place}: not a run directory: it contains no {MANIFEST}; expected a run, a spec, an "
-                "FMU or a bundled name"
+                f"{place}: not a run directory: it contains no {manifest.MANIFEST}; expected a run, a spec, "
+                "an FMU or a bundled name"
             ) from None
     context = click.get_current_context()
     changed = [
@@ -150,14 +148,14 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, li
         raise click.UsageError(
             f"{place}: the search space of a run cannot be changed; drop {', '.join(changed)}"
         )
-    described = read_manifest(place).of(requirement)
+    described = manifest.read(place).of(requirement)
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
-    check_in_sight(place, [source])
+    manifest.check_in_sight(place, [source])
     problem = load_source(source)
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
-    check_unchanged(place, described.hashes, file_hashes(problem), remedy)
+    manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
     evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
     return problem, list(evaluations.values())
 

@@ -14,8 +14,15 @@ from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, cross, run_campaign, suite
-from falsifier.campaigns import resume_campaign as _resume
+from falsifier.campaigns import (
+    CampaignEnd,
+    CampaignRequest,
+    Follower,
+    cross,
+    resume_campaign as _resume,
+    run_campaign,
+    suite,
+)
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import check_new, is_campaign

@@ -17,12 +17,9 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.regression import Database
-from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET
-from falsifier.counterexamples.robustness_map import robustness_map
-from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET
-from falsifier.counterexamples.shrink import shrink
-from falsifier.counterexamples.store import EXPLANATION, beside, save
-from falsifier.counterexamples.store import replay as replay_stored
+from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET, robustness_map
+from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET, shrink
+from falsifier.counterexamples.store import EXPLANATION, beside, replay as replay_stored, save
 from falsifier.evaluation.confirm import confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.joining import rights_notes

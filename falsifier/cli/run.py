@@ -136,8 +136,7 @@ def resume(
     """
     from falsifier.campaigns.directory import is_campaign
     from falsifier.cli.campaign import resume_campaign
-    from falsifier.record.run import resume as resume_run
-    from falsifier.record.run import runs_in
+    from falsifier.record.run import resume as resume_run, runs_in
     from falsifier.views.progress import make_display
 
     if is_campaign(directory):

@@ -17,8 +17,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
-from falsifier.evaluation.evaluate import Evaluation
-from falsifier.evaluation.evaluate import simulate as simulate_inputs
+from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source

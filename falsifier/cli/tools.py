@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from falsifier.campaigns.archcomp import PROTOCOL_SIMULATIONS, Revalidated, read_rows
-from falsifier.campaigns.archcomp import validate as check_rows
+from falsifier.campaigns.archcomp import PROTOCOL_SIMULATIONS, Revalidated, read_rows, validate as check_rows
 from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
 from falsifier.cli.command import command
 from falsifier.cli.files import check_out, in_existing_folder
@@ -21,8 +20,7 @@ from falsifier.counterexamples.store import load_counterexample
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
-from falsifier.record.journal import holds_run, simulated
-from falsifier.record.journal import repair as repair_run
+from falsifier.record.journal import holds_run, repair as repair_run, simulated
 from falsifier.record.manifest import Manifest
 from falsifier.record.records import RECORDS
 from falsifier.stl.margins import signed

@@ -20,8 +20,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.engines.layout import Array
 from falsifier.engines.llm import LLMEngine, reason_in_remark
-from falsifier.engines.surrogate import Settings as SurrogateSettings
-from falsifier.engines.surrogate import Surrogate
+from falsifier.engines.surrogate import Settings as SurrogateSettings, Surrogate
 from falsifier.engines.surrogate.planning import is_seen
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation

@@ -14,8 +14,6 @@ from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.description.xml import read_xml
 from falsifier.fmu.model import FmuModel
 
-__all__ = ["compile_sources"]
-
 # The standard's name, and that of drafts of FMI 3, which some exporters still write.
 _BUILD_DESCRIPTIONS = ("buildDescription.xml", "build_description.xml")
 _INCLUDED = re.compile(r'^\s*#\s*include\s*["<]([^">\n\0]+)[">]', re.MULTILINE)

@@ -5,11 +5,9 @@
 (('speed',), 20.0)
 """
 
-from falsifier.stl.breach import Breach
-from falsifier.stl.diagnosis import Diagnosis
-from falsifier.stl.formula import Formula
-from falsifier.stl.monitor import Monitor, Verdict
-from falsifier.stl.parser import parse
-from falsifier.stl.words import in_words
-
-__all__ = ["Breach", "Diagnosis", "Formula", "Monitor", "Verdict", "in_words", "parse"]
+from falsifier.stl.breach import Breach as Breach
+from falsifier.stl.diagnosis import Diagnosis as Diagnosis
+from falsifier.stl.formula import Formula as Formula
+from falsifier.stl.monitor import Monitor as Monitor, Verdict as Verdict
+from falsifier.stl.parser import parse as parse
+from falsifier.stl.words import in_words as in_words

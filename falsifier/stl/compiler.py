@@ -12,9 +12,7 @@ import numpy as np
 
 from falsifier.core.literals import shortest
 from falsifier.errors import FormulaError
-from falsifier.stl import expression
-from falsifier.stl import formula as stl
-from falsifier.stl import program as op
+from falsifier.stl import expression, formula as stl, program as op
 from falsifier.stl.margins import on_limit
 from falsifier.stl.program import CompiledPart, Location, Program
 

@@ -26,8 +26,7 @@ from decimal import Decimal
 from typing import NoReturn, cast
 
 from falsifier.errors import FormulaError, did_you_mean
-from falsifier.stl import expression, lexer
-from falsifier.stl import formula as stl
+from falsifier.stl import expression, formula as stl, lexer
 
 # Parsing, compiling and printing recurse; this keeps them below Python's recursion limit.
 MAX_DEPTH = 100

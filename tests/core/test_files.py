@@ -5,8 +5,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from falsifier.core import posix_files
 from falsifier.core.files import check_seal, checksum, private_folder, remove_partial, seal, write_whole

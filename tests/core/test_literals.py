@@ -4,8 +4,7 @@ import ast
 import re
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from falsifier.core import literals
 from falsifier.core.candidate import Candidate

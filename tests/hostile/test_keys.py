@@ -6,8 +6,7 @@ from base64 import b64encode
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from falsifier.core.secrets import holds_credentials, redact, redact_held
 from falsifier.errors import ChatSetupError

@@ -11,8 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.archcomp import export as arch_comp

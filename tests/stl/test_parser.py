@@ -2,12 +2,10 @@ import pickle
 import random
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from falsifier.errors import FormulaError
-from falsifier.stl import formula as stl
-from falsifier.stl import parse
+from falsifier.stl import formula as stl, parse
 from falsifier.stl.expression import Arithmetic, Name, Number
 from falsifier.stl.lexer import name_text
 from tests.stl.randoms import random_formula

@@ -26,8 +26,6 @@ from falsifier.fmu import FmuModel, System
 from falsifier.problem.problem import Problem
 from falsifier.record.files import can_be_a_folder
 
-__all__ = ["export_counterexample"]
-
 
 def export_counterexample(
     problem: Problem, stored: StoredCounterexample, evaluation: Evaluation, directory: Path

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.layout import Array, TimeGrid, learnable
-from falsifier.stl import Monitor, Verdict
-from falsifier.stl import formula as stl
+from falsifier.stl import Monitor, Verdict, formula as stl
 from falsifier.stl.expression import Name, Number
 
 Margins = list[Array]

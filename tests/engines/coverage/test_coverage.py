@@ -2,8 +2,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.core.trajectory import Trajectory

@@ -1,7 +1,6 @@
 """Inputs and numbers as prompts write them."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
