@@ -18,6 +18,11 @@ Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
 
+# What descriptions of FMUs and of systems, and fmpy, call the interfaces.
+INTERFACE_TAGS: Mapping[Interface, str] = {
+    "co-simulation": "CoSimulation",
+    "model-exchange": "ModelExchange",
+}
 # Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
     "Boolean": (0, 1),

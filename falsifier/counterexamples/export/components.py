@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import file_name
 from falsifier.core.literals import one_line
-from falsifier.core.model import Variable
+from falsifier.core.model import INTERFACE_TAGS, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.tables import InputTable
@@ -45,7 +45,6 @@ _TYPES: Mapping[str, str] = {
     "string": "String",
 }
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
-_IMPLEMENTATIONS = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 # Folder of an export in which each component has one.
 FOLDER = "components"
 # Share by which the outputs may leave the range that they had in the system.
@@ -199,7 +198,7 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
             "name": member.name,
             "source": sources[member.name],
             "type": _FMU_TYPE,
-            "implementation": _IMPLEMENTATIONS[member.interface],
+            "implementation": INTERFACE_TAGS[member.interface],
         }
         component = SubElement(elements, f"{_SSD}Component", attributes)
         info = member.description.info

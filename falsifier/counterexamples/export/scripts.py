@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
+from falsifier.core.model import INTERFACE_TAGS
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
@@ -13,7 +14,6 @@ from falsifier.stl.margins import signed
 
 # Rows that replay.py prints before and after the one at which what broke was farthest off.
 _SHOWN_ROWS = 3
-_FMPY_TYPES = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 
 _REPLAY_ABOUT = """\
 Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows around what broke.
@@ -121,7 +121,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
         fmu=repr(model.path.name),
-        fmi_type=_FMPY_TYPES[model.interface],
+        fmi_type=INTERFACE_TAGS[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
         tolerance=experiment.tolerance,

@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from falsifier.core.arguments import path_of
-from falsifier.core.model import Interface, ModelInfo, Variable
+from falsifier.core.model import INTERFACE_TAGS, Interface, ModelInfo, Variable
 from falsifier.errors import ModelError, ModelFileError, did_you_mean
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.libraries import Libraries, can_run_windows, find_libraries, platforms
@@ -28,10 +28,6 @@ from falsifier.fmu.description.variables import (
 )
 from falsifier.fmu.description.xml import read_xml
 
-_INTERFACE_TAGS: Mapping[str, Interface] = {
-    "CoSimulation": "co-simulation",
-    "ModelExchange": "model-exchange",
-}
 # FMI 2 and FMI 3 write it differently.
 _SAVING = ("canGetAndSetFMUstate", "canGetAndSetFMUState")
 _NO_LIBRARIES = Libraries({}, {}, {}, ())
@@ -184,7 +180,7 @@ def _number_of_states(root: Element, major: int) -> int:
 def _interfaces(root: Element, major: int) -> dict[Interface, Mapping[str, str]]:
     """Return the attributes of the interfaces that an FMU offers."""
     if major > 1:
-        found = {interface: root.find(tag) for tag, interface in _INTERFACE_TAGS.items()}
+        found = {interface: root.find(tag) for interface, tag in INTERFACE_TAGS.items()}
         return {interface: dict(e.attrib) for interface, e in found.items() if e is not None}
     own = {"modelIdentifier": root.attrib["modelIdentifier"]}
     implementation = root.find("Implementation")

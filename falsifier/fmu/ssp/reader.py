@@ -10,7 +10,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from falsifier.core.arguments import path_of
-from falsifier.core.model import Interface, Variable
+from falsifier.core.model import INTERFACE_TAGS, Interface, Variable
 from falsifier.errors import ModelError, SpecError, did_you_mean
 from falsifier.fmu.description.model_description import Description, describe
 from falsifier.fmu.description.structure import Unit, conversion, read_structure, read_units
@@ -33,11 +33,7 @@ from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.system import System
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
-_INTERFACES: Mapping[str, Interface | None] = {
-    "any": None,
-    "CoSimulation": "co-simulation",
-    "ModelExchange": "model-exchange",
-}
+_INTERFACES: Mapping[str, Interface | None] = {"any": None, **{t: i for i, t in INTERFACE_TAGS.items()}}
 _NESTED_TYPES = ("application/x-ssp-definition", "application/x-ssp-package")
 _SOURCES, _SINKS = ("output", "calculatedParameter"), ("input", "parameter")
 _KINDS = ("input", "output", "parameter", "calculatedParameter")
