@@ -131,8 +131,6 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
     Interpolated signals have control points at both ends of [0, stop_time]. Constant pieces are equally long,
     so their last control point is one piece before the end. A single control point is at 0.
     """
-    if count < 1:
-        raise ValueError(f"a signal needs at least one control point, got {count}")
     pieces = count if interpolation == "constant" else max(count - 1, 1)
     return tuple(stop_time * i / pieces for i in range(count))
 

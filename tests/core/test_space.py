@@ -219,6 +219,11 @@ def test_bad_control_points_are_refused(
         Signal(times, values)
 
 
+def test_an_even_signal_without_values_is_refused_as_any_other() -> None:
+    with pytest.raises(SpecError, match="one or more"):
+        Signal.evenly([], stop_time=10)
+
+
 RAMP = Signal(tuple(i / 10 for i in range(101)), tuple(i / 100 for i in range(101)), "linear")
 
 
