@@ -51,6 +51,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}
+        for name, section in source.changes.parameters.items():  # items of enumerations
+            number = problem.info[name].number_of(section.value) if isinstance(section.value, str) else None
+            given |= {} if number is None else {name: number}
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}
@@ -59,8 +62,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         for name, (low, high) in tried.items():
             if excess := problem.info[name].excess(low, high):
                 warn(f"{name}: {f'{low:g}' if low == high else f'[{low:g}, {high:g}]'} {excess}")
-        if signals and (kept := [n for n in problem.space.names if n in inputs and n not in signals]):
-            warn(f"no inputs given for {', '.join(kept)}: kept at the model's start value")
+        known = {*signals, *stored.parameters, *given}
+        if signals and (kept := [n for n in problem.space.names if n not in known]):
+            warn(f"no values given for {', '.join(kept)}: kept at the model's start value")
         if inputs and not signals:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "

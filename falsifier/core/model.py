@@ -114,6 +114,12 @@ class Variable:
         """Numbers and names of an enumeration's items; empty for other types."""
         return ", ".join(f"{number} = {name}" for name, number in self.literals.items())
 
+    def number_of(self, word: str) -> float | None:
+        """Return the number that the name of an item, or ``true`` or ``false`` of a Boolean, stands for."""
+        if self.kind == "boolean":
+            return {"false": 0.0, "true": 1.0}.get(word.lower())
+        return self.literals.get(word)
+
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""
         numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))

@@ -13,7 +13,7 @@ import numpy as np
 
 from falsifier.core.arguments import finite, instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING, ModelInfo
+from falsifier.core.model import GRID_ROUNDING, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
@@ -103,16 +103,17 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
 
 def simulate(
     problem: Problem,
-    inputs: Mapping[str, Signal | float] | Candidate | str | PathLike[str] | None = None,
-    parameters: Mapping[str, float] | None = None,
+    inputs: Mapping[str, Signal | float | str] | Candidate | str | PathLike[str] | None = None,
+    parameters: Mapping[str, float | str] | None = None,
 ) -> Evaluation:
     """Simulate given inputs and evaluate the requirement; the ranges of the search space do not apply.
 
     Args:
         problem: the model to simulate and the requirement to evaluate.
-        inputs: a signal, or a number for a constant one, by input name; or a CSV file of inputs; or a
-            candidate with its parameters. Other inputs keep the problem's fixed or the model's start values.
-        parameters: values by name; other parameters keep the problem's or the model's values.
+        inputs: a signal, or for a constant one a number or the name of an enumeration's item, by input name;
+            or a CSV file of inputs; or a candidate with its parameters. Other inputs keep the problem's fixed
+            or the model's start values.
+        parameters: values, or names of items, by name; others keep the problem's or the model's values.
 
     Raises:
         CandidateError: if a name is not an input, or not a parameter or start value that can be set, or a
@@ -144,9 +145,9 @@ def simulate(
             others = [other for other in (*known, *settable) if other != name]
             near = did_you_mean(str(name), others)
             raise CandidateError(f"the model has no parameter {name!r} to set; {near}")
-    signals = {name: _signal(name, given) for name, given in driven.items()}
+    signals = {name: _signal(info[name], given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
-    numbers = {name: finite(f"parameters.{name}", _plain(value)) for name, value in values.items()}
+    numbers = {n: finite(f"parameters.{n}", _plain(info[n], value)) for n, value in values.items()}
     _check_types(info, signals, numbers)
     return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
 
@@ -165,16 +166,18 @@ def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mappin
             raise CandidateError(f"{name} = {value:g}: {expected}")
 
 
-def _signal(name: str, given: Signal | float) -> Signal:
+def _signal(variable: Variable, given: Signal | float | str) -> Signal:
     if isinstance(given, Signal):
         return given
-    number = finite(f"inputs.{name}", _plain(given), "a finite number or a Signal(times, values)")
+    number = _plain(variable, given)
+    number = finite(f"inputs.{variable.name}", number, "a finite number or a Signal(times, values)")
     return Signal((0.0,), (number,))
 
 
-def _plain(given: object) -> object:
-    """Return the number of a truth value, as Boolean variables are set."""
-    return int(given) if isinstance(given, bool) else given
+def _plain(variable: Variable, given: object) -> object:
+    """Return the number of a truth value, or of an enumeration's item, if it is one."""
+    number = variable.number_of(given) if isinstance(given, str) else None
+    return int(given) if isinstance(given, bool) else given if number is None else number
 
 
 def check_evaluation(problem: Problem, evaluation: Evaluation) -> None:

@@ -283,12 +283,6 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
             check_number(variable)
-            if isinstance(section.value, str) and section.value in variable.literals:
-                stated["value"] = variable.literals[section.value]
-            elif isinstance(section.value, str) and variable.kind != "string":
-                items = f" or one of {', '.join(variable.literals)}" if variable.literals else ""
-                got, to_search = f"got {section.value!r}", f"to search a range: {searching(kind, name)}"
-                raise SpecError(f"expected a number{items}, {got}; {to_search}")
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:

@@ -148,14 +148,17 @@ def _parameter_range(variable: Variable, limits: tuple[float, float]) -> Paramet
 
 
 def _fixed(variable: Variable, value: float | str) -> float:
-    if isinstance(value, str):
+    number = variable.number_of(value) if isinstance(value, str) else value
+    if number is None:
+        words = ["true", "false"] if variable.kind == "boolean" else variable.literals
+        others = f" or one of {', '.join(words)}" if words else ""
+        kind = "inputs" if variable.causality == "input" else "parameters"
         raise SpecError(
-            f"{value!r} is not a number, and {variable.name!r} is not a string but has the type "
-            f"{variable.kind}; write a number, or range = [low, high] to search",
+            f"expected a number{others}, got {value!r}; to search a range: {searching(kind, variable.name)}",
             key="value",
         )
-    _check(variable, value)
-    return value
+    _check(variable, number)
+    return number
 
 
 def _check(variable: Variable, low: float, high: float | None = None) -> None:

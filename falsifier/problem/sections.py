@@ -104,7 +104,9 @@ class InputSection(Strict):
     free: FreeSection | None = Field(
         None, description="Limits within which engines may choose the control points."
     )
-    value: Number | None = Field(None, description="Keep this input at a constant value.")
+    value: Number | str | None = Field(
+        None, description="Keep this input constant: a number, or the name of an enumeration's item."
+    )
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "InputSection":
@@ -124,7 +126,9 @@ class ParameterSection(Strict):
 
     range: Range | None = Field(None, description="[low, high] to search within.")
     value: Number | str | None = Field(
-        None, description="Fixed value; text for a string. A file is named relative to the spec file."
+        None,
+        description="Fixed value: a number, the name of an enumeration's item, or the text of a string. A "
+        "file is named relative to the spec file.",
     )
 
     @model_validator(mode="after")

@@ -24,18 +24,19 @@ _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
-# A constant value; (low, high) to search, with the spec's control points or else a free parameterization;
+# A constant value or the name of an item; (low, high) to search, with the spec's control points or else free;
 # (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
 # FMU's min and max; or a complete section of a spec.
 InputChoice = (
     float
+    | str
     | tuple[float, float]
     | tuple[float, float, int]
     | tuple[float, float, int, str]
     | InputSection
     | None
 )
-# A value, text for a string, a range to search, or a complete section of a spec.
+# A value, the name of an item or text for a string, a range to search, or a complete section of a spec.
 ParameterChoice = float | str | tuple[float, float] | ParameterSection
 
 Choice = TypeVar("Choice")
@@ -158,7 +159,7 @@ def _input_section(name: str, choice: InputChoice) -> object:
             return {}
         case InputSection():
             return choice
-        case int() | float():
+        case int() | float() | str():
             return {"value": choice}
         case (low, high, *more) if len(more) <= 2:
             return {"range": (low, high)} | dict(zip(("control_points", "interpolation"), more, strict=False))

@@ -213,9 +213,9 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
 
 
 def _can_continue(result: Result) -> bool:
-    if not result.evaluations or result.spent.has_mostly_failed:
-        return False
-    return result.status in ("interrupted", "failed")
+    if result.status == "failed":
+        return bool(result.evaluations) and not result.spent.has_mostly_failed
+    return result.status == "interrupted"
 
 
 def _continue_line(directory: Path) -> str:

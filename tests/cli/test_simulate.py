@@ -60,7 +60,7 @@ def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
 def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,throttle\n0,50\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
-    assert "no inputs given for brake: kept at the model's start value" in done.err
+    assert "no values given for brake: kept at the model's start value" in done.err
 
 
 def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:

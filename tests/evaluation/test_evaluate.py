@@ -182,7 +182,7 @@ def test_files_candidates_and_arrays_are_inputs(tmp_path: Path) -> None:
 
 def test_numbers_as_text_are_no_parameters() -> None:
     with pytest.raises(SpecError, match=r"parameters.x0: expected a finite number, got '1'"):
-        simulate(lag_problem(parameters=[START]), {}, {"x0": "1"})  # type: ignore[dict-item]
+        simulate(lag_problem(parameters=[START]), {}, {"x0": "1"})
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from falsifier.problem.joining import Joined, join, join_formula, placed
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import search_space
 from falsifier.problem.requirement import parse_requirement
-from falsifier.problem.sections import InputSection, ModelChanges, RequirementSection
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import path as fixture
@@ -193,6 +193,22 @@ def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None
         join_formula(fixture("Ball_2"), low, changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
         join_formula(tmp_path / "gone.fmu", low, changes=changes_from_options())
+
+
+def test_items_and_truth_values_are_given_by_their_names() -> None:
+    items = {"Off": 1, "On": 7}
+    kinds: list[Variable] = [
+        Variable("mode", "enumeration", "input", literals=items),
+        Variable("flag", "boolean", "parameter", settable=True),
+    ]
+    info = ModelInfo("m", variables=tuple(kinds))
+    inputs = {"mode": InputSection(value="On")}
+    parameters = {"flag": ParameterSection(value="True")}
+    assert search_space(inputs, parameters, info, 1.0, ModelChanges())[1] == {"mode": 7, "flag": 1}
+    for wrong, message in (("on", "one of Off, On, got 'on'"), ("7:8", "got '7:8'; to search a range")):
+        section = {"mode": InputSection(value=wrong)}
+        with pytest.raises(SpecError, match=message):
+            search_space(section, {}, info, 1.0, ModelChanges())
 
 
 def test_strings_are_no_numbers() -> None:

@@ -62,7 +62,7 @@ def test_a_section_says_all_that_a_spec_can() -> None:
     assert changes_from(inputs={"u": section}, parameters={}).inputs["u"] == section
 
 
-@pytest.mark.parametrize("value", ["1", (1,), (0, 1, 2, "linear", 4)])
+@pytest.mark.parametrize("value", [(1,), (0, 1, 2, "linear", 4)])
 def test_values_that_mean_nothing_are_named(value: object) -> None:
     with pytest.raises(SpecError, match=r"inputs\.u"):
         changes_from(inputs={"u": value}, parameters={})  # type: ignore[dict-item]
@@ -92,7 +92,6 @@ def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_comm
         ({"inputs": {1: (0, 1)}}, "^inputs: names must be text, got the key 1"),
         ({"parameters": {1: 2}}, "^parameters: names must be text, got the key 1"),
         ({"inputs": {"u": {"range": (0, 1)}}}, r"an InputSection or None, got \{'range': \(0, 1\)\}"),
-        ({"inputs": {"u": "0:1"}}, "inputs.u: .*got '0:1'"),
         ({"inputs": {"u": {0, 100}}}, "inputs.u: .*got "),
         ({"parameters": {"p": None}}, "parameters.p: .*a ParameterSection, got None"),
         ({"inputs": {"u": ("0", "100")}}, "inputs.u.range, entry 1: expected a number, got '0'"),
