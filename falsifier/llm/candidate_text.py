@@ -206,20 +206,30 @@ def written_candidate(
     try:
         return WrittenCandidate.model_validate(found, context=words)
     except ValidationError as error:
-        raise RejectedReplyError(defect(error)) from None
+        raise RejectedReplyError(defect(error, found)) from None
 
 
-def defect(error: ValidationError) -> str:
+def defect(error: ValidationError, found: Mapping[str, Any] = MappingProxyType({})) -> str:
     """What is wrong first, with the keys that are not known there: one of them may be what is missing."""
     errors = error.errors(include_url=False, include_context=False, include_input=False)
     first, place = errors[0], errors[0]["loc"][:-1]
-    text = f"{'.'.join(str(part) for part in first['loc'])}: {first['msg']}"
+    text = f"{'.'.join(str(part) for part in first['loc'])}{_whose(found, *place[:2])}: {first['msg']}"
     unknown = [
         quoted(str(e["loc"][-1])) for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == place
     ]
     if unknown and first["type"] == "missing":
         text += f"; unknown there: {', '.join(unknown[:_SHOWN_KEYS])}"
     return text
+
+
+def _whose(found: Mapping[str, Any], part: int | str = "", index: int | str = 0) -> str:
+    """The name in an entry of the signals or parameters."""
+    listed = found.get(str(part))
+    if not isinstance(listed, dict | list) or not isinstance(index, int):
+        return ""
+    entry = list(listed)[index]
+    name = entry.get("name") if isinstance(entry, dict) else entry
+    return f" (of {quoted(name)})" if isinstance(name, str) else ""
 
 
 def _other_keys(text: str) -> str:
