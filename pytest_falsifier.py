@@ -101,6 +101,13 @@ def pytest_configure(config: pytest.Config) -> None:
     )
     for name in _OPTIONS:
         _setting(config, name)
+    if engine := _setting(config, "engine"):
+        from falsifier.errors import SpecError
+
+        try:
+            _check_engine(engine)
+        except SpecError as error:
+            raise pytest.UsageError(f"falsifier_{error}") from None
 
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
@@ -300,6 +307,8 @@ def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: 
     target = "a Problem, or the name of one as for falsifier run, such as 'specs/car.toml:no_speeding'"
     instance("falsifier_check", problem, (Problem, str, PathLike), target)
     database = Database(_database(item.config, options["database"]))
+    if options["engine"] is not None:
+        _check_engine(options["engine"])
     loaded = problem if isinstance(problem, Problem) else load_problem(problem)
     try:
         checked = check(
@@ -351,6 +360,17 @@ def _setting(config: pytest.Config, name: str) -> Any:
         if least <= (number := int(found)) <= most:
             return number
     raise pytest.UsageError(f"{key}: expected a whole number from {least} to {most}, got {found!r}")
+
+
+def _check_engine(name: str) -> None:
+    """Refuse an engine that does not exist, or that needs a language model; SpecError."""
+    from falsifier.engines import check_engine
+    from falsifier.errors import SpecError
+    from falsifier.search.make_engines import LLM_ENGINES
+
+    if name in LLM_ENGINES:
+        raise SpecError(f"engine: {name} asks a language model, and tests ask none")
+    check_engine(name)
 
 
 def _database(config: pytest.Config, stated: Any) -> Path:

@@ -256,6 +256,8 @@ def test_a_counterexample_that_cannot_be_stored_or_drawn_is_shown(repository: Pa
         ("budget", "99999999999", "a whole number from 1 to 10000000, got '99999999999'"),
         ("seed", "-1", "a whole number from 0 to .*, got '-1'"),
         ("strict", "x", "x"),
+        ("engine", "surogate", "unknown engine 'surogate'; did you mean 'surrogate'"),
+        ("engine", "hybrid", "hybrid asks a language model, and tests ask none"),
     ],
 )
 def test_a_wrong_ini_value_is_a_usage_error_that_names_the_key(

@@ -122,7 +122,11 @@ def private_folder(folder: Path) -> Path | None:
 
 def absent(path: Path) -> str:
     """Say that there is no file to read: nothing at all, or a folder."""
-    return f"{path} is a folder" if path.is_dir() else f"{path}: no such file"
+    if path.is_dir():
+        return f"{path} is a folder"
+    # As \f and \n of a Windows path within the double quotes of TOML.
+    hint = "" if str(path).isprintable() else "; write backslashes of a path in single quotes"
+    return f"{str(path)!r}: no such file{hint}" if hint else f"{path}: no such file"
 
 
 def bundled(folder: str) -> Path:
