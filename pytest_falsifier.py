@@ -101,7 +101,7 @@ def pytest_configure(config: pytest.Config) -> None:
     )
     for name in _OPTIONS:
         _setting(config, name)
-    if engine := _setting(config, "engine"):
+    if config.getoption("falsifier") and (engine := _setting(config, "engine")):
         from falsifier.errors import SpecError
 
         try:

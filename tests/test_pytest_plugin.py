@@ -263,7 +263,7 @@ def test_a_counterexample_that_cannot_be_stored_or_drawn_is_shown(repository: Pa
 def test_a_wrong_ini_value_is_a_usage_error_that_names_the_key(
     repository: Path, key: str, value: str, said: str
 ) -> None:
-    done = run_pytest(repository, "specs", "-o", f"falsifier_{key}={value}")
+    done = run_pytest(repository, "--falsifier", "specs", "-o", f"falsifier_{key}={value}")
     assert done.code == 4 and "Traceback" not in done.err
     assert re.search(f"ERROR: falsifier_{key}: .*{said}", done.err), done.err
 

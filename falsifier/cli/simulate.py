@@ -51,9 +51,8 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}
-        for name, section in source.changes.parameters.items():  # items of enumerations
-            number = problem.info[name].number_of(section.value) if isinstance(section.value, str) else None
-            given |= {} if number is None else {name: number}
+        items = [name for name in source.changes.parameters if name in problem.parameters]
+        given |= {name: problem.parameters[name] for name in items}
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}
@@ -137,7 +136,9 @@ def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
         room = 1.0 if min(values) == max(values) else 0.0
         low, high = min(values) - room, max(values) + room
         if own is None:
-            own = InputRange(name, low, high, unit=variable.unit)
+            kind: Any = variable.kind  # no string: it was simulated
+            items = tuple(variable.literals.items())
+            own = InputRange(name, low, high, unit=variable.unit, kind=kind, items=items)
         inputs.append(replace(own, low=low, high=high))
     return replace(problem, space=SearchSpace(tuple(inputs), (), problem.space.stop_time))
 

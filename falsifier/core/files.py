@@ -125,8 +125,9 @@ def absent(path: Path) -> str:
     if path.is_dir():
         return f"{path} is a folder"
     # As \f and \n of a Windows path within the double quotes of TOML.
-    hint = "" if str(path).isprintable() else "; write backslashes of a path in single quotes"
-    return f"{str(path)!r}: no such file{hint}" if hint else f"{path}: no such file"
+    if any(c in str(path) for c in "\n\t\f\b\r"):
+        return f"{str(path)!r}: no such file; write backslashes of a path in single quotes"
+    return f"{path}: no such file"
 
 
 def bundled(folder: str) -> Path:

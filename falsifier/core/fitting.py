@@ -10,7 +10,7 @@ from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
 from falsifier.errors import CandidateError
 
-_ROUNDED = "{} is rounded to the nearest numbers that it can have"
+_ROUNDED = "{} can have certain numbers only: its values are rounded to the nearest ones"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,8 @@ def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[S
     values = signal.held(None).sample(np.asarray(times))
     sampled = Signal(times, tuple(float(v) for v in values), interpolation, r.hold)
     note = f"{r.name} is sampled at {len(times)} control points with {interpolation} interpolation ({reason})"
-    return sampled, [note]
+    is_rounded = any(nearest_value(r, v) != v for v in sampled.values)
+    return sampled, [note, *([_ROUNDED.format(r.name)] if is_rounded else [])]
 
 
 def _allowed(r: InputRange, signal: Signal, space: SearchSpace) -> tuple[tuple[float, ...], Interpolation]:

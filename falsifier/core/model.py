@@ -118,7 +118,7 @@ class Variable:
         """Return the number that the name of an item, or ``true`` or ``false`` of a Boolean, stands for."""
         if self.kind == "boolean":
             return {"false": 0.0, "true": 1.0}.get(word.lower())
-        return self.literals.get(word)
+        return float(self.literals[word]) if word in self.literals else None
 
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""

@@ -162,6 +162,8 @@ def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mappin
             )
     values = [(name, value) for name, signal in signals.items() for value in signal.values]
     for name, value in (*values, *numbers.items()):
+        if info[name].kind == "string":
+            raise CandidateError(f"{name} is a string; only numbers can be simulated")
         if expected := info[name].expected(value):
             raise CandidateError(f"{name} = {value:g}: {expected}")
 

@@ -92,23 +92,28 @@ def _parameters_by_name(found: Any, info: ValidationInfo) -> Any:
 def _in_numbers(part: Any, info: ValidationInfo) -> Any:
     """A signal or parameter with numbers in place of the words that stand for its values."""
     name = part.get("name") if isinstance(part, dict) else None
-    words: Mapping[str, float] = (info.context or {}).get(name, {}) if isinstance(name, str) else {}
+    known: Mapping[str, Mapping[str, float]] = info.context or {}
+    if not isinstance(name, str) or name not in known:
+        return part
+    words = known[name]
     in_any_case = {word.lower(): number for word, number in words.items()}
     if len(in_any_case) < len(words):  # the case tells items apart
         in_any_case = {}
 
     def number(value: Any) -> Any:
-        word = str(value).lower() if isinstance(value, bool) else value
-        if not isinstance(word, str) or word in words:
-            return words[word] if isinstance(word, str) else value
+        if not isinstance(value, str | bool):
+            return value
+        word = str(value).lower() if isinstance(value, bool) else value.strip()
+        stated = word.partition("=")[0].strip()  # as the prompt has it, 2 = Lock
+        for said in (word, stated):
+            if (found := words.get(said, in_any_case.get(said.lower()))) is not None:
+                return found
         if isinstance(value, str) and not (words and word[:1].isalpha()):
-            return value  # a number, a run of one, or nothing that can be read
-        if (found := in_any_case.get(word.strip().lower())) is not None:
-            return found
+            return stated if words else value
         expected = f"none of {', '.join(map(quoted, words))}" if words else "no number"
         raise RejectedReplyError(f"{name}: {quoted(word)} is {expected}")
 
-    given = {key: part[key] for key in ("value", "values") if name and key in part}
+    given = {key: part[key] for key in ("value", "values") if key in part}
     found = {k: list(map(number, v)) if isinstance(v, list) else number(v) for k, v in given.items()}
     return {**part, **found} if found else part
 
@@ -213,7 +218,7 @@ def defect(error: ValidationError, found: Mapping[str, Any] = MappingProxyType({
     """What is wrong first, with the keys that are not known there: one of them may be what is missing."""
     errors = error.errors(include_url=False, include_context=False, include_input=False)
     first, place = errors[0], errors[0]["loc"][:-1]
-    text = f"{'.'.join(str(part) for part in first['loc'])}{_whose(found, *place[:2])}: {first['msg']}"
+    text = f"{'.'.join(str(part) for part in first['loc'])}{_whose(found, *first['loc'][:2])}: {first['msg']}"
     unknown = [
         quoted(str(e["loc"][-1])) for e in errors if e["type"] == "extra_forbidden" and e["loc"][:-1] == place
     ]
@@ -228,7 +233,7 @@ def _whose(found: Mapping[str, Any], part: int | str = "", index: int | str = 0)
     if not isinstance(listed, dict | list) or not isinstance(index, int):
         return ""
     entry = list(listed)[index]
-    name = entry.get("name") if isinstance(entry, dict) else entry
+    name = entry if isinstance(listed, dict) else entry.get("name") if isinstance(entry, dict) else None
     return f" (of {quoted(name)})" if isinstance(name, str) else ""
 
 

@@ -6,6 +6,7 @@ on disk, keyed by the content of the request.
 
 import json
 import logging
+import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -208,6 +209,9 @@ class LiteLLMChat:
         """
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
+        # litellm sends it to other providers' servers if it knows no key of theirs.
+        withheld = "" if provider_of(self.llm) in _OF_OPENAI else os.environ.get("OPENAI_API_KEY", "").strip()
+        withheld = "" if withheld == key else withheld
         litellm_adapter.load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left
@@ -228,7 +232,7 @@ class LiteLLMChat:
 
         try:
             seconds = timeout if left is None else min(timeout, left)
-            return cleaned(within(seconds, ask, never=_not_to(self.llm)), secrets)
+            return cleaned(within(seconds, ask, never=_not_to(self.llm), withheld=withheld), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
                 error, llm=self.llm, api_base=self.api_base, secrets=secrets, options=self.options

@@ -14,7 +14,7 @@ from falsifier.core.secrets import redact
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
-from falsifier.llm.providers import key_variables, known, server_address
+from falsifier.llm.providers import known, server_address
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
@@ -78,12 +78,6 @@ class _RefusedOptionError(ChatError):
 # ``{detail}``. The first one that fits counts.
 _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...] = (
     (
-        (),
-        ("missing credentials",),  # of OpenAI's client, before anything is sent
-        ChatError,
-        "no API key: set {keys} in the environment, to any text if the server needs none",
-    ),
-    (
         (403,),
         # A key that is right may belong to an account that is not.
         ("organization", "organisation", "project", "verif", "not have access", "region", "country"),
@@ -99,6 +93,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         "variant, or raise its limit. {detail}",
     ),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
+    ((), ("_api_key is not set",), ChatError, "{detail}"),  # of litellm, before anything is sent
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
     ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
@@ -156,7 +151,7 @@ def classify(
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     filled = {
-        "keys": " or ".join(key_variables(llm)),
+        "keys": " or ".join(provider.keys) or "the API key",
         "longer": _LONGER if api_base is not None or provider.local else "",
         "option": refused,
         "detail": _detail(text, status),

@@ -63,6 +63,9 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
             limits=True,
         ),
         "hosted_vllm": Provider(start="vllm serve MODEL", limits=True),
+        "custom_openai": Provider(("CUSTOM_OPENAI_API_KEY",), openai_client=True),
+        "litellm_proxy": Provider(("LITELLM_PROXY_API_KEY",), openai_client=True),
+        "xinference": Provider(("XINFERENCE_API_KEY",), openai_client=True),
         "llamafile": Provider(
             local=True,
             address="http://127.0.0.1:8080/v1",
@@ -165,12 +168,8 @@ def _sendable(variable: str) -> str:
 
 def key_variable(llm: str) -> str:
     """Environment variable that contains a key for this LLM; empty if none does."""
-    return next((name for name in key_variables(llm) if os.environ.get(name, "").strip()), "")
-
-
-def key_variables(llm: str) -> tuple[str, ...]:
-    """Environment variables that may contain a key for this LLM, the usual one first."""
-    return known(llm).keys or (f"{provider_of(llm).upper()}_API_KEY",)
+    variables = known(llm).keys or (f"{provider_of(llm).upper()}_API_KEY",)
+    return next((name for name in variables if os.environ.get(name, "").strip()), "")
 
 
 def stated_address(llm: str, api_base: str | None) -> str | None:

@@ -91,7 +91,7 @@ class ReplyForm:
             RejectedReplyError: if none is valid; states what is wrong with each.
         """
         written, valid, defects = candidates_in(text), list[Candidate](), list[str]()
-        words = {r.name: _BOOLEAN if r.kind == "boolean" else dict(r.items) for r in self.space.ranges}
+        words = {r.name: _BOOLEAN if _is_truth(r) else dict(r.items) for r in self.space.ranges}
         for number, found in enumerate(written, start=1):
             try:
                 valid.append(self._candidate(written_candidate(found, words), origin))
@@ -166,6 +166,11 @@ class ReplyForm:
         except CandidateError as error:
             what = str(error) if self.named else "the numbers are no sample: see what was said of each"
             raise RejectedReplyError(what) from None
+
+
+def _is_truth(ranged: Range) -> bool:
+    """Whether it is a Boolean, or one that is told under a neutral name."""
+    return ranged.kind == "boolean" or (ranged.kind == "integer" and (ranged.low, ranged.high) == (0.0, 1.0))
 
 
 def _clamped(value: float, ranged: Range | Dimension) -> float:

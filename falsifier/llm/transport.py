@@ -87,17 +87,17 @@ class UnusableReplyError(BrokenReplyError):
     """An LLM's server answered, so that the request is paid for, but with nothing that can be used."""
 
 
-def within(seconds: float, action: Callable[[], T], *, never: Collection[str] = ()) -> T:
+def within(seconds: float, action: Callable[[], T], *, never: Collection[str] = (), withheld: str = "") -> T:
     """Return what an action returns, or give it up after so many seconds and cut its connections.
 
-    Nothing is sent to the hosts ``never``.
+    Nothing is sent to the hosts ``never``, and no header with a key that is ``withheld``.
 
     Raises:
         TimeoutError: if it has not returned by then.
         RefusedReplyError: if a server's reply was refused.
         BrokenReplyError: if the action failed because of the connection, or of a reply that is not readable.
     """
-    call = _Call(never)
+    call = _Call(never, withheld)
     outcome: SimpleQueue[tuple[T | None, BaseException | None]] = SimpleQueue()
 
     def work() -> None:
@@ -153,8 +153,8 @@ def _is_importing(thread: Thread) -> bool:
 class _Call:
     """The connections of one call, why a reply was refused, and what was wrong with the last one."""
 
-    def __init__(self, never: Collection[str]) -> None:
-        self.never = never
+    def __init__(self, never: Collection[str], withheld: str) -> None:
+        self.never, self.withheld = never, withheld
         self.refusal = ""
         self.fault: BrokenReplyError | None = None
         self._lock = Lock()
@@ -228,6 +228,11 @@ class _Guarded(httpx.BaseTransport):
         if request.url.host in call.never:
             own = f"the address of your server: {setting('api_base', 'URL')}"
             call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
+        if call.withheld and any(call.withheld in value for value in request.headers.values()):
+            call.refuse(
+                f"nothing was sent: OpenAI's key would have gone to {request.url.host}; set the environment "
+                "variable of this provider's key, to any text if the server needs none"
+            )
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.

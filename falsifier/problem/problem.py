@@ -253,6 +253,15 @@ def _check_variables(problem: Problem) -> None:
         if name not in known:
             near = did_you_mean(name, (v.name for v in info.variables))
             raise SpecError(f"{problem.name}: the model has no variable {name!r}; {near}")
+    for each in problem.space.ranges:
+        variable = info[each.name]  # of a real one, whole numbers alone may be searched
+        is_other = variable.kind != "real" and each.kind == "real"
+        if is_other or (variable.literals and dict(each.items) != dict(variable.literals)):
+            items = f", items={tuple(variable.literals.items())}" if variable.literals else ""
+            raise SpecError(
+                f"{problem.name}: {each.label} is of type {variable.kind} in the model: give the range "
+                f"kind={variable.kind!r}{items}"
+            )
     for name, value in problem.parameters.items():
         finite(f"{problem.name}: parameter {name!r}", value)
     for name in problem.requirement.formula.signals:

@@ -154,7 +154,8 @@ def _fixed(variable: Variable, value: float | str) -> float:
         others = f" or one of {', '.join(words)}" if words else ""
         kind = "inputs" if variable.causality == "input" else "parameters"
         raise SpecError(
-            f"expected a number{others}, got {value!r}; to search a range: {searching(kind, variable.name)}",
+            f"expected a number{others}, got {value!r}; to search a range: {searching(kind, variable.name)}, "
+            "or range = [low, high] in a spec",
             key="value",
         )
     _check(variable, number)

@@ -116,7 +116,9 @@ def read_spec(path: Path) -> Spec:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
             said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
-            raise SpecError(f"not valid TOML: {said}") from None
+            is_path = any(what in said for what in ("hex value", "Unescaped '\\'"))
+            hint = "; write backslashes, as of a path, in single quotes" if is_path else ""
+            raise SpecError(f"not valid TOML: {said}{hint}") from None
         if not data:
             raise SpecError(
                 "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.files import bundled
 from tests.command import falsifier
 from tests.fmu.fixtures import path as fixture
 from tests.fmu.packages import PLANT, structure, system, write
@@ -61,6 +62,14 @@ def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,throttle\n0,50\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
     assert "no values given for brake: kept at the model's start value" in done.err
+    fmu = bundled("fmus") / "AT.fmu"
+    (tmp_path / "car.toml").write_text(f"""
+        model = {{ fmu = '{fmu}', interface = 'co-simulation', output_interval = 0.1 }}
+        inputs.throttle.control_points = 3
+        parameters.finalDrive.range = [3, 3.5]
+        requirements.R.formula = 'G (speed <= 200)'""")
+    done = falsifier("simulate", "car.toml:R", "--inputs", "u.csv", cwd=tmp_path)
+    assert "no values given for finalDrive: kept at the model's start value" in done.err
 
 
 def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:

@@ -272,4 +272,4 @@ def test_what_is_rounded_to_fit_is_said() -> None:
     space = SearchSpace((gear,), (ParameterRange("n", 0.0, 5.0, kind="integer"),), 10.0)
     fitted = fit(space, Candidate({"u": Signal((0.0,), (6.0,), "constant")}, {"n": 2.6}))
     assert (fitted.candidate.signals["u"].values, fitted.candidate.parameters) == ((7,), {"n": 3})
-    assert [note.split(" is ")[0] for note in fitted.notes if "rounded" in note] == ["u", "n"]
+    assert [note.split()[0] for note in fitted.notes if "rounded" in note] == ["u", "n"]

@@ -13,6 +13,7 @@ from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, kno
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.make_engines import open_chat, price_of
 from falsifier.search.request import LLMSettings
+from tests.llm.server import Step, serving
 from tests.llm.support import Served
 
 
@@ -139,10 +140,47 @@ def test_a_server_of_the_users_own_must_be_named(monkeypatch: pytest.MonkeyPatch
         connect("hosted_vllm/x")
 
 
-def test_no_prompt_of_another_provider_goes_to_openai() -> None:
+@pytest.mark.parametrize("llm", ["nvidia_nim/x", "perplexity/x", "deepinfra/x"])
+def test_the_key_of_openai_goes_to_no_other_provider(llm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """litellm takes it where it knows no other one."""
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
+    with serving(Step("an answer")) as server:
+        with pytest.raises(ChatError, match=r"OpenAI's key would have gone to 127\.0\.0\.1") as caught:
+            connect(llm, api_base=server.url, attempts=1).complete(QUESTION)
+        assert not server.received and "sk-openai" not in str(caught.value)
+
+
+@pytest.mark.parametrize("llm", ["custom_openai/x", "litellm_proxy/x", "xinference/x"])
+def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
+    with serving(Step("an answer")) as server:
+        assert connect(llm, api_base=server.url, attempts=1).complete(QUESTION).text == "an answer"
+    assert [r.headers["Authorization"] for r in server.received] == [f"Bearer {NO_KEY}"]
+
+
+def test_a_missing_key_that_only_litellm_misses_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("FIREWORKS_API_KEY", raising=False)
+    with pytest.raises(ChatError, match=r"^fireworks_ai/x: FIREWORKS_API_KEY is not set"):
+        connect("fireworks_ai/x").complete(QUESTION)
+
+
+def test_keys_of_providers_that_are_not_listed_are_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOSTED_VLLM_API_KEY", "ab“c")
+    with pytest.raises(ChatSetupError, match="HOSTED_VLLM_API_KEY in the environment: character 3 of 4"):
+        find_key("hosted_vllm/x", api_base="http://127.0.0.1/v1")
+
+
+@pytest.mark.parametrize("address", ["http://127.0.0.1:80/v 1", " http://127.0.0.1:80/v1", "http://a\tb/v1"])
+def test_an_address_has_no_blanks(address: str) -> None:
+    with pytest.raises(ChatSetupError, match=r"expected http://HOST:PORT/v1"):
+        connect("openai/x", api_base=address)
+
+
+def test_no_prompt_of_another_provider_goes_to_openai(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its library would take it for its own if no address is named."""
+    monkeypatch.setenv("CUSTOM_OPENAI_API_KEY", "k")
     with pytest.raises(ChatError, match=r"nothing was sent: it would have gone to api\.openai\.com"):
-        connect("custom_openai/x", options={"api_key": "k"}, attempts=1).complete(QUESTION)
+        connect("custom_openai/x", attempts=1).complete(QUESTION)
 
 
 @pytest.mark.parametrize(

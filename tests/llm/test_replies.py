@@ -195,7 +195,8 @@ def discrete(door: Any = 0, on: Any = 0, gear: Any = 1, **reply: Any) -> Any:
     [
         {"door": ["Lock", "Open"], "on": ["true", False], "gear": 3.0},
         {"door": ["2", 0], "on": [True, "false"], "gear": "3"},
-        {"door": ["LOCK", "open"], "on": ["True", "FALSE"], "gear": 3},
+        {"door": [" LOCK", "open"], "on": ["True", "FALSE"], "gear": 3},
+        {"door": ["2 = Lock", "0 = Open"], "on": ["1 = true", False], "gear": 3},
         {"signals": {"door": ["Lock", 0], "on": [[0, "true"], [5, 0]]}, "parameters": {"gear": 3}},
     ],
     ids=str,
@@ -304,3 +305,18 @@ def test_what_can_be_read_in_one_way_only_is_read_and_everything_else_told() -> 
     assert len(ROWS) == len(list(odd_replies()))
     assert sum(came == "read" for _, came in ROWS) >= 27
     assert all(came == "read" or len(came) > len("rejected: ") for _, came in ROWS)
+
+
+@pytest.mark.parametrize(
+    ("reply", "problem"),
+    [
+        ({"signals": [{"name": "door", "values": [0, 2]}, 5]}, "signals.1: "),
+        ({"signals": {"door": [None, 2], "on": [0, 1]}}, "signals.0.values.0 (of 'door'): "),
+        ({"parameters": [{"name": "gear", "value": "fast"}]}, "parameters.0.value (of 'gear'): "),
+        ({"signals": [{"name": "n" * 200, "values": [True]}]}, f"unknown input '{'n' * 64}' ..."),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_names_the_input_or_parameter(reply: dict[str, Any], problem: str) -> None:
+    with pytest.raises(RejectedReplyError, match=f"^{re.escape(problem)}"):
+        discrete(**reply)

@@ -37,6 +37,13 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
     ("old", "new", "message"),
     [
         ('"AT.fmu"', '"gone.fmu"', r"model\.fmu: .*gone\.fmu: no such file"),
+        (
+            '"AT.fmu"',
+            r'"..\fmus\new.fmu"',
+            r"model\.fmu: .*no such file; write backslashes of a path in sing",
+        ),
+        ('"AT.fmu"', r'"C:\Users\a.fmu"', r"not valid TOML: .*; write backslashes, as of a path, in single"),
+        ('"AT.fmu"', r'"C:\Docs\a.fmu"', r"not valid TOML: .*; write backslashes, as of a path, in single"),
         ("[inputs.throttle]", "[inputs.throtle]", r"inputs\.throtle: .*did you mean 'throttle'"),
         ("speed <=", "sped <=", r"requirements\.R\.formula: unknown signal 'sped'; did you mean 'speed'"),
         ("G[0,20]", "G[0,60]", r"requirements\.R\.formula: .*60 s"),

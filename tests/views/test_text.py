@@ -54,6 +54,8 @@ def test_a_run_that_can_be_continued_says_how(tmp_path: Path) -> None:
     result = falsify(impossible(), "uniform", budget=9, directory=tmp_path, listeners=stop_after(2))
     assert result.status == "interrupted"
     assert f"falsifier resume {shlex.quote(str(tmp_path))}" in result_text(result)
+    before = replace(result, evaluations=())
+    assert f"falsifier resume {shlex.quote(str(tmp_path))}" in result_text(before)
 
 
 def test_what_the_language_model_used_is_told(found: Result) -> None:

@@ -42,7 +42,13 @@ def export_counterexample(
     files = [
         save(stored, directory / FILE_NAME),
         tables.write_json(start, directory / "start_values.json", problem.model),
-        tables.write_ssv(start, problem.name, directory / "start_values.ssv", problem.info),
+        tables.write_ssv(
+            start,
+            problem.name,
+            directory / "start_values.ssv",
+            problem.info,
+            named=not isinstance(problem.model, System),
+        ),
         tables.write_mat(table, start, directory / "inputs.mat"),
     ]
     if table.columns:

@@ -233,7 +233,7 @@ def _bindings(element: Element, system: System, files: Iterable[str]) -> None:
     bindings = Element(f"{_SSD}ParameterBindings")
     if system.frame.values:
         values = SubElement(SubElement(bindings, f"{_SSD}ParameterBinding"), f"{_SSD}ParameterValues")
-        values.append(tables.parameter_set(dict(system.frame.values), system.name, system.info))
+        values.append(tables.parameter_set(dict(system.frame.values), system.name, system.info, named=False))
     for source in files:
         SubElement(bindings, f"{_SSD}ParameterBinding", {"source": source})
     if len(bindings):

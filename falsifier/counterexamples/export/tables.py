@@ -119,23 +119,30 @@ def text_of(value: float | str, kind: Kind) -> str:
     return str(bool(value)).lower() if kind == "boolean" else str(round(value))
 
 
-def write_ssv(start: Mapping[str, float | str], name: str, path: Path, info: ModelInfo) -> Path:
+def write_ssv(
+    start: Mapping[str, float | str], name: str, path: Path, info: ModelInfo, *, named: bool = True
+) -> Path:
     """Write the start values as a parameter set of System Structure and Parameterization 1.0."""
-    root = parameter_set(start, name, info)
+    root = parameter_set(start, name, info, named=named)
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
     return path
 
 
-def parameter_set(start: Mapping[str, float | str], name: str, info: ModelInfo) -> ElementTree.Element:
-    """Return the start values as an XML element of that standard; of enumerations the names of items."""
+def parameter_set(
+    start: Mapping[str, float | str], name: str, info: ModelInfo, *, named: bool
+) -> ElementTree.Element:
+    """Return the start values as an XML element of that standard.
+
+    Of enumerations, items are ``named``, or else numbers, as connectors have them.
+    """
     ElementTree.register_namespace("ssv", _SSV)
     root = ElementTree.Element(f"{{{_SSV}}}ParameterSet", {"version": "1.0", "name": plain(name)})
     parameters = ElementTree.SubElement(root, f"{{{_SSV}}}Parameters")
     for key, value in start.items():
         parameter = ElementTree.SubElement(parameters, f"{{{_SSV}}}Parameter", {"name": plain(key)})
         variable = info[key] if key in info else Variable(key, "string" if isinstance(value, str) else "real")
-        items = {number: item for item, number in variable.literals.items()}
+        items = {number: item for item, number in variable.literals.items() if named}
         text = items.get(round(value), "") if items and not isinstance(value, str) else ""
         kind = "integer" if variable.kind == "enumeration" and not text else variable.kind
         written = {"value": plain(text or text_of(value, kind))}

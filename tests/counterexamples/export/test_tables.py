@@ -13,6 +13,7 @@ from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.tables import (
     InputTable,
     input_table,
+    parameter_set,
     write_csv,
     write_mat,
     write_ssv,
@@ -45,6 +46,8 @@ def test_parameter_sets_have_the_types_of_the_model(tmp_path: Path) -> None:
         "x": ("Real", "2.0"),
         "s": ("String", "a"),
     }
+    (number,) = parameter_set({"m": 7.0}, "m", info, named=False)[0][0]
+    assert (number.tag.rpartition("}")[2], number.get("value")) == ("Integer", "7")
 
 
 def test_the_mat_file_holds_a_matrix_of_inputs_and_the_models_own_names(tmp_path: Path) -> None:
