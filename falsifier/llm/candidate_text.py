@@ -227,10 +227,10 @@ def defect(error: ValidationError, found: Mapping[str, Any] = MappingProxyType({
     return text
 
 
-def _whose(found: Mapping[str, Any], part: int | str = "", index: int | str = 0) -> str:
+def _whose(found: Mapping[str, Any], part: int | str = "", index: int | str = "") -> str:
     """The name in an entry of the signals or parameters."""
     listed = found.get(str(part))
-    if not isinstance(listed, dict | list) or not isinstance(index, int):
+    if not isinstance(listed, dict | list) or not isinstance(index, int) or index >= len(listed):
         return ""
     entry = list(listed)[index]
     name = entry if isinstance(listed, dict) else entry.get("name") if isinstance(entry, dict) else None

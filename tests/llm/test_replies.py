@@ -272,6 +272,7 @@ def reads_or_tells(form: ReplyForm, text: str) -> None:
 @settings(max_examples=100)
 @given(st.dictionaries(keys, anything, max_size=4), st.booleans())
 @example({"point": ["0\x1f"]}, False)
+@example({"point": {}}, False)
 def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
     reads_or_tells(form_of(free=free), json.dumps(reply))
 
