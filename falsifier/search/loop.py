@@ -233,7 +233,12 @@ class _Loop:
     def ask(self, state: RequirementState, n: int) -> None:
         """Ask for n candidates, and start to simulate them."""
         engine = self.known if self.known.left else state.engine
-        candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
+        started = perf_counter()
+        try:
+            candidates, wanted, seconds = self.steps.ask(state.problem, engine, n)
+        except BaseException:  # Ctrl-C, too: the time is spent
+            self.spent += Spent(engine_seconds=perf_counter() - started)
+            raise
         self.turns += 1
         self.spent += Spent(engine_seconds=seconds)
         self.emit(
@@ -246,8 +251,8 @@ class _Loop:
                 spent=self.clock(),
             )
         )
-        started = self.steps.start(state.problem, candidates)
-        self.waiting.extend((state, wait) for wait in started)
+        waits = self.steps.start(state.problem, candidates)
+        self.waiting.extend((state, wait) for wait in waits)
 
     def settle(
         self, asked: RequirementState, wait: Callable[[], Evaluation], standing: Sequence[RequirementState]

@@ -1,6 +1,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from time import sleep
 
 import pytest
 
@@ -97,6 +98,16 @@ def test_a_model_that_always_fails_ends_the_run_early() -> None:
     assert result.status == "failed"
     assert result.spent.simulations == 10
     assert "RuntimeError: out of order" in result.reason
+
+
+def test_the_time_of_a_question_that_is_interrupted_is_the_engines() -> None:
+    class Asked(Wrapped):
+        def ask(self, n: int = 1) -> list[Candidate]:
+            sleep(0.05)
+            raise KeyboardInterrupt
+
+    result = falsify(lag_problem(), Asked(lag_problem()))
+    assert result.status == "interrupted" and result.spent.engine_seconds >= 0.05
 
 
 def test_interruption_loses_nothing(tmp_path: Path) -> None:
