@@ -266,7 +266,12 @@ def falsifier_check(request: pytest.FixtureRequest) -> Callable[..., "Checked"]:
     def check(problem: "Problem | str | PathLike[str]", **options: Any) -> "Checked":
         __tracebackhide__ = True
         _check_names("falsifier_check", options)
-        return _check(request.node, problem, options)
+        from falsifier.errors import FalsifierError
+
+        try:
+            return _check(request.node, problem, options)
+        except FalsifierError as error:  # what is wrong stands in the test, not within falsifier
+            raise error.with_traceback(None) from None
 
     return check
 

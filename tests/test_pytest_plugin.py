@@ -150,8 +150,9 @@ def test_typo(falsifier_check):
         falsifier_check(lag_problem(), bugdet=3)
 
 def test_no_problem(falsifier_check):
-    with pytest.raises(SpecError, match="expected a Problem, or .* got 42"):
+    with pytest.raises(SpecError, match="expected a Problem, or .* got 42") as caught:
         falsifier_check(42)
+    assert len(caught.traceback) == 2, "this line and the fixture"
 
 @pytest.mark.falsifier(strict=True, engine="sobol", database="elsewhere")
 class TestMarked:
