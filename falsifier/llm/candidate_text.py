@@ -104,12 +104,12 @@ def _in_numbers(part: Any, info: ValidationInfo) -> Any:
         if not isinstance(value, str | bool):
             return value
         word = str(value).lower() if isinstance(value, bool) else value.strip()
-        stated = word.partition("=")[0].strip()  # as the prompt has it, 2 = Lock
-        for said in (word, stated):
-            if (found := words.get(said, in_any_case.get(said.lower()))) is not None:
-                return found
-        if isinstance(value, str) and not (words and word[:1].isalpha()):
-            return stated if words else value
+        before, _, after = (part.strip() for part in word.rpartition("="))  # as the prompt has it, 2 = Lock
+        found = words.get(word, in_any_case.get(word.lower(), in_any_case.get(after.lower())))
+        if found is not None and before in ("", f"{found:g}"):
+            return found
+        if isinstance(value, str) and not (words and (before or word[:1].isalpha())):
+            return value
         expected = f"none of {', '.join(map(quoted, words))}" if words else "no number"
         raise RejectedReplyError(f"{name}: {quoted(word)} is {expected}")
 

@@ -210,8 +210,9 @@ class LiteLLMChat:
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
         # litellm sends it to other providers' servers if it knows no key of theirs.
-        withheld = "" if provider_of(self.llm) in _OF_OPENAI else os.environ.get("OPENAI_API_KEY", "").strip()
-        withheld = "" if withheld == key else withheld
+        is_own = key is not None or provider_of(self.llm) in _OF_OPENAI
+        withheld = "" if is_own else os.environ.get("OPENAI_API_KEY", "").strip()
+        withheld = "" if withheld in secrets else withheld  # stated as an option, in Python
         litellm_adapter.load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left

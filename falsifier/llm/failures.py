@@ -14,7 +14,7 @@ from falsifier.core.secrets import redact
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
-from falsifier.llm.providers import known, server_address
+from falsifier.llm.providers import known, server_address, unset_key
 from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
@@ -93,7 +93,9 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         "variant, or raise its limit. {detail}",
     ),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
-    ((), ("_api_key is not set",), ChatError, "{detail}"),  # of litellm, before anything is sent
+    # Of litellm and of OpenAI's client, before anything is sent.
+    ((), ("_api_key is not set",), ChatError, "{detail}"),
+    ((), ("missing credentials. please pass",), ChatError, "no API key: {unset}"),
     ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
     ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
@@ -144,7 +146,8 @@ def classify(
         )
     said = redact(printable(str(error)), secrets)
     if isinstance(error, RefusedReplyError):
-        return ChatError(where + said)
+        advice = f"; {unset_key(llm)}" if "OpenAI's key would have gone" in said else ""
+        return ChatError(where + said + advice)
     if isinstance(error, BrokenReplyError) and error.status_code is None:
         return TransientChatError(where + said, patience=error.patience)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
@@ -152,6 +155,7 @@ def classify(
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     filled = {
         "keys": " or ".join(provider.keys) or "the API key",
+        "unset": unset_key(llm),
         "longer": _LONGER if api_base is not None or provider.local else "",
         "option": refused,
         "detail": _detail(text, status),

@@ -21,6 +21,7 @@ class Provider:
     keys: tuple[str, ...] = ()
     local: bool = False  # runs on the user's own machine, so a price of zero is correct
     address: str = ""  # default address of its server; litellm has none for some
+    own: bool = False  # a server of the user's own, of which nobody else knows the address
     start: str = ""  # command that starts its server, for messages
     openai_client: bool = False  # served through the OpenAI client, which silently retries by default
     defaults: Mapping[str, Any] = field(default_factory=dict)  # sent unless the user states them
@@ -62,10 +63,10 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
             names_effort=True,
             limits=True,
         ),
-        "hosted_vllm": Provider(start="vllm serve MODEL", limits=True),
-        "custom_openai": Provider(("CUSTOM_OPENAI_API_KEY",), openai_client=True),
-        "litellm_proxy": Provider(("LITELLM_PROXY_API_KEY",), openai_client=True),
-        "xinference": Provider(("XINFERENCE_API_KEY",), openai_client=True),
+        "hosted_vllm": Provider(own=True, start="vllm serve MODEL", limits=True),
+        "custom_openai": Provider(("CUSTOM_OPENAI_API_KEY",), own=True, openai_client=True),
+        "litellm_proxy": Provider(("LITELLM_PROXY_API_KEY",), own=True, openai_client=True),
+        "xinference": Provider(("XINFERENCE_API_KEY",), own=True, openai_client=True),
         "llamafile": Provider(
             local=True,
             address="http://127.0.0.1:8080/v1",
@@ -168,8 +169,17 @@ def _sendable(variable: str) -> str:
 
 def key_variable(llm: str) -> str:
     """Environment variable that contains a key for this LLM; empty if none does."""
-    variables = known(llm).keys or (f"{provider_of(llm).upper()}_API_KEY",)
-    return next((name for name in variables if os.environ.get(name, "").strip()), "")
+    return next((name for name in key_variables(llm) if os.environ.get(name, "").strip()), "")
+
+
+def key_variables(llm: str) -> tuple[str, ...]:
+    """Environment variables that may contain a key; that of an unlisted provider has usually this name."""
+    return known(llm).keys or (f"{provider_of(llm).upper()}_API_KEY",)
+
+
+def unset_key(llm: str) -> str:
+    """What to do if a server wants a key, and none is known."""
+    return f"set {' or '.join(key_variables(llm))} in the environment, to any text if the server needs none"
 
 
 def stated_address(llm: str, api_base: str | None) -> str | None:
@@ -217,7 +227,7 @@ def server_address(llm: str, api_base: str | None) -> str | None:
         ChatSetupError: if it is a server of the user's own, and nothing says where.
     """
     address = stated_address(llm, api_base) or known(llm).address
-    if known(llm).start and not address:
+    if known(llm).own and not address:
         variable = _address_variables(llm)[-1]
         raise ChatSetupError(f"{llm}: where is the server? state {setting('api_base')}, or set {variable}")
     return address or None

@@ -228,11 +228,9 @@ class _Guarded(httpx.BaseTransport):
         if request.url.host in call.never:
             own = f"the address of your server: {setting('api_base', 'URL')}"
             call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
-        if call.withheld and any(call.withheld in value for value in request.headers.values()):
-            call.refuse(
-                f"nothing was sent: OpenAI's key would have gone to {request.url.host}; set the environment "
-                "variable of this provider's key, to any text if the server needs none"
-            )
+        keys = [value.removeprefix("Bearer ").strip() for value in request.headers.values()]
+        if call.withheld and call.withheld in keys:
+            call.refuse(f"nothing was sent: OpenAI's key would have gone to {request.url.host}")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.

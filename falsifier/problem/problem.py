@@ -256,7 +256,8 @@ def _check_variables(problem: Problem) -> None:
     for each in problem.space.ranges:
         variable = info[each.name]  # of a real one, whole numbers alone may be searched
         is_other = variable.kind != "real" and each.kind == "real"
-        if is_other or (variable.literals and dict(each.items) != dict(variable.literals)):
+        items_differ = not each.items or set(each.items) - set(variable.literals.items())
+        if is_other or (variable.literals and items_differ):
             items = f", items={tuple(variable.literals.items())}" if variable.literals else ""
             raise SpecError(
                 f"{problem.name}: {each.label} is of type {variable.kind} in the model: give the range "

@@ -211,6 +211,7 @@ def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
         ({"door": ["look", 0]}, "door: 'look' is none of 'Open', 'Lock'"),
         ({"door": [True, 0]}, "door: 'true' is none of 'Open', 'Lock'"),
         ({"gear": True}, "gear: 'true' is no number"),
+        ({"door": ["2 = Open", 0]}, "door: '2 = Open' is none of 'Open', 'Lock'"),
         ({"door": [{"value": 1}, 0]}, "signals.0.values"),
         ({"on": ["Lock", 0]}, "on: 'Lock' is none of 'false', 'true'"),
         ({"door": [1, 0]}, "input 'door': 1 is none of its numbers; the nearest is 0"),

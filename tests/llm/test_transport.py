@@ -2,6 +2,7 @@ import subprocess
 import sys
 import threading
 from contextvars import ContextVar
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -84,3 +85,13 @@ def test_cookies_are_not_kept() -> None:
         for _ in range(2):
             within(HANG, lambda: client.get(server.root))
     assert all(b"a=b" not in sent for sent in server.requests)
+
+
+def test_nothing_is_sent_to_a_host_or_with_a_key_that_is_another_ones() -> None:
+    with pytest.raises(RefusedReplyError, match=r"it would have gone to api\.openai\.com; state the address"):
+        within(HANG, lambda: guarded_client().get("http://api.openai.com"), never={"api.openai.com"})
+    for headers in ({"Authorization": "Bearer sk-1"}, {"api-key": "sk-1"}):
+        send = partial(guarded_client().get, "http://127.0.0.1:9", headers=headers)
+        with pytest.raises(RefusedReplyError, match="OpenAI's key would have gone to 127") as caught:
+            within(HANG, send, withheld="sk-1")
+        assert "sk-1" not in str(caught.value)
