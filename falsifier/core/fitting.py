@@ -1,5 +1,6 @@
 """Candidates from elsewhere, made to fit a search space."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor
 
@@ -9,8 +10,6 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
 from falsifier.errors import CandidateError
-
-_ROUNDED = "{} can have certain numbers only: its values are rounded to the nearest ones"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +41,7 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
         if r.name not in candidate.signals:
             raise _missing(r)
         signals[r.name], changed = _fitted_signal(space, r, candidate.signals[r.name])
-        notes += changed
+        notes += [*changed, *_rounded(r, signals[r.name].values)]
     parameters = {}
     for p in space.parameters:
         value = candidate.parameters.get(p.name, p.nominal)
@@ -50,8 +49,7 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
             raise _missing(p)
         if p.name not in candidate.parameters:
             notes.append(f"{p.name} is not given: {value:g}, its value if it is not searched")
-        if nearest_value(p, value) != value:
-            notes.append(_ROUNDED.format(p.name))
+        notes += _rounded(p, (value,))
         parameters[p.name] = value
     return Fitted(
         space.admit(replace(candidate, signals=signals, parameters=parameters)), tuple(dict.fromkeys(notes))
@@ -61,9 +59,8 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
 def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[Signal, list[str]]:
     alone = SearchSpace((r,), (), space.stop_time)
     try:
-        admitted = alone.admit(Candidate({r.name: signal})).signals[r.name]
-        is_rounded = r.kind != "real" and admitted.values != signal.values
-        return admitted, [_ROUNDED.format(r.name)] if is_rounded else []
+        alone.admit(Candidate({r.name: signal}))
+        return signal, []
     except CandidateError as error:
         reason = str(error)
     for time, value in zip(signal.times, signal.values, strict=True):
@@ -75,8 +72,14 @@ def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[S
     values = signal.held(None).sample(np.asarray(times))
     sampled = Signal(times, tuple(float(v) for v in values), interpolation, r.hold)
     note = f"{r.name} is sampled at {len(times)} control points with {interpolation} interpolation ({reason})"
-    is_rounded = any(nearest_value(r, v) != v for v in sampled.values)
-    return sampled, [note, *([_ROUNDED.format(r.name)] if is_rounded else [])]
+    return sampled, [note]
+
+
+def _rounded(ranged: Range, values: Sequence[float]) -> list[str]:
+    """Say that values are none that an input or parameter can have, if any is not."""
+    is_rounded = any(nearest_value(ranged, value) != value for value in values)
+    why = f"{ranged.name} can have certain numbers only: its values are rounded to the nearest ones"
+    return [why] if is_rounded else []
 
 
 def _allowed(r: InputRange, signal: Signal, space: SearchSpace) -> tuple[tuple[float, ...], Interpolation]:

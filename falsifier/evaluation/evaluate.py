@@ -154,18 +154,22 @@ def simulate(
 
 def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mapping[str, float]) -> None:
     """Refuse values that a variable's type does not have: the FMU would get others."""
-    for name, signal in signals.items():
-        kind, interpolation = info[name].kind, signal.interpolation
-        if kind != "real" and interpolation != "constant" and len(signal.values) > 1:
+    given = {name: (signal.values, signal.interpolation) for name, signal in signals.items()}
+    given |= {name: ((number,), "constant") for name, number in numbers.items()}
+    for name, (values, interpolation) in given.items():
+        variable = info[name]
+        if variable.kind == "real":
+            continue
+        if variable.kind == "string":
+            raise CandidateError(f"{name} is a string, and only numbers can be given here: leave it out")
+        if interpolation != "constant" and len(values) > 1:
             raise CandidateError(
-                f"{name}: values of type {kind} cannot have {interpolation} interpolation; use 'constant'"
+                f"{name}: values of type {variable.kind} cannot have {interpolation} interpolation; use "
+                "'constant'"
             )
-    values = [(name, value) for name, signal in signals.items() for value in signal.values]
-    for name, value in (*values, *numbers.items()):
-        if info[name].kind == "string":
-            raise CandidateError(f"{name} is a string; only numbers can be simulated")
-        if expected := info[name].expected(value):
-            raise CandidateError(f"{name} = {value:g}: {expected}")
+        for value in values:
+            if expected := variable.expected(value):
+                raise CandidateError(f"{name} = {value:g}: {expected}")
 
 
 def _signal(variable: Variable, given: Signal | float | str) -> Signal:

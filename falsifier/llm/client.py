@@ -48,6 +48,7 @@ from falsifier.llm.providers import (
     provider_of,
     server_address,
     stated_address,
+    unset_key,
 )
 from falsifier.llm.transport import UnusableReplyError, within
 from falsifier.llm.usage import Price, tokens_sent, usage_of
@@ -210,9 +211,11 @@ class LiteLLMChat:
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))
         # litellm sends it to other providers' servers if it knows no key of theirs.
+        others = os.environ.get("OPENAI_API_KEY", "").strip()
         is_own = key is not None or provider_of(self.llm) in _OF_OPENAI
-        withheld = "" if is_own else os.environ.get("OPENAI_API_KEY", "").strip()
-        withheld = "" if withheld in secrets else withheld  # stated as an option, in Python
+        is_meant = is_own or others in secrets  # as an option, in Python
+        advice = f"the key of OpenAI; {unset_key(self.llm)}"
+        withheld = {others: advice} if others and not is_meant else {}
         litellm_adapter.load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left

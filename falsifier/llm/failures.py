@@ -146,8 +146,7 @@ def classify(
         )
     said = redact(printable(str(error)), secrets)
     if isinstance(error, RefusedReplyError):
-        advice = f"; {unset_key(llm)}" if "OpenAI's key would have gone" in said else ""
-        return ChatError(where + said + advice)
+        return ChatError(where + said)
     if isinstance(error, BrokenReplyError) and error.status_code is None:
         return TransientChatError(where + said, patience=error.patience)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")

@@ -20,6 +20,7 @@ from contextvars import ContextVar, copy_context
 from http.cookiejar import CookieJar, DefaultCookiePolicy
 from queue import Empty, SimpleQueue
 from threading import Lock, Thread
+from types import MappingProxyType
 from typing import Any, TypeVar, cast
 from weakref import WeakSet
 
@@ -87,10 +88,17 @@ class UnusableReplyError(BrokenReplyError):
     """An LLM's server answered, so that the request is paid for, but with nothing that can be used."""
 
 
-def within(seconds: float, action: Callable[[], T], *, never: Collection[str] = (), withheld: str = "") -> T:
+def within(
+    seconds: float,
+    action: Callable[[], T],
+    *,
+    never: Collection[str] = (),
+    withheld: Mapping[str, str] = MappingProxyType({}),
+) -> T:
     """Return what an action returns, or give it up after so many seconds and cut its connections.
 
-    Nothing is sent to the hosts ``never``, and no header with a key that is ``withheld``.
+    Nothing is sent to the hosts ``never``, and no key that is ``withheld``: each with whose it is, and what
+    to do.
 
     Raises:
         TimeoutError: if it has not returned by then.
@@ -153,7 +161,7 @@ def _is_importing(thread: Thread) -> bool:
 class _Call:
     """The connections of one call, why a reply was refused, and what was wrong with the last one."""
 
-    def __init__(self, never: Collection[str], withheld: str) -> None:
+    def __init__(self, never: Collection[str], withheld: Mapping[str, str]) -> None:
         self.never, self.withheld = never, withheld
         self.refusal = ""
         self.fault: BrokenReplyError | None = None
@@ -228,9 +236,9 @@ class _Guarded(httpx.BaseTransport):
         if request.url.host in call.never:
             own = f"the address of your server: {setting('api_base', 'URL')}"
             call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
-        keys = [value.removeprefix("Bearer ").strip() for value in request.headers.values()]
-        if call.withheld and call.withheld in keys:
-            call.refuse(f"nothing was sent: OpenAI's key would have gone to {request.url.host}")
+        for value in request.headers.values():
+            if advice := call.withheld.get(value.removeprefix("Bearer ").strip()):
+                call.refuse(f"nothing was sent to {request.url.host}: it would have got {advice}")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"
         # Compressed, a small reply could fill the memory.

@@ -14,7 +14,7 @@ from falsifier.errors import SpecError, did_you_mean, in_section, naming, settin
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
-from falsifier.problem.ranges import check_number, search_space, string_values
+from falsifier.problem.ranges import search_space, string_values
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 from falsifier.problem.shorthand import searching, stated_as
@@ -282,7 +282,6 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                     f"{did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
-            check_number(variable)
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:

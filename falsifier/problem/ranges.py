@@ -63,16 +63,11 @@ def _input(name: str, info: ModelInfo) -> Variable:
         raise SpecError(f"the {info.noun} has one input with two names: use {info[name].alias_of!r} instead")
     _check_unconnected(name, info)
     variable = _variable(name, info.inputs, f"the {info.noun} has no such input")
-    check_number(variable)
-    return variable
-
-
-def check_number(variable: Variable) -> None:
-    """Refuse an input that is a string: it keeps its start value."""
-    if variable.causality == "input" and variable.kind == "string":
+    if variable.kind == "string":
         raise SpecError(
             "this input is a string; it keeps its start value, and can be neither set nor searched"
         )
+    return variable
 
 
 def _parameter(name: str, info: ModelInfo) -> Variable:

@@ -156,7 +156,7 @@ def test_the_key_of_openai_goes_to_no_other_provider(llm: str, monkeypatch: pyte
     monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
     with serving(Step("an answer")) as server:
         with pytest.raises(
-            ChatError, match=r"OpenAI's key would have gone to 127\.0\.0\.1; set .*_API_KEY"
+            ChatError, match=r"sent to 127\.0\.0\.1: it would have got the key of OpenAI; set .*_API_KEY"
         ) as caught:
             connect(llm, api_base=server.url, attempts=1).complete(QUESTION)
         assert not server.received and "sk-openai" not in str(caught.value)

@@ -220,5 +220,6 @@ def test_strings_are_no_numbers() -> None:
         section = {"in": InputSection.model_validate(stated)}
         with pytest.raises(SpecError, match="this input is a string; it keeps its start value"):
             search_space(section, {}, info, 1.0, ModelChanges())
-    with pytest.raises(SpecError, match="this input is a string"):
-        placed(changes_from_options(values=["in=boom"]), info)
+    changes = placed(changes_from_options(values=["in=boom"]), info)
+    with pytest.raises(SpecError, match=r"^inputs\.in: this input is a string"):
+        search_space(changes.inputs, {}, info, 1.0, changes)
