@@ -99,7 +99,7 @@ def _type(said: Mapping[str, Any]) -> str:
     if "enum" in said:
         return ", ".join(f'`"{value}"`' for value in said["enum"])
     if "prefixItems" in said:
-        return f"`[{', '.join(each['type'] for each in said['prefixItems'])}]`"
+        return f"`[{', '.join(_type(each) for each in said['prefixItems'])}]`"
     if said["type"] == "array":
         return f"list of {said['items']['type']}s"
     if said["type"] == "object":

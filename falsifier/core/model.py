@@ -120,6 +120,12 @@ class Variable:
             return {"false": 0.0, "true": 1.0}.get(word.lower())
         return float(self.literals[word]) if word in self.literals else None
 
+    @property
+    def or_name(self) -> str:
+        """What can be given in place of a number, in words; empty if nothing can."""
+        names = ("true", "false") if self.kind == "boolean" else self.literals
+        return f" or one of {', '.join(names)}" if names else ""
+
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""
         numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))

@@ -16,10 +16,11 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean
+from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean, shown
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem
+from falsifier.problem.ranges import string_value
 from falsifier.stl import Formula, Monitor
 from falsifier.stl.monitor import Verdict
 
@@ -113,7 +114,8 @@ def simulate(
         inputs: a signal, or for a constant one a number or the name of an enumeration's item, by input name;
             or a CSV file of inputs; or a candidate with its parameters. Other inputs keep the problem's fixed
             or the model's start values.
-        parameters: values, or names of items, by name; others keep the problem's or the model's values.
+        parameters: values, names of items or texts of strings, by name; others keep the problem's or the
+            model's values.
 
     Raises:
         CandidateError: if a name is not an input, or not a parameter or start value that can be set, or a
@@ -147,9 +149,13 @@ def simulate(
             raise CandidateError(f"the model has no parameter {name!r} to set; {near}")
     signals = {name: _signal(info[name], given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}
-    numbers = {n: finite(f"parameters.{n}", _plain(info[n], value)) for n, value in values.items()}
+    strings = {n: _text(f"parameters.{n}", v) for n, v in values.items() if info[n].kind == "string"}
+    numbers = {n: _number(f"parameters.{n}", info[n], v) for n, v in values.items() if n not in strings}
     _check_types(info, signals, numbers)
-    return evaluate_any(replace(problem, parameters=fixed), Candidate(signals, numbers, "user"))
+    strings = dict(problem.experiment.strings) | strings
+    experiment = replace(problem.experiment, strings=tuple(strings.items()))
+    problem = replace(problem, parameters=fixed, experiment=experiment)
+    return evaluate_any(problem, Candidate(signals, numbers, "user"))
 
 
 def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mapping[str, float]) -> None:
@@ -175,15 +181,19 @@ def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mappin
 def _signal(variable: Variable, given: Signal | float | str) -> Signal:
     if isinstance(given, Signal):
         return given
-    number = _plain(variable, given)
-    number = finite(f"inputs.{variable.name}", number, "a finite number or a Signal(times, values)")
+    number = _number(f"inputs.{variable.name}", variable, given, " or a Signal(times, values)")
     return Signal((0.0,), (number,))
 
 
-def _plain(variable: Variable, given: object) -> object:
-    """Return the number of a truth value, or of an enumeration's item, if it is one."""
-    number = variable.number_of(given) if isinstance(given, str) else None
-    return int(given) if isinstance(given, bool) else given if number is None else number
+def _text(what: str, given: float | str) -> str:
+    return string_value(given if isinstance(given, str) else finite(what, given, "a text"), Path())
+
+
+def _number(what: str, variable: Variable, given: object, others: str = "") -> float:
+    """Return a number, or that of a truth value or of an enumeration's item."""
+    word = shown(given) if isinstance(given, bool) else given
+    number = variable.number_of(word) if isinstance(word, str) else None
+    return finite(what, given, f"a finite number{variable.or_name}{others}") if number is None else number
 
 
 def check_evaluation(problem: Problem, evaluation: Evaluation) -> None:

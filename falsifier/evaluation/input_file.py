@@ -30,8 +30,8 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     """Read input signals from a CSV file.
 
     The first row has the names. The first column is the time in s, from 0 on; a repeated time is a step. Each
-    further column is one input, linear between two rows; inputs that are not real hold their values. An array
-    may be one column, with spaces between its elements.
+    further column is one input, linear between two rows; inputs that are not real hold their values, also
+    given by the names of items. An array may be one column, with spaces between its elements.
 
     Raises:
         SpecError: naming the file, the row or column and what is wrong.
@@ -101,27 +101,28 @@ def _time(cell: str, before: Sequence[float], line: int) -> float:
 
 
 def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell: str, what: str) -> None:
-    parts = cell.split()
-    if not parts:
+    parts = cell.split() if len(column) > 1 else [cell.strip()]  # names of items may have spaces
+    if not any(parts):
         raise SpecError(
             f"{what}: the cell is empty; expected {'a number' if len(column) == 1 else 'numbers'}"
         )
     if len(parts) != len(column):
         raise SpecError(f"{what}: {len(parts)} numbers, expected {len(column)}")
     for variable, part in zip(column, parts, strict=True):
-        number = _number(part, what)
+        named = variable.number_of(part)
+        number = _number(part, what, variable.or_name) if named is None else named
         if expected := variable.expected(number):
             raise SpecError(f"{what}: {number:g}: {expected}")
         values[variable.name].append(number)
 
 
-def _number(text: str, what: str) -> float:
+def _number(text: str, what: str, others: str = "") -> float:
     try:
         number = float(text)
     except ValueError:
         number = float("nan")
     if not isfinite(number):
-        raise SpecError(f"{what}: expected a number, got {text!r}")
+        raise SpecError(f"{what}: expected a number{others}, got {text!r}")
     return number
 
 

@@ -18,12 +18,14 @@ from pydantic import (
     Field,
     ValidationError,
     ValidationInfo,
+    WrapValidator,
 )
 
 from falsifier.core.literals import printable
 from falsifier.core.signals import Interpolation
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import objects_in, without_thoughts
+from falsifier.problem.sections import no_truth
 
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _RUN = re.compile(rf"\s*({_NUMBER.pattern})\s*[x×*]\s*(\d+)\s*", re.ASCII)
@@ -40,6 +42,9 @@ _SHOWN_BEFORE, _SHOWN_KEYS = 24, 10
 _PARTS = frozenset({"signals", "parameters", "point"})
 _KEYS = _PARTS | {"candidates", "lessons", "rationale"}
 _KEYS |= {"name", "value", "values", "points", "times", "interpolation"}
+
+
+_NumberOrTruth = Annotated[float, WrapValidator(lambda v, read: v if isinstance(v, bool) else read(v))]
 
 
 def _unrolled(found: Any) -> Any:
@@ -133,7 +138,7 @@ class WrittenSignal(_Part):
 
     name: str
     values: Annotated[list[float], FailFast(), BeforeValidator(_unrolled)]
-    times: Annotated[list[float] | None, FailFast()] = None
+    times: Annotated[list[Annotated[float, BeforeValidator(no_truth)]] | None, FailFast()] = None
     interpolation: Interpolation | None = None
 
 
@@ -156,7 +161,7 @@ class WrittenCandidate(BaseModel):
     parameters: Annotated[list[WrittenParameter], FailFast(), BeforeValidator(_parameters_by_name)] = Field(
         default_factory=list
     )
-    point: Annotated[list[float] | None, FailFast(), BeforeValidator(_unrolled)] = None
+    point: Annotated[list[_NumberOrTruth] | None, FailFast(), BeforeValidator(_unrolled)] = None
 
 
 def candidates_in(text: str) -> list[dict[str, Any]]:

@@ -145,11 +145,14 @@ class ReplyForm:
         except SpecError as error:
             raise RejectedReplyError(f"input {quoted(written.name)}: {error}") from None
 
-    def _decoded(self, numbers: list[float], rationale: str, origin: str) -> Candidate:
-        dimensions = self.space.dimensions
-        if len(numbers) != len(dimensions):
-            raise RejectedReplyError(f"expected {counted(len(dimensions), 'number')}, got {len(numbers)}")
-        numbers = [_clamped(v, d) for v, d in zip(numbers, dimensions, strict=True)]
+    def _decoded(self, written: Sequence[float], rationale: str, origin: str) -> Candidate:
+        dimensions, ranges = self.space.dimensions, {r.name: r for r in self.space.ranges}
+        if len(written) != len(dimensions):
+            raise RejectedReplyError(f"expected {counted(len(dimensions), 'number')}, got {len(written)}")
+        for place, (value, d) in enumerate(zip(written, dimensions, strict=True), start=1):
+            if isinstance(value, bool) and not _is_truth(ranges[d.name]):
+                raise RejectedReplyError(f"number {place}: {quoted(str(value).lower())} is no number")
+        numbers = [_clamped(v, d) for v, d in zip(written, dimensions, strict=True)]
         outside = [
             f"number {place}: {value:g} is outside its range [{d.low:g}, {d.high:g}]"
             for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1)
@@ -158,7 +161,6 @@ class ReplyForm:
         if outside and not self.named:
             more = f"; and {len(outside) - _MOST_OUTSIDE} more" if len(outside) > _MOST_OUTSIDE else ""
             raise RejectedReplyError("; ".join(outside[:_MOST_OUTSIDE]) + more)
-        ranges = {r.name: r for r in self.space.ranges}
         for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1):
             _check_possible(value, ranges[d.name], f"number {place}")
         try:

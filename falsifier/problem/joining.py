@@ -14,7 +14,7 @@ from falsifier.errors import SpecError, did_you_mean, in_section, naming, settin
 from falsifier.fmu import System, is_package, read_info, read_package
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
-from falsifier.problem.ranges import search_space, string_values
+from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
 from falsifier.problem.shorthand import searching, stated_as
@@ -277,14 +277,17 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
         with naming(stated_as(kind, name, searched=section.value is None)):
             if name not in info:
                 names = [v.name for v in info.variables if v.settable or v.causality == "input"]
+                cut = next((n for n in names if n.startswith(f"{name}=")), "")
+                near = f"write [inputs.NAME] or [parameters.NAME] with {cut!r} in a spec" if cut else ""
                 raise SpecError(
                     f"the {info.noun} has no input, parameter or start value {name!r}; "
-                    f"{did_you_mean(name, names)}"
+                    f"{near or did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:
+                value_kind(variable)
                 raise SpecError(f"is no input: {searching(kind, name)} searches it, without control points")
             else:
                 parameters[name] = ParameterSection.model_validate(stated)

@@ -8,7 +8,7 @@ from falsifier.core.literals import shortest
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, ValueKind
 from falsifier.errors import SpecError, did_you_mean, in_section, naming
-from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, in_order
 from falsifier.problem.shorthand import named_file, searching, stated_as
 
 # Number of control points of an input of which nobody states it: both ends, the middle and two in between.
@@ -37,7 +37,7 @@ def search_space(
         with _stated("inputs", name, changes.inputs.get(name)):
             variable = _input(name, info)
             if section.value is not None:
-                fixed[name] = _fixed(variable, section.value)
+                fixed[name] = _number(variable, section.value, "value")
             else:
                 searched.append(_input_range(variable, section))
     for name, parameter in parameters.items():
@@ -46,7 +46,7 @@ def search_space(
             if parameter.range is not None:
                 ranges.append(_parameter_range(variable, parameter.range))
             elif parameter.value is not None and variable.kind != "string":
-                fixed[name] = _fixed(variable, parameter.value)
+                fixed[name] = _number(variable, parameter.value, "value")
     return SearchSpace(tuple(searched), tuple(ranges), stop_time), fixed
 
 
@@ -99,14 +99,14 @@ def _variable(name: str, variables: Iterable[Variable], otherwise: str) -> Varia
 
 def _input_range(variable: Variable, section: InputSection) -> InputRange:
     """Return the searched input for a section, completed from the FMU's min, max, unit and description."""
-    low, high = section.range or variable.limits
+    low, high = _ends(variable, section.range) if section.range else variable.limits
     if low is None or high is None:
         raise SpecError(
             "the FMU specifies no min and max for this input; add its range: "
             f"{searching('inputs', variable.name)}, or range = [low, high] in a spec",
             key="range",
         )
-    _check(variable, low, high)
+    _check(variable, "range", low, high)
     discrete = variable.kind != "real"
     interpolation = section.interpolation or ("constant" if discrete else "pchip")
     if discrete and interpolation != "constant":
@@ -123,52 +123,59 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
         free=Freedom(**section.free.model_dump()) if section.free else None,
         unit=variable.unit,
         description=variable.description,
-        kind=_value_kind(variable),
+        kind=value_kind(variable),
         items=tuple(variable.literals.items()),
     )
 
 
-def _parameter_range(variable: Variable, limits: tuple[float, float]) -> ParameterRange:
+def _parameter_range(variable: Variable, given: tuple[float | str, float | str]) -> ParameterRange:
     """Return the searched parameter, completed from the FMU's start value, unit and description."""
-    _check(variable, *limits)
+    kind, limits = value_kind(variable), _ends(variable, given)
+    _check(variable, "range", *limits)
     return ParameterRange(
         variable.name,
         *limits,
         nominal=variable.start_number,
         unit=variable.unit,
         description=variable.description,
-        kind=_value_kind(variable),
+        kind=kind,
         items=tuple(variable.literals.items()),
     )
 
 
-def _fixed(variable: Variable, value: float | str) -> float:
+def _ends(variable: Variable, given: tuple[float | str, float | str]) -> tuple[float, float]:
+    """Return the ends of a range as numbers; only those of names have not been compared yet."""
+    low, high = (_number(variable, end, "range") for end in given)
+    try:
+        return in_order((low, high))
+    except ValueError as error:
+        raise SpecError(str(error), key="range") from None
+
+
+def _number(variable: Variable, value: float | str, key: str) -> float:
     number = variable.number_of(value) if isinstance(value, str) else value
     if number is None:
-        words = ["true", "false"] if variable.kind == "boolean" else variable.literals
-        others = f" or one of {', '.join(words)}" if words else ""
         kind = "inputs" if variable.causality == "input" else "parameters"
-        raise SpecError(
-            f"expected a number{others}, got {value!r}; to search a range: {searching(kind, variable.name)}, "
-            "or range = [low, high] in a spec",
-            key="value",
-        )
-    _check(variable, number)
+        searched = f"{searching(kind, variable.name)}, or range = [low, high] in a spec"
+        advice = f"; to search a range: {searched}" if key == "value" else ""
+        raise SpecError(f"expected a number{variable.or_name}, got {value!r}{advice}", key=key)
+    if key == "value":
+        _check(variable, key, number)
     return number
 
 
-def _check(variable: Variable, low: float, high: float | None = None) -> None:
-    """Check a range, or a single value, against the variable's type and the FMU's min and max."""
-    key, shown, high = ("value", f"{low:g}", low) if high is None else ("range", f"[{low:g}, {high:g}]", high)
-    with in_section(key=key):
-        if excess := variable.excess(low, high):
-            raise SpecError(f"{shown} {excess}")
-        # Whether a range contains such a number is checked by the range itself.
-        if key == "value" and (expected := variable.expected(low)):
-            raise SpecError(f"{shown}: {expected}")
+def _check(variable: Variable, key: str, *numbers: float) -> None:
+    """Check the ends of a range, or a single value, against the variable's type and the FMU's min and max."""
+    shown = f"{numbers[0]:g}" if key == "value" else "[{:g}, {:g}]".format(*numbers)
+    if excess := variable.excess(numbers[0], numbers[-1]):
+        raise SpecError(f"{shown} {excess}", key=key)
+    # Whether a range contains such a number is checked by the range itself.
+    if key == "value" and (expected := variable.expected(numbers[0])):
+        raise SpecError(f"{shown}: {expected}", key=key)
 
 
-def _value_kind(variable: Variable) -> ValueKind:
+def value_kind(variable: Variable) -> ValueKind:
+    """Return the type of a variable's values; SpecError if they are texts."""
     if variable.kind == "string":
         raise SpecError(f"{variable.name!r} is a string; only numbers can be searched")
     return variable.kind
@@ -179,7 +186,12 @@ def string_values(
 ) -> tuple[tuple[str, str], ...]:
     """Return the values of string parameters; files are named relative to the spec's folder."""
     return tuple(
-        (name, named_file(v, folder) if isinstance(v := section.value, str) else shortest(v))
+        (name, string_value(section.value, folder))
         for name, section in parameters.items()
         if section.value is not None and info[name].kind == "string"
     )
+
+
+def string_value(given: float | str, folder: Path) -> str:
+    """Return the text that a string gets; files are named relative to the folder."""
+    return named_file(given, folder) if isinstance(given, str) else shortest(given)

@@ -1,6 +1,8 @@
 """The sections of a spec file."""
 
 from collections.abc import Mapping
+from numbers import Real
+from sys import float_info
 from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -14,33 +16,49 @@ from falsifier.errors import did_you_mean, shown
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 
-def _no_text(value: Any) -> Any:
-    if isinstance(value, str):  # pydantic would take "5" for 5
+def no_truth(value: Any) -> Any:
+    """Refuse a truth value, which pydantic would take for 0 or 1."""
+    if isinstance(value, bool):
         raise ValueError(f"expected a number, got {shown(value)}")
     return value
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, bool):  # and true for 1, which only a value of a Boolean variable may be
+    if isinstance(value, str):  # pydantic would take "5" for 5
         raise ValueError(f"expected a number, got {shown(value)}")
-    return _no_text(value)
+    return no_truth(value)
+
+
+def _number_or_word(value: Any) -> float | str:
+    """Truth values are words like names of items: the variable knows the numbers that they stand for."""
+    if isinstance(value, bool | str):
+        return value if isinstance(value, str) else shown(value)
+    is_number = isinstance(value, Real)
+    if is_number and abs(value) <= float_info.max:
+        return float(value)
+    kind = "a finite number" if is_number else "a number or text"
+    raise ValueError(f"expected {kind}, got {shown(value)}")
 
 
 # A path, or a text with one: all that users name is recorded.
 Recordable = Annotated[str, AfterValidator(utf_8)]
-Number = Annotated[float, BeforeValidator(_no_text), Field(allow_inf_nan=False)]
-Bound = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
+Number = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
+Value = Annotated[float | str, BeforeValidator(_number_or_word)]
 Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
+Truth = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, BeforeValidator(_plain)]
 
 
-def _in_order(limits: tuple[float, float]) -> tuple[float, float]:
+def in_order(limits: tuple[float, float]) -> tuple[float, float]:
+    """Return the ends of a range; ValueError if the first one is not the smaller one."""
     if not limits[0] < limits[1]:
         raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
     return limits
 
 
-Range = Annotated[tuple[Bound, Bound], AfterValidator(_in_order)]
+Range = Annotated[tuple[Number, Number], AfterValidator(in_order)]
+# Of a variable, whose items' names stand for numbers that are known once there is a model.
+Ends = Annotated[tuple[Value, Value], AfterValidator(lambda e: e if str in map(type, e) else in_order(e))]
 # Maximum number of control points of one input.
 MAX_CONTROL_POINTS = 10_000
 
@@ -89,7 +107,9 @@ class FreeSection(Strict):
 class InputSection(Strict):
     """One input signal: searched within a range, or kept constant."""
 
-    range: Range | None = Field(None, description="[low, high]; default: the FMU's min and max.")
+    range: Ends | None = Field(
+        None, description="[low, high], numbers or names of items; default: the FMU's min and max."
+    )
     control_points: Count | None = Field(
         None,
         ge=1,
@@ -104,7 +124,7 @@ class InputSection(Strict):
     free: FreeSection | None = Field(
         None, description="Limits within which engines may choose the control points."
     )
-    value: Number | str | None = Field(
+    value: Value | None = Field(
         None, description="Keep this input constant: a number, or the name of an enumeration's item."
     )
 
@@ -124,8 +144,8 @@ class InputSection(Strict):
 class ParameterSection(Strict):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
-    range: Range | None = Field(None, description="[low, high] to search within.")
-    value: Number | str | None = Field(
+    range: Ends | None = Field(None, description="[low, high] to search within; numbers or names of items.")
+    value: Value | None = Field(
         None,
         description="Fixed value: a number, the name of an enumeration's item, or the text of a string. A "
         "file is named relative to the spec file.",
@@ -161,7 +181,7 @@ class ModelSection(Strict):
         None,
         description="Maximum wall-clock time of one simulation in s; default: 60 per tenth of its stop time.",
     )
-    logging: bool = Field(default=False, description="Ask the FMU for its messages in every simulation.")
+    logging: Truth = Field(default=False, description="Ask the FMU for its messages in every simulation.")
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
     omit: tuple[str, ...] = Field((), description="Outputs not to record, such as one that becomes NaN.")
     allow: tuple[str, ...] = Field(
@@ -233,7 +253,7 @@ class ContextSection(Strict):
     files: tuple[str, ...] = Field(
         (), description="Simulink files, sources and documents, relative to the spec file."
     )
-    fmu: bool = Field(default=False, description="Also documentation, sources and texts inside the FMU.")
+    fmu: Truth = Field(default=False, description="Also documentation, sources and texts inside the FMU.")
     checked: tuple[str, ...] = Field(
         (), description="Of these files, those with a line that looks like a key or password but is not."
     )
@@ -253,7 +273,7 @@ class ModelChanges(Strict):
     step_size: Seconds | None = None
     tolerance: Seconds | None = None
     time_limit: Seconds | None = None
-    logging: bool | None = None
+    logging: Truth | None = None
     omit: tuple[str, ...] = ()
     allow: tuple[Recordable, ...] = ()
     deny: tuple[str, ...] = ()

@@ -24,20 +24,21 @@ _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
-# A constant value or the name of an item; (low, high) to search, with the spec's control points or else free;
-# (low, high, points) or (low, high, points, interpolation) to search with these; None to search between the
-# FMU's min and max; or a complete section of a spec.
+# A number or the name of an item.
+Value = float | str
+# A constant value; (low, high) to search, with the spec's control points or else free; (low, high, points) or
+# (low, high, points, interpolation) to search with these; None to search between the FMU's min and max; or a
+# complete section of a spec.
 InputChoice = (
-    float
-    | str
-    | tuple[float, float]
-    | tuple[float, float, int]
-    | tuple[float, float, int, str]
+    Value
+    | tuple[Value, Value]
+    | tuple[Value, Value, int]
+    | tuple[Value, Value, int, str]
     | InputSection
     | None
 )
-# A value, the name of an item or text for a string, a range to search, or a complete section of a spec.
-ParameterChoice = float | str | tuple[float, float] | ParameterSection
+# A value, or text for a string; a range to search; or a complete section of a spec.
+ParameterChoice = Value | tuple[Value, Value] | ParameterSection
 
 Choice = TypeVar("Choice")
 
@@ -143,14 +144,17 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
 
 def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:
     if section.value is not None:
-        value = section.value if isinstance(section.value, str) else shortest(section.value)
-        return "--set", f"{name}={value}"
+        return "--set", f"{name}={_said(section.value)}"
     if section.range is None:
         return "--search", name
-    said = list(map(shortest, section.range))
+    said = list(map(_said, section.range))
     if isinstance(section, InputSection) and section.control_points is not None:
         said += [str(section.control_points), *([section.interpolation] if section.interpolation else [])]
     return "--search", f"{name}={':'.join(said)}"
+
+
+def _said(value: float | str) -> str:
+    return value if isinstance(value, str) else shortest(value)
 
 
 def _input_section(name: str, choice: InputChoice) -> object:
@@ -225,17 +229,25 @@ def _range(option: str) -> tuple[str, InputChoice]:
     if name and not equals:
         return name, None
     try:
-        low, high, *more = said.split(":")
+        low, high, *more = (part.strip() for part in said.split(":"))
         points = [int(number) for number in more[:1]]
-        choice: Any = (float(low), float(high), *points, *more[1:])
-        if name and len(choice) <= 4:
+        choice: Any = (_end(low), _end(high), *points, *more[1:])
+        if name and low and high and len(choice) <= 4:
             return name, choice
-    except ValueError:  # of a number, or because there is no colon
+    except ValueError:  # of the points, or because there is no colon
         pass
     raise SpecError(
         f"--search {option}: expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search "
-        f"{name or 'throttle'}=0:100:7; to keep it constant: --set {name or 'throttle'}=50"
+        f"{name or 'throttle'}=0:100:7; to keep it constant: --set {name or 'throttle'}=VALUE"
     )
+
+
+def _end(said: str) -> float | str:
+    """Return an end of a range: a number, or else the name of an item."""
+    try:
+        return float(said)
+    except ValueError:
+        return said
 
 
 def requirement_of(text: str) -> AnyRequirement:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_serial
 
 from falsifier.errors import SpecError, first_fault
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
-from falsifier.problem.sections import ModelChanges, Recordable
+from falsifier.problem.sections import ModelChanges, Number, Recordable
 
 # Name of the requirement that a formula makes if it is given without a name.
 STL_NAME = "stl"
@@ -71,7 +71,7 @@ class ProblemSource(BaseModel):
     stl_name: str = STL_NAME
     profile: str | None = None
     parameterization: Parameterization = "free"
-    shortest_piece: float | None = None
+    shortest_piece: Number | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
     context: tuple[Recordable, ...] = ()
 

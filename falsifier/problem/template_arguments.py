@@ -3,13 +3,12 @@
 from math import floor, inf, isfinite
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from falsifier.core.literals import shortest
 from falsifier.errors import FormulaError, SpecError
-from falsifier.problem.sections import ModelChanges
-from falsifier.stl import parse
-from falsifier.stl.expression import Number
+from falsifier.problem.sections import ModelChanges, Number, no_truth
+from falsifier.stl import expression, parse
 from falsifier.stl.formula import Predicate
 
 # Decimals of times in s; finer than any grid.
@@ -38,7 +37,7 @@ def _term(text: str | float) -> str | float:
         raise ValueError(str(error)) from None
     if not isinstance(formula, Predicate):
         raise ValueError(f"expected a signal or an expression such as y2 - y1, got the formula {text}")
-    return formula.left.value if isinstance(formula.left, Number) else str(formula.left)
+    return formula.left.value if isinstance(formula.left, expression.Number) else str(formula.left)
 
 
 def _condition(text: str) -> str:
@@ -78,12 +77,11 @@ def share_of(margin: float | str) -> float | None:
         return None
 
 
-Term = Annotated[str | float, AfterValidator(_term)]
+Term = Annotated[str | float, BeforeValidator(no_truth), AfterValidator(_term)]
 Condition = Annotated[str, AfterValidator(_condition)]
-Margin = Annotated[float | str, AfterValidator(_margin)]
-Moment = Annotated[float | str, AfterValidator(_moment)]
-Duration = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Margin = Annotated[float | str, BeforeValidator(no_truth), AfterValidator(_margin)]
+Moment = Annotated[float | str, BeforeValidator(no_truth), AfterValidator(_moment)]
+Duration = Annotated[Number, Field(ge=0)]
 
 
 # -- parts of formulas, as text ------------------------------------------------------------------------------
@@ -126,7 +124,7 @@ class Template(ModelChanges):
     summary: ClassVar[str] = ""
 
     description: str = Field("", description="Its meaning in words.")
-    during: tuple[Finite, Finite] | None = Field(
+    during: tuple[Number, Number] | None = Field(
         None, description="[start, end] in s; default: as long as the simulation allows."
     )
 

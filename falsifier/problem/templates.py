@@ -23,12 +23,11 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from falsifier.errors import FormulaError
-from falsifier.problem.sections import Range, Seconds
+from falsifier.problem.sections import Count, Number, Range, Seconds
 from falsifier.problem.template_arguments import (
     Clock,
     Condition,
     Duration,
-    Finite,
     Margin,
     Moment,
     Template,
@@ -221,7 +220,7 @@ class RampLimit(Template):
 
     template: Literal["ramp_limit"]
     signal: Term = _SIGNAL
-    limit: Finite = Field(gt=0, description="Largest change per second, in the signal's unit.")
+    limit: Number = Field(gt=0, description="Largest change per second, in the signal's unit.")
     rate: Term | None = Field(
         None, description="Signal that is its rate of change; default: der(signal), unless over is given."
     )
@@ -229,7 +228,7 @@ class RampLimit(Template):
         None, description="Without a rate: time in s over which changes are judged, with range and levels."
     )
     range: Range | None = Field(None, description="With over: [low, high] of the signal.")
-    levels: int = Field(20, ge=1, le=_MOST_LEVELS, description="With over: number of levels in the range.")
+    levels: Count = Field(20, ge=1, le=_MOST_LEVELS, description="With over: number of levels in the range.")
 
     @model_validator(mode="after")
     def _one_way(self) -> "RampLimit":

@@ -3,17 +3,28 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
 from falsifier.llm import Effort
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address, check_option_values, stated_address
+from falsifier.problem.sections import no_truth
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 
+_Number = Annotated[float, BeforeValidator(no_truth), Field(allow_inf_nan=False)]
+_Count = Annotated[int, BeforeValidator(no_truth)]
 # A negative price, or one that is not a number, would switch off the limit on the cost.
-_Price = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+_Price = Annotated[_Number, Field(ge=0)]
 
 # Which trajectories a record keeps. history: the first ones, then each that improves on the best; best: only
 # the best one, for campaigns of very many runs.
@@ -36,15 +47,15 @@ class LLMSettings(Strict):
     effort: Effort | None = None
     api_base: str | None = None
     variant: str | None = Field(default=None, description="Prompt variant; default: the best one.")
-    options: dict[str, str | int | float] = Field(
+    options: dict[str, str | int | float | bool] = Field(
         default_factory=dict, description="Passed to litellm unchanged."
     )
     price: tuple[_Price, _Price] | None = Field(
         default=None,
         description="US dollars per million tokens sent, and per million received; default: litellm's table.",
     )
-    timeout: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False, description="Seconds to wait for one reply; default: 600."
+    timeout: _Number | None = Field(
+        default=None, gt=0, description="Seconds to wait for one reply; default: 600."
     )
     anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
@@ -75,7 +86,7 @@ class LLMSettings(Strict):
 
     @field_validator("options")
     @classmethod
-    def _without_keys(cls, options: dict[str, str | int | float]) -> dict[str, str | int | float]:
+    def _without_keys(cls, options: dict[str, Any]) -> dict[str, Any]:
         for name in filter(is_secret_option, options):
             raise ValueError(
                 f"{name}: may contain a key; keys are read from the environment only, because requests are "
@@ -99,9 +110,9 @@ class RunRequest(Strict):
     )
     engine: str | None = None
     llm: LLMSettings | None = None
-    seed: int = Field(default=0, ge=0)
+    seed: _Count = Field(default=0, ge=0)
     budget: Budget = Budget()
-    jobs: int = Field(default=1, ge=1)
+    jobs: _Count = Field(default=1, ge=1)
     keep: Keep = "history"
     start_from: tuple[dict[str, Any], ...] = Field(
         default=(), description="Known candidates, simulated before those of the engine."

@@ -12,6 +12,7 @@ INFO = ModelInfo(
     variables=(
         Variable("u", causality="input"),
         Variable("gear", kind="integer", causality="input"),
+        Variable("mode", kind="enumeration", causality="input", literals={"Off": 1, "Hill hold": 3}),
         Variable("=v", causality="input"),
         *(Variable(f"w[{i}]", causality="input") for i in (1, 2)),
         Variable("speed", causality="output"),
@@ -39,8 +40,10 @@ def test_a_repeated_time_is_a_step_with_the_later_value(tmp_path: Path) -> None:
 
 
 def test_integers_hold_their_values_between_rows(tmp_path: Path) -> None:
-    gear = read_inputs(written(tmp_path, "t,gear\n0,1\n2,2\n4,2\n"), INFO).signals["gear"]
+    text = "t,gear,mode\n0,1,Off\n2,2, Hill hold\n4,2,3\n"
+    gear, mode = read_inputs(written(tmp_path, text), INFO).signals.values()
     assert gear.sample(np.array([1.9, 2.0, 4.0])).tolist() == [1, 2, 2]
+    assert mode.sample(np.array([1.9, 2.0, 4.0])).tolist() == [1, 3, 3]
 
 
 def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
@@ -61,6 +64,7 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
         ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2"),
         ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),
         ("t,u\n0,nan\n", "row 2, column u"),
+        ("t,mode\n0,on\n", "column mode: expected a number or one of Off, Hill hold, got 'on'"),
         ("t,u\n3,1\n", "first time must be 0 s"),
         ("t,u\n0,1\n2,1\n1,1\n", "row 4: time 1 s is before 2 s"),
         ("t,u\n0,\n", "row 2, column u: the cell is empty; expected a number"),

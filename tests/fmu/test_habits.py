@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.signals import Signal
-from falsifier.errors import ModelError, SimulationError
+from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, simulate
 from falsifier.fmu import FmuModel, read_info
 from falsifier.problem.problem import Problem
@@ -99,10 +99,15 @@ def test_strings_can_be_set(name: str, tmp_path: Path) -> None:
     assert simulate(problem, {"u": 1.0}).robustness == -0.5
 
 
-def test_a_string_that_names_no_file_reaches_the_model_as_it_is() -> None:
+def test_a_string_that_names_no_file_reaches_the_model_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "gain.txt"
     problem = Problem.from_fmu(
         fixtures.path("Table_2"), "G[0,1] (y <= 2)", parameters={"fileName": "gone.txt"}
     )
+    file.write_text("2.5")
+    assert simulate(problem, {"u": 1.0}, {"fileName": str(file)}).robustness == -0.5
+    with pytest.raises(SpecError, match=r"parameters\.fileName: expected a text, got None"):
+        simulate(problem, {}, {"fileName": None})  # type: ignore[dict-item]
     evaluation = simulate(problem, {"u": 1.0})
     assert evaluation.status == "failed" and "the table cannot be read" in evaluation.reason
 

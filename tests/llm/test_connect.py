@@ -196,6 +196,7 @@ def test_an_address_has_no_blanks(address: str) -> None:
         ({"top_p": float("nan")}, "top_p: expected a finite number, got nan"),
         ({"max_tokens": "many"}, "max_tokens: expected an integer from 1 on, got 'many'"),
         ({"max_tokens": 0}, "max_tokens: expected an integer from 1 on, got 0"),
+        ({"max_tokens": True}, "max_tokens: expected an integer from 1 on, got True"),
         ({"max_completion_tokens": 2.5}, "max_completion_tokens: expected an integer from 1 on, got 2.5"),
     ],
 )

@@ -198,6 +198,7 @@ def discrete(door: Any = 0, on: Any = 0, gear: Any = 1, **reply: Any) -> Any:
         {"door": [" LOCK", "open"], "on": ["True", "FALSE"], "gear": 3},
         {"door": ["2 = Lock", "0 = Open"], "on": ["1 = true", False], "gear": 3},
         {"signals": {"door": ["Lock", 0], "on": [[0, "true"], [5, 0]]}, "parameters": {"gear": 3}},
+        {"point": [2, 0, True, False, 3]},
     ],
     ids=str,
 )
@@ -219,6 +220,11 @@ def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
         ({"gear": 2.7}, "parameter 'gear': 2.7 is no whole number; the nearest is 3"),
         ({"gear": 5.3}, "parameter 'gear': 5.3 is no whole number; the nearest is 5"),
         ({"gear": 6}, "parameter 'gear': 6 is outside its range"),
+        ({"point": [0, 0, 1, 0, True]}, "number 5: 'true' is no number"),
+        (
+            {"signals": [{"name": "on", "values": [1, 0], "times": [0, True]}]},
+            "times.1 (of 'on'): Value error",
+        ),
         ({"point": [0, 0, 0.4, 0, 1]}, "number 3: 0.4 is no whole number; the nearest is 0"),
     ],
     ids=str,

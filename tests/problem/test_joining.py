@@ -203,10 +203,19 @@ def test_items_and_truth_values_are_given_by_their_names() -> None:
     ]
     info = ModelInfo("m", variables=tuple(kinds))
     inputs = {"mode": InputSection(value="On")}
-    parameters = {"flag": ParameterSection(value="True")}
-    assert search_space(inputs, parameters, info, 1.0, ModelChanges())[1] == {"mode": 7, "flag": 1}
-    for wrong, message in (("on", "one of Off, On, got 'on'"), ("7:8", "got '7:8'; to search a range")):
-        section = {"mode": InputSection(value=wrong)}
+    for word in ("True", True):
+        parameters = {"flag": ParameterSection.model_validate({"value": word})}
+        assert search_space(inputs, parameters, info, 1.0, ModelChanges())[1] == {"mode": 7, "flag": 1}
+    (mode,) = search_space({"mode": InputSection(range=("Off", 7))}, {}, info, 1.0, ModelChanges())[0].inputs
+    assert (mode.low, mode.high) == (1, 7)
+    for wrong, message in (
+        ({"value": "on"}, r"mode\.value: .*one of Off, On, got 'on'"),
+        ({"value": "7:8"}, "got '7:8'; to search a range"),
+        ({"value": True}, "one of Off, On, got 'true'"),
+        ({"range": ("Off", "on")}, r"mode\.range: .*one of Off, On, got 'on'$"),
+        ({"range": ("On", "Off")}, r"expected \[low, high\] with low < high, got \[7, 1\]"),
+    ):
+        section = {"mode": InputSection.model_validate(wrong)}
         with pytest.raises(SpecError, match=message):
             search_space(section, {}, info, 1.0, ModelChanges())
 
@@ -220,6 +229,13 @@ def test_strings_are_no_numbers() -> None:
         section = {"in": InputSection.model_validate(stated)}
         with pytest.raises(SpecError, match="this input is a string; it keeps its start value"):
             search_space(section, {}, info, 1.0, ModelChanges())
+    named = Variable("text", "string", "parameter", settable=True), Variable("a=b", settable=True)
+    with pytest.raises(SpecError, match="'text' is a string; only numbers can be searched"):
+        placed(changes_from_options(ranges=["text"]), ModelInfo("m", variables=named))
+    with pytest.raises(
+        SpecError, match=r"no input, .* 'a'; write \[inputs.NAME\] or .* with 'a=b' in a spec"
+    ):
+        placed(changes_from_options(ranges=["a=b=0:1"]), ModelInfo("m", variables=named))
     changes = placed(changes_from_options(values=["in=boom"]), info)
     with pytest.raises(SpecError, match=r"^inputs\.in: this input is a string"):
         search_space(changes.inputs, {}, info, 1.0, changes)

@@ -13,6 +13,7 @@ GOOD: dict[str, Any] = {
     "inputs": {"u": {"range": [0, 1], "control_points": 3}},
     "requirements": {"R": {"formula": "G[0,1] (y <= 1)"}},
 }
+RISE = {"template": "rise", "signal": "y", "reference": 1.0, "time": 1.0}
 
 
 def changed(path: str, value: object) -> dict[str, Any]:
@@ -38,6 +39,10 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.interpolation", "cubic", r"inputs\.u\.interpolation: .*'constant', got 'cubic'$"),
         ("inputs.u.control_points", True, r"inputs\.u\.control_points: expected a number, got true$"),
         ("model.stop_time", "50", r"model\.stop_time: expected a number, got '50'$"),
+        ("model.logging", 1, r"model\.logging: expected true or false, got 1$"),
+        ("connections", {"a.b": {"from": "c.d", "factor": True}}, r"connections\.a\.b\.factor: .*got true$"),
+        ("requirements.R", RISE | {"time": True}, r"requirements\.R\.time: expected a number, got true$"),
+        ("requirements.R", RISE | {"reference": True}, r"requirements\.R\.reference: .*number, got true$"),
         ("inputs.u.control_points", 0, r"inputs\.u\.control_points: .*greater than or equal to 1, got 0$"),
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
         ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),
