@@ -1,6 +1,7 @@
 """Joining a validated spec with its FMU: checks names and ranges, and completes defaults from the FMU."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -59,13 +60,16 @@ def join(
         SpecError: naming the file, the key and the remedy.
         ModelError: if the FMU cannot be read or simulated.
     """
-    with in_section(str(path)):
+    stating: dict[str, Spec | ModelChanges] = {"": spec}
+    with in_section(str(path)), _where_stated(stating):
         if requirement not in spec.requirements:
             raise SpecError(f"no requirement {requirement!r}; {did_you_mean(requirement, spec.requirements)}")
         if profile is not None and profile not in spec.profiles:
             near = did_you_mean(profile, spec.profiles)
             raise SpecError(f"no profile {profile!r}; {near}; without a profile: free or fixed")
-        layers, changes = spec.changes(requirement, profile), changes or ModelChanges()
+        overriding, changes = spec.changes(requirement, profile), changes or ModelChanges()
+        stating |= overriding
+        layers = list(overriding.values())
         model = model or make_model(spec, [*layers, changes], path)
         info = model.info
         layers.append(changes := placed(changes, info))
@@ -93,8 +97,8 @@ def join(
         formula = formula_of(section, info, experiment, key=key)
         known = {*space.names, *fixed, *(v.name for v in info.inputs if v.start_number is not None)}
         experiment = replace(experiment, strings=string_values(parameters, info, path.parent))
-        omitted = dict.fromkeys((*spec.model.omit, *(n for each in layers for n in each.omit)), "model.omit")
-        omitted |= dict.fromkeys(changes.omit, setting("omit"))
+        omitted = dict.fromkeys(spec.model.omit, "model.omit") | dict.fromkeys(changes.omit, setting("omit"))
+        omitted |= {name: f"{place}.omit" for place, each in overriding.items() for name in each.omit}
         return Joined(
             model,
             Requirement(name, formula, section.description),
@@ -103,6 +107,27 @@ def join(
             fixed,
             (*info.notes, *_notes(grid, model, space, experiment)),
         )
+
+
+@contextmanager
+def _where_stated(layers: Mapping[str, Spec | ModelChanges]) -> Iterator[None]:
+    """Let errors raised within name the last section, of those by their keys, that states what is wrong."""
+    try:
+        yield
+    except SpecError as error:
+        stated: dict[str, str] = {}
+        for place, section in layers.items():
+            begin = place and f"{place}."
+            stated |= {f"model.{key}": f"{begin}{key}" for key in section.model_fields_set if place}
+            for kind, found in (("inputs", section.inputs), ("parameters", section.parameters)):
+                for name, each in found.items():
+                    keys = (f"{kind}.{name}", *(f"{kind}.{name}.{key}" for key in each.model_fields_set))
+                    stated |= {key: f"{begin}{key}" for key in keys}
+        wrong = error.key or ""
+        near = max((key for key in stated if f"{wrong}.".startswith(f"{key}.")), key=len, default=None)
+        if error.file is not None or near is None:
+            raise
+        raise SpecError(error.message, key=stated[near] + wrong.removeprefix(near)) from None
 
 
 def join_formula(

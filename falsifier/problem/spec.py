@@ -94,13 +94,14 @@ class Spec(sections.Strict):
             raise ValueError("a requirement has an empty name; write [requirements.NAME]")
         return found
 
-    def changes(self, requirement: str, profile: str | None) -> list[sections.ModelChanges]:
+    def changes(self, requirement: str, profile: str | None) -> dict[str, sections.ModelChanges]:
         """Return the sections that apply to this requirement with this profile; later ones override."""
-        layers: list[sections.ModelChanges] = [self.requirements[requirement]]
+        place = f"requirements.{requirement}"
+        layers: dict[str, sections.ModelChanges] = {place: self.requirements[requirement]}
         if profile is not None:
-            layers.append(self.profiles[profile])
+            layers[f"profiles.{profile}"] = self.profiles[profile]
             if requirement in self.profiles[profile].requirements:
-                layers.append(self.profiles[profile].requirements[requirement])
+                layers[f"profiles.{profile}.{place}"] = self.profiles[profile].requirements[requirement]
         return layers
 
 

@@ -1,5 +1,7 @@
 """What is said in several places: which of them counts, and what must be said somewhere."""
 
+import copy
+import re
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
@@ -94,6 +96,25 @@ def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -
     assert named in str(caught.value)
     # The spec is named if it is to blame, or what is missing can be added to it.
     assert (str(FILE) in str(caught.value)) == (named in ("'T'", "'fine'") or named.startswith("nothing"))
+
+
+@pytest.mark.parametrize(
+    ("profile", "wrong", "key"),
+    [
+        (None, {"output_interval": 0.07}, "requirements.S.output_interval"),
+        (None, {"omit": ["sped"]}, "requirements.S.omit"),
+        (None, {"inputs": {"throttle": {"range": [0, 500]}}}, "requirements.S.inputs.throttle.range"),
+        ("coarse", {"inputs": {"throttle": {"range": [0, 500]}}}, "requirements.S.inputs.throttle.range"),
+        ("own", {"parameters": {"drive": 1}}, "profiles.own.requirements.S.parameters.drive"),
+    ],
+)
+def test_what_is_wrong_is_named_where_it_is_stated(
+    profile: str | None, wrong: dict[str, Any], key: str
+) -> None:
+    spec = copy.deepcopy(SPEC)
+    (spec["profiles"]["own"] if profile == "own" else spec)["requirements"]["S"] |= wrong
+    with pytest.raises(SpecError, match=rf"^{FILE}: {re.escape(key)}: "):
+        join(parse_spec(spec, file="my.toml"), "S", path=FILE, profile=profile)
 
 
 @pytest.mark.parametrize(

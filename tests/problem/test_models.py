@@ -86,7 +86,7 @@ WRONG = [
     (COMPONENTS + CONNECTIONS + REST.replace('"plant.T"', '"plant.u"'), "parameters.plant.u: this input"),
     (COMPONENTS + REST.replace('"pi.r"', '"pi.x"'), "inputs.pi.x: the system has no such input; did you"),
     (COMPONENTS + '[model]\ninterface = "model-exchange"\n' + REST, "set components.NAME.interface"),
-    (COMPONENTS + "step = 0.03\n[model]\noutput_interval = 0.02\n" + REST, "try step_size = 0.01"),
+    (COMPONENTS + "step = 0.03\n[model]\noutput_interval = 0.02\n" + REST, "try output_interval = 0.01"),
     (COMPONENTS + "step = 100\n" + REST, "components.pi.step: 100 s is longer than the simulation"),
     (COMPONENTS.replace("Gain_2.fmu", "inner.ssp") + REST, "an SSP package cannot be a component"),
     (COMPONENTS.replace("[components.pi]", "[components.'']") + REST, "the name of a component is empty"),

@@ -112,7 +112,7 @@ def _component(network: Network, plan: Plan, position: int, feeds: Mapping[Place
     return b"".join(parts)
 
 
-def own_steps(member: Member, step: float, stop_time: float) -> int:
+def own_steps(member: Member, step: float, stop_time: float, *, stated_as: str = "step_size") -> int:
     """Return the number of communication steps, of this many s, in a component's own step.
 
     Raises:
@@ -128,7 +128,7 @@ def own_steps(member: Member, step: float, stop_time: float) -> int:
             "never step; shorten its step",
             key=key,
         )
-    return whole_steps("step", own, "step_size", step, key=key)
+    return whole_steps("step", own, stated_as, step, key=key)
 
 
 def _is_held(description: Description, interface: Interface, name: str) -> bool:

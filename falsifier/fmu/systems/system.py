@@ -131,8 +131,9 @@ class System(Isolated):
         Raises:
             SpecError: naming the component and steps that fit.
         """
+        stated_as = "step_size" if experiment.step_size else "output_interval"
         for member in self.network.members:
-            own_steps(member, experiment.step, experiment.stop_time)
+            own_steps(member, experiment.step, experiment.stop_time, stated_as=stated_as)
 
     @property
     def order(self) -> Order:

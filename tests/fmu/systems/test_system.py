@@ -23,6 +23,10 @@ def test_own_steps_are_whole_multiples_of_the_communication_step() -> None:
         match=r"components\.pi\.step: step = 0\.25 s is not .* 0\.1 s; try step_size = 0\.05$",
     ):
         run(model, "plant.y")
+    with pytest.raises(
+        SpecError, match=r"0\.25 s is not .* output_interval = 0\.1 s; try output_interval = "
+    ):
+        model.check_steps(Experiment(1.0, 0.1, ("plant.y",)))
     model.check_steps(Experiment(1.0, 0.1, ("plant.y",), step_size=0.05))
 
 
