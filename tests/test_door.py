@@ -55,6 +55,15 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         r"fmu: expected the path.*got 3 \(int",
     ),
     "a number to read": (lambda: untyped.read_info(3), r"path: expected the path of an FMU, got 3 \(int\)"),
+    "no problems": (lambda: untyped.falsify([]), "problem: the list is empty; expected Problems, or targets"),
+    "no runs": (
+        lambda: untyped.cross(["AT1"], ["uniform"], seeds=[], budget=1),
+        "expected at least one of each",
+    ),
+    "a text of problems": (
+        lambda: untyped.cross("AT1", ["uniform"], seeds=[0], budget=1),
+        "problems: expected a list of targets",
+    ),
     "a number as model": (lambda: untyped.FmuModel(3), r"path: expected a path, got 3 \(int\)"),
     "an FMU as package": (lambda: untyped.read_package(AT), r"AT\.fmu: expected the path of an \.ssp or"),
     "a number as target": (lambda: untyped.load_problem(3), "target: expected text, got 3"),

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
-from falsifier.core.arguments import whole
+from falsifier.core.arguments import finite, whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines.layout import fixed_layout
@@ -155,7 +155,7 @@ def assess(
     """
     check_problem(problem)
     budget, seed = whole("budget", budget, least=1), whole("seed", seed, least=0)
-    if not 0.0 < confidence < 1.0:
+    if not 0.0 < finite("confidence", confidence) < 1.0:
         raise SpecError(f"confidence: expected a number between 0 and 1, got {confidence!r}")
     if not problem.space.names:
         raise SpecError("nothing to vary; give at least one input or parameter a range")

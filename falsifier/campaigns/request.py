@@ -8,6 +8,7 @@ from math import inf
 
 from pydantic import Field
 
+from falsifier.core.arguments import list_of, whole
 from falsifier.core.files import readable_part
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
@@ -107,9 +108,19 @@ def cross(
         searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
         budget: limits of each run; those of tokens and cost hold for language models.
+
+    Raises:
+        SpecError: if one of them is no list, or is empty.
     """
+    lists = (
+        list_of("problems", problems, ProblemSource | str, "targets such as 'AT1'"),
+        list_of("searchers", searchers, str | LLMSettings | tuple, "engines and language models"),
+        [whole("seeds", seed, least=0) for seed in list_of("seeds", seeds, object, "numbers")],
+    )
+    if not all(lists):
+        raise SpecError("problems, searchers and seeds: expected at least one of each")
     runs: dict[str, RunRequest] = {}
-    for problem, searcher, seed in product(problems, searchers, seeds):
+    for problem, searcher, seed in product(*lists):
         engine = searcher if isinstance(searcher, str) else None
         llm = searcher if isinstance(searcher, LLMSettings) else None
         if isinstance(searcher, tuple):

@@ -127,6 +127,8 @@ def falsify(
     if several and not isinstance(problem, Iterable):
         raise SpecError(f"expected a Problem, a target such as 'AT1' or a list, got {type(problem).__name__}")
     problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
+    if not problems:
+        raise SpecError("problem: the list is empty; expected Problems, or targets such as 'AT1'")
     check_names(problems)
     _check_engine(engine)
     seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)

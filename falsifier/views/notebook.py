@@ -68,7 +68,7 @@ def evaluation_html(evaluation: Evaluation) -> str:
     units = evaluation.trajectory.units if evaluation.trajectory else {}
     failed = [("status", f"{evaluation.status}: {evaluation.reason}")] if verdict is None else []
     origin = ": ".join(part for part in (candidate.origin, candidate.rationale) if part)
-    facts = [*failed, *broken_facts(verdict), *candidate_facts(candidate), *margin_facts(verdict, units)]
+    facts = [*failed, *broken_facts(verdict), *candidate_facts(candidate), *margin_facts(verdict, units, {})]
     return table((), [*facts, *([("proposed by", origin)] if origin else [])])
 
 
@@ -107,7 +107,7 @@ def result_html(result: Result) -> str:
 
 _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
     Problem: problem_html,
-    Verdict: lambda verdict: table((), [*broken_facts(verdict), *margin_facts(verdict, {})]),
+    Verdict: lambda verdict: table((), [*broken_facts(verdict), *margin_facts(verdict, {}, {})]),
     Evaluation: evaluation_html,
     Trajectory: trajectory_html,
     Result: result_html,

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
+from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted
@@ -24,6 +25,8 @@ from falsifier.stl.margins import margin_words, signed
 
 # A name and what is said under it: a row of a table, or a line of text.
 Fact = tuple[str, str]
+# Names of the numbers of signals that are not real, by signal.
+Labels = Mapping[str, Mapping[int, str]]
 
 
 def result_text(result: Result) -> str:
@@ -68,7 +71,7 @@ def result_facts(result: Result) -> list[Fact]:
     facts += [("fragile", c.reason) for c in result.fragile]
     facts += [("not confirmed", c.reason) for c in result.refuted]
     if shown is not None:
-        facts += margin_facts(shown.verdict, units_of(problem))
+        facts += margin_facts(shown.verdict, *_known(problem))
         facts += [("rationale", shown.candidate.rationale)] if shown.candidate.rationale else []
     facts += [("note", remark) for remark in result.remarks]
     facts += [("language model", llm_use(result.spent))] if result.spent.questions else []
@@ -143,12 +146,14 @@ def result_json(result: Result) -> dict[str, Any]:
 def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
     """Return what broke, the inputs, and what decided an evaluation."""
     verdict, inputs = evaluation.verdict, candidate_facts(evaluation.candidate, problem.space)
-    return [*broken_facts(verdict), *inputs, *margin_facts(verdict, units_of(problem))]
+    return [*broken_facts(verdict), *inputs, *margin_facts(verdict, *_known(problem))]
 
 
-def units_of(problem: Problem) -> dict[str, str]:
-    """Return the units of a model's variables, by name."""
-    return {variable.name: variable.unit for variable in problem.info.variables}
+def _known(problem: Problem) -> tuple[dict[str, str], Labels]:
+    """Return the units of a model's variables by name, and the names of their numbers."""
+    variables = problem.info.variables
+    labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
+    return {v.name: v.unit for v in variables}, labels
 
 
 def broken_facts(verdict: Verdict | None) -> list[Fact]:
@@ -156,11 +161,15 @@ def broken_facts(verdict: Verdict | None) -> list[Fact]:
     return [("" if k else "what broke", line) for k, line in enumerate(broken_lines(verdict))]
 
 
-def margin_facts(verdict: Verdict | None, units: Mapping[str, str]) -> list[Fact]:
+def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labels) -> list[Fact]:
     """Return the robustness, what decided it and when, with the values then; nothing without a verdict."""
     if verdict is None:
         return []
-    values = (f"{name} = {value:.6g} {units.get(name, '')}".strip() for name, value in verdict.values.items())
+    values = []
+    for name, value in verdict.values.items():
+        label = labels.get(name, {}).get(int(value), "")
+        words = (f"{name} = {value:.6g}", units.get(name, ""), label and f"({label})")
+        values.append(" ".join(filter(None, words)))
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
         ("robustness", f"{signed(verdict.robustness)} ({meaning})"),

@@ -1,4 +1,5 @@
 import json
+import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +9,7 @@ import pytest
 from falsifier.engines.llm import LLMEngine
 from falsifier.llm.messages import ChatReply, Usage
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
@@ -15,6 +17,7 @@ from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
+from tests.fmu.fixtures import path
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 from tests.searches import stop_after
 
@@ -39,6 +42,13 @@ def test_a_counterexample_is_told_with_its_verdict_inputs_and_reason(found: Resu
     for part in (found.counterexample.reason, f"{found.robustness:+.6g}", *values):
         assert part in text
     assert "files" not in text, "nothing was recorded"
+
+
+def test_items_are_told_with_their_names(tmp_path: Path) -> None:
+    problem = Problem.from_fmu(path("Echo_2"), "G[0,1] (out_Enumeration <= 1)", stop_time=1.0)
+    result = falsify(problem, "corners", budget=9, directory=tmp_path)
+    for text in (result_text(result), markdown_report(tmp_path)):
+        assert re.search(r"out_Boolean = . \((true|false)\), out_Enumeration = 3 \(third\)", text)
 
 
 def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:

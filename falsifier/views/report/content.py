@@ -20,6 +20,7 @@ from falsifier.search.budget import Spent
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.panels import Panel, panels
+from falsifier.views.text import Labels
 
 Status = Literal["violated", "no violation found", "not finished", "failed"]
 
@@ -32,6 +33,7 @@ class Shown:
     candidate: Candidate
     verdict: Verdict | None  # robustness, and what decided it; None if it could not be judged
     units: Mapping[str, str]
+    labels: Labels
     panels: list[Panel]  # what to draw; empty if the trajectory was not kept
     confirmed: str  # why a counterexample counts
     is_shrunk: bool = False
@@ -211,8 +213,9 @@ def _drawn(
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
     described, drawn = run.manifest, list[Panel]()
+    labels = {r.name: labels_of(r.kind, r.items) for r in searched}
+    labels |= {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
     if trajectory is not None:
-        labels = {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
         formula, components = parse(described.requirement.formula), described.components
         drawn = panels(formula, trajectory, candidate, described.inputs, verdict, labels, components)
     return Shown(
@@ -220,6 +223,7 @@ def _drawn(
         candidate=candidate,
         verdict=verdict,
         units=units,
+        labels=labels,
         panels=drawn,
         confirmed=confirmed if run.falsified else "",
         is_shrunk=is_shrunk,

@@ -72,12 +72,13 @@ def result_text(section: Section) -> str:
 
 def limit_facts(shown: Shown) -> list[Fact]:
     """Return what broke; without a violation, how near it came."""
-    return broken_facts(shown.verdict) or margin_facts(shown.verdict, shown.units)
+    return broken_facts(shown.verdict) or margin_facts(shown.verdict, shown.units, shown.labels)
 
 
 def margin_beside(shown: Shown) -> list[Fact]:
     """Return the margin of what broke, also if it was not confirmed; ``limit_facts`` has it of the rest."""
-    return margin_facts(shown.verdict, shown.units) if broken_facts(shown.verdict) else []
+    facts = margin_facts(shown.verdict, shown.units, shown.labels)
+    return facts if broken_facts(shown.verdict) else []
 
 
 def input_table(shown: Shown) -> Table:
