@@ -30,6 +30,8 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
     **{f"Int{b}": (-(2 ** (b - 1)), 2 ** (b - 1) - 1) for b in (8, 16, 32, 64)},
     **{f"UInt{b}": (0, 2**b - 1) for b in (8, 16, 32, 64)},
 }
+# The largest integer that no other one becomes as a double.
+_EXACT = 2**53 - 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,21 +131,25 @@ class Variable:
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""
         numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))
-        if self.kind == "real" or value in numbers:
+        if self.kind == "real" or (value in numbers and abs(value) <= _EXACT):
             return ""
-        whole = "0 or 1" if self.kind == "boolean" else "an integer"
+        size = "" if abs(value) <= _EXACT else f" of at most {_EXACT} (larger doubles are not exact)"
+        whole = "0 or 1" if self.kind == "boolean" else f"an integer{size}"
         return f"expected {f'one of {self.items_text}' if self.literals else whole} for {self.name!r}"
 
     def excess(self, low: float, high: float) -> str:
         """Say which limits a range, or a single value, exceeds; empty if none."""
-        numbers = self.literals.values()
+        numbers, is_integer = self.literals.values(), self.kind == "integer"
         for what, (least, most) in (
+            ("the integers that doubles tell apart, for", (-_EXACT, _EXACT) if is_integer else (None, None)),
             (f"the range of the type {self.type} of", self.type_limits or (None, None)),
             (f"the items ({self.items_text}) of", (min(numbers), max(numbers)) if numbers else (None, None)),
             ("the model's limits for", self.limits),
         ):
             if (least is not None and low < least) or (most is not None and high > most):
-                limits = ", ".join("no limit" if limit is None else f"{limit:g}" for limit in (least, most))
+                limits = ", ".join(
+                    "no limit" if limit is None else f"{limit:.16g}" for limit in (least, most)
+                )
                 return f"exceeds {what} {self.name!r}, [{limits}]"
         return ""
 

@@ -229,6 +229,11 @@ def test_items_and_truth_values_are_given_by_their_names() -> None:
         assert search_space(inputs, parameters, info, 1.0, ModelChanges())[1] == {"mode": 7, "flag": 1}
     (mode,) = search_space({"mode": InputSection(range=("Off", 7))}, {}, info, 1.0, ModelChanges())[0].inputs
     assert (mode.low, mode.high) == (1, 7)
+    high = {"flag": InputSection.model_validate({"range": [0, 2**53 + 1]})}
+    with pytest.raises(SpecError, match=r"exceeds the integers that doubles .* \[-9007199254740991, 9007"):
+        search_space(
+            high, {}, ModelInfo("m", variables=(Variable("flag", "integer", "input"),)), 1.0, ModelChanges()
+        )
     for wrong, message in (
         ({"value": "on"}, r"mode\.value: .*one of Off, On, got 'on'"),
         ({"value": "7:8"}, "got '7:8'; to search a range"),
