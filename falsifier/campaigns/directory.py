@@ -39,11 +39,7 @@ def is_campaign(directory: Path) -> bool:
 
 
 def check_new(directory: Path) -> None:
-    """Check that no campaign and no run was started in a directory.
-
-    Raises:
-        JournalError: if one was.
-    """
+    """Check that no campaign and no run was started in a directory; JournalError if one was."""
     if is_campaign(directory) or holds_run(directory):
         what = "campaign" if is_campaign(directory) else "run"
         raise JournalError(
@@ -58,11 +54,7 @@ def write_campaign(directory: Path, record: CampaignRecord) -> None:
 
 
 def read_campaign(directory: Path) -> CampaignRecord:
-    """Read campaign.json.
-
-    Raises:
-        JournalError: if there is none, or it is invalid.
-    """
+    """Read campaign.json; JournalError if there is none, or it is invalid."""
     return read_sealed(directory / CAMPAIGN, CampaignRecord, what="campaign")
 
 
@@ -96,11 +88,7 @@ def run_directories(directory: Path) -> list[Path]:
 
 @contextmanager
 def campaign_lock(directory: Path) -> Iterator[None]:
-    """Hold the campaign's lock.
-
-    Raises:
-        JournalError: if another process holds it.
-    """
+    """Hold the campaign's lock; JournalError if another process holds it."""
     with can_be_a_folder(directory):
         directory.mkdir(parents=True, exist_ok=True)
     busy = (

@@ -39,11 +39,7 @@ Tick = Callable[[], bool]
 
 
 def run_task(task: RunTask) -> None:
-    """Carry out one run, or resume it; what comes of it stands in its journal.
-
-    Raises:
-        JournalError: if that cannot be written.
-    """
+    """Carry out or resume one run, which writes a journal; JournalError if that cannot be written."""
     results = carry_out(
         task.request,
         [task.problem],

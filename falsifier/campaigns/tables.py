@@ -133,11 +133,7 @@ class Table:
     notes: tuple[str, ...] = ()
 
     def only(self, *names: str) -> "Table":
-        """Return the table with only these columns, in this order.
-
-        Raises:
-            ValueError: for an unknown column.
-        """
+        """Return the table with only these columns, in this order; ValueError for an unknown column."""
         picked = [self.header.index(name) for name in names]
         return replace(self, header=names, rows=tuple(tuple(row[i] for i in picked) for row in self.rows))
 

@@ -205,11 +205,7 @@ def _spec_of(given: Path) -> Path | None:
 
 
 def one_fmu(given: Path) -> Path:
-    """Return the FMU that is given, by path or name.
-
-    Raises:
-        SpecError: if there is none, or it is a system of several.
-    """
+    """Return the FMU that is given, by path or name; SpecError if there is none, or several."""
     found = _named(given)
     if isinstance(found, Path):
         return found

@@ -32,11 +32,7 @@ def compiler() -> list[str]:
 
 
 def compile_c(what: Path, folder: Path, arguments: Sequence[str]) -> None:
-    """Compile C files into a folder; errors name what that is.
-
-    Raises:
-        ModelError: if there is no compiler, it does not end, or it finds errors.
-    """
+    """Compile C files into a folder; ModelError, naming what that is, if there is no compiler or it fails."""
     command = [*compiler(), *arguments]
     try:
         done = subprocess.run(

@@ -155,11 +155,7 @@ def seal(text: str) -> str:
 
 
 def check_seal(content: bytes) -> None:
-    """Check the checksum of a sealed JSON object.
-
-    Raises:
-        ValueError: if it has none, or the content does not match it.
-    """
+    """Check the checksum of a sealed JSON object; ValueError if it has none, or another content."""
     found = _SEAL.search(content[-100:])
     if found is None:
         raise ValueError("it does not end with a checksum")

@@ -409,11 +409,7 @@ class FunctionModel:
 def check_finite(
     model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]], *, hint: str = ""
 ) -> None:
-    """Reject outputs that contain NaN or inf.
-
-    Raises:
-        SimulationError: naming the output and the first time at which it is not finite.
-    """
+    """Reject outputs with NaN or inf; SimulationError naming the output and the first time of one."""
     for name, column in columns.items():
         finite = np.isfinite(column)
         if not finite.all():

@@ -88,11 +88,7 @@ class WatchedProgram:
         self._lock = threading.Lock()
 
     def send(self, data: bytes, seconds: float) -> None:
-        """Send a request.
-
-        Raises:
-            ConnectionError: if the program does not read it, or not within this time.
-        """
+        """Send a request; ConnectionError if the program does not read it, or not within this time."""
         left, until = memoryview(data), time.monotonic() + seconds
         while left:
             try:
@@ -254,11 +250,7 @@ def machine_memory() -> int:
 
 
 def check_memory_limits() -> None:
-    """Check that a process may use as much memory as its libraries need.
-
-    Raises:
-        MachineError: if it may not; names the limit and how to raise it.
-    """
+    """Check that a process may use the memory its libraries need; MachineError: how to raise the limit."""
     for option, (limit, least) in _LEAST_MEMORY.items():
         allowed = resource.getrlimit(limit)[0]
         if allowed != resource.RLIM_INFINITY and allowed < least:

@@ -108,11 +108,7 @@ class Case:
             ) from None
 
     def content(self, confirmation: Confirmation) -> StoredCounterexample:
-        """Return what to store of a confirmation of this, or of what it was made of.
-
-        Raises:
-            SpecError: if the violation is refuted.
-        """
+        """Return what to store of a confirmation of this; SpecError if the violation is refuted."""
         if confirmation.outcome == "refuted":
             raise SpecError(f"{self.place}: {confirmation.reason}")
         return store.to_store(confirmation).model_copy(update={"problem": self.source})

@@ -185,11 +185,7 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
 
 
 def counterexample_file(path: Path) -> Path:
-    """Find a counterexample file, given its path or its run directory.
-
-    Raises:
-        SpecError: if there is none, or more than one.
-    """
+    """Find a counterexample by its path or run directory; SpecError unless there is exactly one."""
     if not path.is_file():
         keep_recorded(path if path.is_dir() else path.parent)  # it may be in the journal only
     if path.is_file():

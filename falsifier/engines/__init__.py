@@ -29,11 +29,7 @@ class Registered:
     uses_context: bool = False  # whether it tries the levels that context files give
 
     def load(self) -> Any:
-        """Import the engine's class.
-
-        Raises:
-            SpecError: if the package that it needs is not installed.
-        """
+        """Import the engine's class; SpecError if the package that it needs is not installed."""
         module, _, name = self.target.partition(":")
         try:
             return getattr(import_module(module), name)
@@ -81,11 +77,7 @@ DEFAULT_ENGINE = "surrogate"
 
 
 def check_engine(name: str) -> None:
-    """Check that an engine of this name exists.
-
-    Raises:
-        SpecError: if there is none; lists the known names.
-    """
+    """Check that an engine of this name exists; SpecError if there is none; lists the known names."""
     instance(setting("engine"), name, str, "a name")
     if name not in ENGINES:
         raise SpecError(f"{setting('engine')}: unknown engine {name!r}; {did_you_mean(name, ENGINES)}")

@@ -170,11 +170,7 @@ class LLMEngine:
         return real
 
     def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:
-        """Return the new ones of the proposed candidates.
-
-        Raises:
-            RejectedReplyError: if there is none.
-        """
+        """Return the new ones of the proposed candidates; RejectedReplyError if there is none."""
         briefing = self.briefing
         seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in briefing.numbers.items()}
         seen |= {c.key: "one that was proposed already" for c in briefing.pending}

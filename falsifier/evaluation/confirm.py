@@ -119,11 +119,7 @@ def half_step(problem: Problem) -> Problem:
 
 
 def other_interface(problem: Problem) -> Problem:
-    """Return the problem with its FMU simulated through the other interface.
-
-    Raises:
-        SpecError: if the model is not an FMU or has only one interface.
-    """
+    """Return the problem with the other interface of its FMU; SpecError if that has only one, or is none."""
     from falsifier.fmu import FmuModel
 
     model = problem.model

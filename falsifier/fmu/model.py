@@ -86,11 +86,7 @@ class FmuModel(Isolated):
         return tuple(names[offset] for offset in sorted(names))
 
     def load(self) -> None:
-        """Load the library and make an instance in a worker process, without simulating.
-
-        Raises:
-            ModelError: if that fails.
-        """
+        """Load the library and make an instance in a worker, without simulating; ModelError if that fails."""
         load(replace(self.order, logging=True))
 
     @property

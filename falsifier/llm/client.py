@@ -327,11 +327,7 @@ class LiteLLMChat:
 
 
 def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, Any] | None = None) -> None:
-    """Check an LLM's name, address, key and options without sending anything.
-
-    Raises:
-        ChatError: saying what to set or change.
-    """
+    """Check an LLM's name, address, key and options, sending nothing; ChatError saying what to change."""
     instance("llm", llm, str, "a name such as openai/gpt-5-mini, or the path of a model file")
     if is_model_file(llm):
         check_model_file(llm)

@@ -195,11 +195,7 @@ def read_readings(text: str) -> list[ReadingReply]:
 def example_trajectory(
     signals: Sequence[ExampleSignal], names: Sequence[str], times: np.ndarray[Any, np.dtype[np.float64]]
 ) -> Trajectory:
-    """Return an example on a time grid.
-
-    Raises:
-        RejectedReplyError: if a signal is missing, or its points are not in order.
-    """
+    """Return an example on a time grid; RejectedReplyError if signals are missing or out of order."""
     columns = {}
     for name in names:
         found = next((s for s in signals if s.name == name), None)

@@ -50,11 +50,7 @@ _DROPPABLE = frozenset(
 
 @cache
 def load_litellm() -> Any:
-    """Import litellm without its network access, its .env file and its messages.
-
-    Raises:
-        ChatError: if it cannot be imported.
-    """
+    """Import litellm without network, .env file and messages; ChatError if it cannot be imported."""
     os.environ.update(_ENVIRONMENT)
     try:
         import litellm

@@ -174,11 +174,7 @@ class Chat(Protocol):
         ...
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the reply to a request.
-
-        Raises:
-            ChatError: if no reply can be obtained.
-        """
+        """Return the reply to a request; ChatError if no reply can be obtained."""
         ...
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:

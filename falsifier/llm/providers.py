@@ -122,11 +122,7 @@ def _is_address(text: str) -> bool:
 
 
 def check_option_values(options: Mapping[str, Any]) -> None:
-    """Refuse numbers that no request or record can contain, and limits of tokens that are none.
-
-    Raises:
-        ChatSetupError: naming the option.
-    """
+    """Refuse numbers no request can contain, and limits of tokens that are none; ChatSetupError."""
     for name, value in options.items():
         option = written(f"--llm-option {name}", name)
         if isinstance(value, float) and not isfinite(value):

@@ -29,11 +29,7 @@ class ScriptedChat:
         self._lines: Iterator[Line] = iter(() if callable(self.script) else self.script)
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the next line of the script.
-
-        Raises:
-            ChatError: if the script has ended.
-        """
+        """Return the next line of the script; ChatError if the script has ended."""
         self.requests.append(request)
         asked = len(self.requests)
         line = self.script(request) if callable(self.script) else next(self._lines, None)

@@ -152,11 +152,7 @@ class Manifest(Surroundings):
 
 
 def read(directory: Path) -> Manifest:
-    """Read the manifest of a run directory.
-
-    Raises:
-        JournalError: if there is none, or it is invalid.
-    """
+    """Read the manifest of a run directory; JournalError if there is none, or it is invalid."""
     check_no_folder(directory)
     return read_sealed(directory / MANIFEST, Manifest, what="run")
 

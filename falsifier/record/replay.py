@@ -41,11 +41,7 @@ class ReplayedSteps(Steps):
     _next: int = 0
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
-        """Let the engine repeat its recorded suggestions.
-
-        Raises:
-            JournalError: if it suggests something else.
-        """
+        """Let the engine repeat its recorded suggestions; JournalError if it suggests something else."""
         record = self.asked.get(self._next)
         if record is None:
             return super().ask(problem, engine, wanted)

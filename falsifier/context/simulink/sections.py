@@ -63,11 +63,7 @@ class Node:
 
 
 def parse_mdl(text: str, shown: str) -> Node:
-    """Return the sections of a file of braces, within a section ``file``.
-
-    Raises:
-        SpecError: naming the file and the line that cannot be read.
-    """
+    """Return the sections of a file of braces, within a section ``file``; SpecError naming a wrong line."""
     # Of each section around: what it is, its line, its values and the sections within it.
     opened: list[tuple[str, int, dict[str, str], list[Node]]] = [("file", 0, {}, [])]
     name, pieces = "", list[str]()  # of the latest value, if it is text: it may go on in lines of its own

@@ -85,22 +85,14 @@ def read_info(path: str | Path) -> ModelInfo:
 
 
 def read_description(path: str | Path) -> Description:
-    """Return the description of an FMU; a file is read again only if its content has changed.
-
-    Raises:
-        ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
-    """
+    """Return an FMU's description; a changed file is read again; ModelError as of ``read_info``."""
     path = path_of("path", path, "the path of an FMU")
     return describe(path, archive.file_hash(path))
 
 
 @lru_cache(maxsize=32)
 def describe(path: Path, sha256: str) -> Description:
-    """Return the description of an FMU whose content has this hash; cached.
-
-    Raises:
-        ModelError: if the file is not an FMU, or not one of FMI 1, 2 or 3.
-    """
+    """Return the description, cached, of an FMU with this hash; ModelError as of ``read_info``."""
     text = archive.read_entry(path, "modelDescription.xml")
     root = read_xml(text, f"{path}: modelDescription.xml", ModelFileError)
     described = parse(root, name=str(path))

@@ -103,11 +103,7 @@ def _table(description: Description, names: Sequence[str]) -> tuple[bytes, list[
 
 
 def fmu(member: Member, folder: Path, *, logging: bool, through_wine: bool) -> bytes:
-    """Return what the worker needs to load an FMU that was unpacked to this folder.
-
-    Raises:
-        ModelError: if it has no library for the worker.
-    """
+    """Return what the worker needs to load an unpacked FMU; ModelError if it has no library for it."""
     description, interface = member.description, member.interface
     libraries = description.libraries
     found = libraries.windows if through_wine else libraries.here

@@ -42,11 +42,7 @@ class Order:
         return encoding.integers(network.coupling.isolation == "each", len(network.order)) + b"".join(parts)
 
     def prepare(self, plan: Plan) -> bytes:
-        """Return the request to prepare for a plan's simulations.
-
-        Raises:
-            SpecError: if a component's own step does not fit; see ``own_steps``.
-        """
+        """Return the request to prepare for a plan's simulations; SpecError as of ``own_steps``."""
         network = self.network
         coupling, signals, feeds = network.coupling, network.connected_outputs(), _feeds(network, plan)
         steps = any(m.interface == "co-simulation" or m.step is not None for m in network.members)

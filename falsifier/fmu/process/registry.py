@@ -142,11 +142,7 @@ def _plan(
 
 
 def load(order: Order) -> None:
-    """Load an FMU and make an instance in a worker of its own, without simulating.
-
-    Raises:
-        ModelError: if that fails.
-    """
+    """Load an FMU and make an instance in a worker of its own; ModelError if that fails."""
     runner = Runner(REGISTRY.workplace, order)
     try:
         runner.load(make_plan(order.network.description, Experiment(1.0, 1.0, ()), (), ()))

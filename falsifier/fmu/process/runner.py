@@ -80,11 +80,7 @@ class Runner:
             return repeated
 
     def load(self, plan: Plan) -> None:
-        """Load the library and make an instance, without a simulation.
-
-        Raises:
-            ModelError: if that fails.
-        """
+        """Load the library and make an instance, without a simulation; ModelError if that fails."""
         with self._using():
             self._worker_for(plan)
 

@@ -97,11 +97,7 @@ class Side:
 
 
 def gather(*directories: Path) -> list[Side]:
-    """Read runs or campaigns; several are compared.
-
-    Raises:
-        JournalError: if a directory is neither, or is damaged.
-    """
+    """Read runs or campaigns; several are compared; JournalError if a directory is neither, or is damaged."""
     names = [directory.resolve().name for directory in directories]
     return [
         _side(directory, str(directory) if names.count(name) > 1 else name)
