@@ -118,10 +118,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "a name to simulate": (lambda: untyped.simulate("AT1"), PROBLEM),
     "a name to assess": (lambda: untyped.assess("AT1", budget=1), PROBLEM),
     "a name to find a margin of": (lambda: untyped.margin("AT1", "x <= {limit}", (0, 1)), PROBLEM),
-    "one end of a range": (
-        lambda: untyped.margin(easy(), "x <= {limit}", 3),
-        "between: expected a list",
-    ),
+    "one end of a range": (lambda: untyped.margin(easy(), "x <= {limit}", 3), "between: expected a list"),
     "three ends of a range": (lambda: untyped.margin(easy(), "x <= {limit}", (0, 1, 2)), r"\(LOW, HIGH\)"),
     "a number as threshold": (lambda: untyped.margin(easy(), 5, (0, 1)), "vary: expected text, got 5"),
     "a number to confirm": (lambda: untyped.confirm(easy(), 5), "evaluation: expected an Evaluation"),
@@ -136,14 +133,8 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "one listener": (lambda: untyped.falsify(easy(), listeners=print), "listeners: expected a list of func"),
     "a name to make an engine for": (lambda: untyped.make_engine("surrogate", "AT1", seed=0), PROBLEM),
-    "a seed below 0": (
-        lambda: untyped.make_engine("uniform", easy(), seed=-1),
-        "seed: expected",
-    ),
-    "a text as seed": (
-        lambda: untyped.make_engine("uniform", easy(), seed="x"),
-        "seed: expected",
-    ),
+    "a seed below 0": (lambda: untyped.make_engine("uniform", easy(), seed=-1), "seed: expected"),
+    "a text as seed": (lambda: untyped.make_engine("uniform", easy(), seed="x"), "seed: expected"),
     "an argument that an engine does not have": (
         lambda: untyped.make_engine("uniform", easy(), seed=0, sead=1),
         "engine 'uniform': got an unexpected keyword argument 'sead'; it takes problem, seed",
@@ -165,19 +156,13 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "a text in a signal": (lambda: untyped.Signal((0.0,), ("a",)), "expected sequences of numbers"),
     "numbers as signal": (lambda: untyped.Signal(0.0, 1.0), "expected sequences of numbers"),
-    "an unknown interpolation": (
-        lambda: untyped.Signal((0.0,), (0.0,), "cubic"),
-        "interpolation: expected",
-    ),
+    "an unknown interpolation": (lambda: untyped.Signal((0.0,), (0.0,), "cubic"), "interpolation: expected"),
     "a coupling of an unknown kind": (lambda: untyped.Coupling(loops="x"), "coupling.loops: expected refuse"),
     "a text as factor": (
         lambda: untyped.Connection("a.y", factor="a"),
         "a.y: factor: expected a finite number, got 'a'",
     ),
-    "a text without name": (
-        lambda: untyped.Requirement("", "x <= 1"),
-        "expected a name, got ''",
-    ),
+    "a text without name": (lambda: untyped.Requirement("", "x <= 1"), "expected a name, got ''"),
     "a number as name": (
         lambda: untyped.Problem.from_fmu(AT, "G (speed <= 1)", name=5),
         "requirement: expected a name, got 5",

@@ -74,11 +74,7 @@ def test_failed_simulations_are_never_to_the_system_s_credit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"budget": 0}, "budget"),
-        ({"budget": 10, "confidence": 95}, "between 0 and 1"),
-    ],
+    ("options", "said"), [({"budget": 0}, "budget"), ({"budget": 10, "confidence": 95}, "between 0 and 1")]
 )
 def test_numbers_out_of_range_are_refused(options: dict[str, float], said: str) -> None:
     with pytest.raises(SpecError, match=said):

@@ -5,14 +5,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.campaigns import (
-    CampaignRequest,
-    Follower,
-    Progress,
-    cross,
-    resume_campaign,
-    run_campaign,
-)
+from falsifier.campaigns import CampaignRequest, Follower, Progress, cross, resume_campaign, run_campaign
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.campaigns.directory import campaign_lock
 from falsifier.counterexamples.case import counterexample_case
@@ -65,10 +58,7 @@ def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path)
     falsify(problems.easy(), "uniform", budget=1, directory=tmp_path / "r")
     with pytest.raises(JournalError, match="already contains a run"):
         run_campaign(request("easy"), tmp_path / "r")
-    with (
-        campaign_lock(directory),
-        pytest.raises(JournalError, match="another process is working on"),
-    ):
+    with campaign_lock(directory), pytest.raises(JournalError, match="another process is working on"):
         resume_campaign(directory)
 
 

@@ -270,19 +270,13 @@ def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
     for arguments, why in (
         (["explain", "run", "--shrink", "--out", "keep.json"], "exists and is kept"),
         (["explain", "run", "--shrink", "--out", "x.csv"], "x.csv: expected a file name that ends in .json"),
-        (
-            ["explain", "run", "--shrink", "--out", "run/counterexample.json"],
-            "is the original, which is",
-        ),
+        (["explain", "run", "--shrink", "--out", "run/counterexample.json"], "is the original, which is"),
         (["explain", "run", "--shrink", "--out", "folder.json"], "is not a file that can be replaced"),
         (["report", "run", "--out", "run/journal.jsonl"], "exists and is kept"),
         (["report", "run", "--csv", "keep.fmu"], "exists and is kept"),
         (["report", "run", "--markdown", "--out", "my.toml"], "exists and is kept"),
         (["report", "run", "--markdown", "--out", "x.png"], "x.png: expected a file name that ends in .md"),
-        (
-            ["explain", "run", "--shrink", "--out", "s.json"],
-            "s.png exists and is kept",
-        ),
+        (["explain", "run", "--shrink", "--out", "s.json"], "s.png exists and is kept"),
         (["explain", "run", "--map", "--out", "s.png"], "s.png exists and is kept"),
         (["export", "run", "--out", "run"], "run has files, which are kept"),
         (["export", "run", "--out", "others"], "others has files, which are kept"),

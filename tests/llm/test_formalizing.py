@@ -8,12 +8,7 @@ import pytest
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
-from falsifier.llm.formalizing import (
-    ExampleSignal,
-    example_trajectory,
-    formalizing_messages,
-    read_readings,
-)
+from falsifier.llm.formalizing import ExampleSignal, example_trajectory, formalizing_messages, read_readings
 from falsifier.problem.templates import TEMPLATES
 
 INFO = ModelInfo(

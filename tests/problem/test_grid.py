@@ -3,13 +3,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.grid import (
-    check_steps,
-    choose_grid,
-    default_freedom,
-    exact,
-    formula_times,
-)
+from falsifier.problem.grid import check_steps, choose_grid, default_freedom, exact, formula_times
 from falsifier.problem.problem import Problem
 from tests.fmu.fixtures import path as fmu_path
 from tests.problem.support import echo

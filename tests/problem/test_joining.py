@@ -121,10 +121,7 @@ def test_what_is_wrong_is_named_where_it_is_stated(
     ("section", "told"),
     [
         ({"hold": 500.0}, "input 'throttle': hold: 500 s is longer than the simulation of 40 s; shorten it"),
-        (
-            {"free": {"max_control_points": 3, "min_interval": 100.0}},
-            "min_interval: 100 s is longer than",
-        ),
+        ({"free": {"max_control_points": 3, "min_interval": 100.0}}, "min_interval: 100 s is longer than"),
     ],
 )
 def test_periods_of_an_input_end_within_the_simulation(section: dict[str, Any], told: str) -> None:

@@ -53,16 +53,8 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("requirements.R", {"formul": "x"}, r"requirements\.R\.formul: unknown key; did you mean 'formula'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
         ("requirements.R.template", "settles", r"requirements\.R\.formula: .* has a template, too; give one"),
-        (
-            "requirements.R",
-            "G (x <= 1)",
-            r"requirements\.R: expected a table: \[requirements\.R\] with",
-        ),
-        (
-            "parameters.p",
-            [0, 1],
-            r"parameters\.p: expected a table: \[parameters\.p\] with range",
-        ),
+        ("requirements.R", "G (x <= 1)", r"requirements\.R: expected a table: \[requirements\.R\] with"),
+        ("parameters.p", [0, 1], r"parameters\.p: expected a table: \[parameters\.p\] with range"),
         (
             "parameters.p",
             {"range": [0, 1], "control_points": 3},

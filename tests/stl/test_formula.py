@@ -7,16 +7,7 @@ import numpy as np
 import pytest
 
 from falsifier.stl import Monitor, parse, second_monitor
-from falsifier.stl.expression import (
-    Arithmetic,
-    Call,
-    Expression,
-    Function,
-    Name,
-    Negative,
-    Number,
-    unit_of,
-)
+from falsifier.stl.expression import Arithmetic, Call, Expression, Function, Name, Negative, Number, unit_of
 from falsifier.stl.formula import FALSE, TRUE, Constant, Formula, Predicate, replaced, without_constants
 from tests.stl.direct import Direct
 from tests.stl.randoms import STEP, random_formula, random_trajectory

@@ -8,18 +8,10 @@ from falsifier.analyses.formalize import formalize
 from falsifier.core.space import Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.views.analyses_text import (
-    coverage_json,
-    coverage_text,
-    formalized_text,
-    trace_lines,
-)
+from falsifier.views.analyses_text import coverage_json, coverage_text, formalized_text, trace_lines
 from tests.analyses.test_coverage import described
 
-RANGES = (
-    Range(name="throttle", low=0.0, high=100.0, unit="%"),
-    Range(name="brake", low=0.0, high=10.0),
-)
+RANGES = (Range(name="throttle", low=0.0, high=100.0, unit="%"), Range(name="brake", low=0.0, high=10.0))
 STEP = Signal((0.0, 5.0), (0.0, 95.0), "constant")
 FOUND = coverage_of(
     described(*RANGES), [(Candidate({"throttle": STEP, "brake": Signal((0.0,), (5.5,))}), None)]

@@ -19,8 +19,7 @@ def test_a_connected_input_cannot_be_driven() -> None:
 def test_own_steps_are_whole_multiples_of_the_communication_step() -> None:
     model = system({"plant": "Plant_2", "pi": component("Gain_2", 0.25)}, LOOP)
     with pytest.raises(
-        SpecError,
-        match=r"components\.pi\.step: step = 0\.25 s is not .* 0\.1 s; try step_size = 0\.05$",
+        SpecError, match=r"components\.pi\.step: step = 0\.25 s is not .* 0\.1 s; try step_size = 0\.05$"
     ):
         run(model, "plant.y")
     with pytest.raises(

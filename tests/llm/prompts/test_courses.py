@@ -5,13 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bench.prompts import samples, told_courses
-from falsifier.llm.prompts.courses import (
-    breakpoints,
-    change_list,
-    course,
-    dwell_list,
-    oscillations,
-)
+from falsifier.llm.prompts.courses import breakpoints, change_list, course, dwell_list, oscillations
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals
 from falsifier.llm.prompts.view import View
 from falsifier.problem.loading import load_problem
