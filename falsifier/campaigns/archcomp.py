@@ -194,11 +194,7 @@ def validate(rows: Iterable[Row], *, budget: int = PROTOCOL_SIMULATIONS) -> list
 
 
 def bundled_problem(requirement: str, instance: str, stop_time: float | None) -> Problem:
-    """Load the bundled problem of a row.
-
-    Raises:
-        SpecError: if there is none of that name, or the stop time is too short for the requirement.
-    """
+    """Load the bundled problem of a row; SpecError if there is none, or it ends before its requirement."""
     try:
         target = _bundled_target(requirement)
     except SpecError:  # its text lists all names, which would be repeated in each row

@@ -12,12 +12,12 @@ from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
-from falsifier.fmu import System, is_package, read_info, read_package
+from falsifier.fmu import Rights, System, is_package, read_info, read_package, resolved
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
-from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection
+from falsifier.problem.sections import InputSection, ModelChanges, ModelSection, ParameterSection
 from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
@@ -69,6 +69,10 @@ def join(
             raise SpecError(f"no profile {profile!r}; {near}; without a profile: free or fixed")
         overriding, changes = spec.changes(requirement, profile), changes or ModelChanges()
         stating |= overriding
+        allowing: dict[str, ModelSection | ModelChanges] = {"model": spec.model, **overriding}
+        for place, each in allowing.items():
+            with in_section(key=place):
+                Rights.of(resolved(each.allow, path.parent), each.deny)
         layers = list(overriding.values())
         model = model or make_model(spec, [*layers, changes], path)
         info = model.info

@@ -103,6 +103,7 @@ def test_what_does_not_fit_together_is_named(more: dict[str, Any], named: str) -
     [
         (None, {"output_interval": 0.07}, "requirements.S.output_interval"),
         (None, {"omit": ["sped"]}, "requirements.S.omit"),
+        (None, {"allow": ["all"]}, "requirements.S.allow"),
         (None, {"inputs": {"throttle": {"range": [0, 500]}}}, "requirements.S.inputs.throttle.range"),
         ("coarse", {"inputs": {"throttle": {"range": [0, 500]}}}, "requirements.S.inputs.throttle.range"),
         ("own", {"parameters": {"drive": 1}}, "profiles.own.requirements.S.parameters.drive"),
