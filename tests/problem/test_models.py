@@ -138,7 +138,7 @@ def test_rights_that_do_not_exist_are_named(tmp_path: Path, allow: str, deny: st
     with pytest.raises(SpecError, match=f"^(allow|deny).*{message}"):
         load_problem(file, allow=[allow] if allow else [], deny=[deny] if deny else [])
     right, wrong = ("write:logs", allow) if allow else ("network", deny)
-    with pytest.raises(SpecError, match=rf"cruise.toml: model\.(allow|deny): .*{message}"):
+    with pytest.raises(SpecError, match=rf"cruise.toml: (model\.allow|requirements\.R\.deny): .*{message}"):
         load_problem(write(tmp_path, RIGHTS.replace(f'"{right}"', f'"{wrong}"')))
 
 
