@@ -249,10 +249,7 @@ def test_an_address_of_the_environment_is_recorded_and_has_its_own_price(
     [
         ("http://me:word@127.0.0.1:1/v1", "http://127.0.0.1:1/v1"),
         ("http://127.0.0.1:1/v1?x=1&apikey=word12", "http://127.0.0.1:1/v1"),
-        (
-            "http://127.0.0.1:1/hf-inference/sk-abcdefghijklmnopq",
-            "http://127.0.0.1:1/hf-inference/[redacted]",
-        ),
+        ("http://127.0.0.1:1/hf-ordinary/sk-abcdefghijklmnopq", "http://127.0.0.1:1/hf-ordinary/[redacted]"),
     ],
 )
 def test_an_address_is_recorded_without_its_password_and_used_with_it(
