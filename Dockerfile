@@ -3,7 +3,7 @@
 #   docker build -t falsifier .
 #   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/work" falsifier run my.toml:R1
 #
-# It has no C compiler: `falsifier tools build` needs one, nothing else does.
+# It has no C compiler, which only `falsifier tools build` needs, and no Wine, which FMUs for Windows need.
 FROM python:3.13-slim
 
 WORKDIR /src

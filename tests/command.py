@@ -40,11 +40,7 @@ class Done:
 def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fresh: bool = False) -> Done:
     """Run ``falsifier`` with these arguments in a folder, without keys in the environment.
 
-    Args:
-        arguments: the command line after the program's name.
-        cwd: the folder.
-        env: variables beyond those of the tests.
-        fresh: start a new interpreter, for tests of what is imported or what variables do to the interpreter.
+    ``fresh``: start a new interpreter, for tests of what is imported or what variables do to the interpreter.
     """
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
     environment = clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {})

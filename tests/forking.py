@@ -44,14 +44,7 @@ _ONE_AT_A_TIME = threading.Lock()
 def run(
     command: Sequence[str], folder: Path, environment: Mapping[str, str], streams: tuple[str, str, str]
 ) -> int:
-    """Run ``falsifier`` or ``pytest``; return its exit code.
-
-    Args:
-        command: the program and its arguments.
-        folder: where it runs.
-        environment: its variables.
-        streams: files for its three standard streams.
-    """
+    """Run ``falsifier`` or ``pytest`` with files for its standard streams; return its exit code."""
     with _ONE_AT_A_TIME:
         requests, codes = _server().stdin, _server().stdout
         assert requests is not None and codes is not None

@@ -100,7 +100,7 @@ def test_the_spec_page_has_every_key_of_every_section(site: dict[str, Page]) -> 
 def test_marks_are_replaced_by_tables(site: dict[str, Page]) -> None:
     marked = [path for path in WRITTEN if re.search(r"^<!-- \w+", path.read_text(), re.MULTILINE)]
     assert {path.stem for path in marked} == {
-        "spec", "systems", "requirements", "commands", "engines", "language-models"
+        "spec", "systems", "requirements", "commands", "engines", "language-models", "json"
     }  # fmt: skip
     engines, llms = site["engines/index.html"].text, site["language-models/index.html"].text
     assert [

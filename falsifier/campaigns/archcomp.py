@@ -175,7 +175,7 @@ def export(runs: Iterable[Run]) -> dict[str, str]:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Read a validation file without other columns; SpecError naming the row that is invalid, and why."""
+    """Read a validation file, but no other columns; SpecError naming a row that is invalid, and why."""
     csv.field_size_limit(10**9)  # a dense input is longer than the csv module's default allows
     (_, columns), *rows = csv_rows(path) or [(0, [])]
     if missing := [name for name in _READ if name not in columns]:

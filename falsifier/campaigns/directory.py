@@ -16,7 +16,15 @@ from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.errors import JournalError, written
-from falsifier.record.files import CAMPAIGN, can_be_a_folder, is_locked, locked, read_sealed, write_sealed
+from falsifier.record.files import (
+    CAMPAIGN,
+    can_be_a_folder,
+    check_unused,
+    is_locked,
+    locked,
+    read_sealed,
+    write_sealed,
+)
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -39,13 +47,18 @@ def is_campaign(directory: Path) -> bool:
 
 
 def check_new(directory: Path) -> None:
-    """Check that no campaign and no run was started in a directory; JournalError if one was."""
+    """Check that no campaign and no run was started in a directory, and that nothing else is in it.
+
+    Raises:
+        JournalError: if that is not so.
+    """
     if is_campaign(directory) or holds_run(directory):
         what = "campaign" if is_campaign(directory) else "run"
         raise JournalError(
             f"{directory} already contains a {what}: choose another directory, or to continue it: "
             + written(f"falsifier resume {directory}", f"resume_campaign({str(directory)!r})")
         )
+    check_unused(directory)
 
 
 def write_campaign(directory: Path, record: CampaignRecord) -> None:

@@ -205,5 +205,6 @@ def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | 
             f"sending them with the longest prompts costs about {cost:.4g} US dollars; replies cost extra, "
             f"and {total.format('cost')} limits all of it"
         )
-    text = f"up to {counted(questions, 'question')} to language models; {told}"
+    asked = ", ".join(dict.fromkeys(llm.told for llm, _ in asking))
+    text = f"up to {counted(questions, 'question')} to {asked}; {told}"
     return Ceiling(None if cost == inf else cost, text)

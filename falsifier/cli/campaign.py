@@ -134,8 +134,9 @@ def bench(
     # The competition's 1500 simulations may be 1500 paid questions.
     usual = PROTOCOL_SIMULATIONS if suite_name and not llms else DEFAULT_SIMULATIONS
     budget = llm_options.read_budget(given, asks=bool(llms), usual=usual)
+    stated = given["api_base"]
     how = llm_options.llm_settings({"llm": next(iter(llms), None), **given})
-    searchers = _searchers(engines, llms, variants, how)
+    searchers = _searchers(engines, llms, variants, how, stated)
     request = CampaignRequest(
         runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget), limits=totals
     )
@@ -246,7 +247,11 @@ def _kinds(
 
 
 def _searchers(
-    engines: Sequence[str], llms: Sequence[str], variants: Sequence[str], how: LLMSettings | None
+    engines: Sequence[str],
+    llms: Sequence[str],
+    variants: Sequence[str],
+    how: LLMSettings | None,
+    api_base: str | None,
 ) -> list[Searcher]:
     """Engines, those that ask an LLM once for each LLM and variant; without engines, the LLMs alone."""
     if how is None:
@@ -255,7 +260,8 @@ def _searchers(
     models = []
     for llm, variant in product(llms, variants or (None,)):
         name, effort = llm_options.name_and_effort(llm)
-        decided = {"name": name, "effort": effort, "variant": variant}
+        # Without an address, each has that of its own provider.
+        decided = {"name": name, "effort": effort, "variant": variant, "api_base": api_base}
         models.append(LLMSettings.model_validate(how.model_dump() | decided))
     # If no engine asks one, all are paired with it, which is refused where requests are checked.
     asking = {*engines} & {*LLM_ENGINES} or {*engines}

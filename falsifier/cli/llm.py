@@ -172,10 +172,7 @@ def check(*, name: str, **options: Any) -> None:
     price = price_of(settings) or "unknown"
     variable = key_variable(settings.name)
     key = f"key from {variable}" if variable else "no key needed"
-    where = f" at {settings.api_base}" if settings.api_base else ""
-    lines = [
-        f"{settings.name}{where}: {key}; price: {price}; {counted(usage.tokens, 'token')} for this check"
-    ]
+    lines = [f"{settings.told}: {key}; price: {price}; {counted(usage.tokens, 'token')} for this check"]
     lines += [f"  {'ok ' if f.works else 'no '} {f.name}: {f.said}" for f in features]
     is_usable = features[0].works
     if not is_usable:

@@ -318,7 +318,7 @@ total_option = click.option(
     type=_total,
     callback=_totals,
     help="Limit of all runs of a campaign together: simulations, seconds from this start, tokens, US "
-    "dollars. Repeatable.",
+    "dollars. What is being simulated or asked then is finished. Repeatable.",
 )
 
 

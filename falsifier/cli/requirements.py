@@ -103,6 +103,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
         _file(subject_of(target), out)
     from falsifier.analyses.formalize import formalize as ask
 
+    warn(f"asking {settings.told}")
     found = ask(target, sentence, settings)
     say(formalized_text(found))
     if choose is None:

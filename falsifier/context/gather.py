@@ -55,15 +55,11 @@ def gather(
 ) -> Context:
     """Return what files and the inside of FMUs say of a model; nothing else is opened.
 
-    Args:
-        files: paths of files.
-        fmus: FMUs to look into.
-        seeds: the requirement's signals: diagrams are cut to what they depend on.
-        signals: all signals that the language model is told.
-        checked: files with a line that looks like a secret and is none, by the names that messages give them.
-        ranges: bounds of the inputs and parameters whose crossings are wanted.
-        is_told: whether anything is sent. If not, nothing is refused as a secret, and only crossings are
-            returned.
+    Diagrams are cut to what the ``seeds`` depend on, the requirement's signals; ``signals`` are all that the
+    language model is told. ``checked`` are files with a line that looks like a secret and is none, by the
+    names that messages give them, and ``ranges`` the bounds of inputs and parameters whose crossings are
+    wanted. If nothing is sent, ``is_told`` is false: nothing is refused as a secret, and only crossings are
+    returned.
 
     Raises:
         SpecError: naming the file that is missing, damaged or binary, the line that looks like a secret, or a

@@ -62,12 +62,9 @@ def thresholds(
 ) -> Iterator[Threshold]:
     """Return the comparisons of variables with numbers or named constants.
 
-    Args:
-        text: a condition, a statement or a whole file.
-        constants: values of named constants, as written.
-        place: file or block.
-        is_dotted: whether ``a.b`` is a variable of this name, as in Modelica, and not the member ``b``.
-        has_lines: whether places have the number of the line.
+    ``text`` is a condition, a statement or a whole file, ``place`` a file or block, with the number of the
+    line if it ``has_lines``. ``is_dotted``: ``a.b`` is a variable of this name, as in Modelica, and not the
+    member ``b``. ``constants`` are the values of named constants, as written.
     """
     seen = set()
     line, at = 1, 0

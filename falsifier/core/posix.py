@@ -102,10 +102,7 @@ class WatchedProgram:
     def read(self, most: int, seconds: float, polling: float = 0.0) -> bytes:
         """Wait for replies; return at most this many bytes, none if it has ended or closed its end.
 
-        Args:
-            most: number of bytes, at least 1.
-            seconds: how long to wait.
-            polling: for how many seconds at first to poll, yielding to other processes.
+        For ``polling`` s it polls at first, yielding to other processes.
 
         Raises:
             TimeoutError: if nothing arrives in this time.

@@ -36,15 +36,19 @@ _KEY_SHAPES = (
 )
 # Passwords may contain an unescaped @ themselves.
 _CREDENTIALS_IN_ADDRESS = r"(?<!mailto://)(?<=://)[^\s/?#'\"]+(?=@)"
-_VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS)))
+_NAMED = r"(?:[\w.-]{0,40}?[_.-]|api|access|auth)?(?:key|token|secret|passw(?:or)?d|pwd|sig|signature|auth)"
+_NAMED_IN_QUERY = rf"(?i:[?&]{_NAMED}=)"
+_KEY_IN_ADDRESS = rf"(?<=://)[^\s?'\"]{{1,200}}+(?=\?)[^\s'\"]{{0,200}}?{_NAMED_IN_QUERY}[^\s&#'\"]{{6}}"
+_VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS, _KEY_IN_ADDRESS)))
 # The same for an address alone: without a scheme too, and a password may contain a slash; a port is none.
 _CREDENTIALS = re.compile(r"(?:.*?://)?(?:[^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$))[^@]*@)")
-_KEY_IN_QUERY = re.compile(r"(?i)[?&](?:\w*[_-])?(?:key|token|secret|password)=.")
+_KEY_IN_QUERY = re.compile(rf"(?P<name>{_NAMED_IN_QUERY})(?P<key>[^\s&#'\"]+)")
+# Folders of an address may look like short keys: hf-inference.
+_KEY_IN_PATH = re.compile("|".join(rf"(?=[^/]{{20}}){shape}" for shape in _KEY_SHAPES))
 _IN_TEXT = re.compile(
     "|".join(
         (
             r"(?i:(?<=bearer ))[^\s'\",}]+",
-            r"(?i:(?<=[?&]key=))[^\s&'\"]+",
             r"(?i:(?<=api[_-]key=))[^\s&'\"]+",
             _CREDENTIALS_IN_ADDRESS,
             *_KEY_SHAPES,
@@ -116,22 +120,24 @@ def holds_credentials(address: str) -> bool:
     >>> holds_credentials("http://me:word@host/v1"), holds_credentials("http://host:80/v1/@me")
     (True, False)
     """
-    return bool(_CREDENTIALS.match(address) or _KEY_IN_QUERY.search(address))
+    return bool(_CREDENTIALS.match(address) or _KEY_IN_QUERY.search(address) or _KEY_IN_PATH.search(address))
 
 
 def without_credentials(address: str) -> str:
-    """Return an address as it may be recorded: without a user name, a password and a query with a key.
+    """Return an address as it may be told: without a user name, a password, a query with a key, other keys.
 
     >>> without_credentials("http://me:word@host/v1"), without_credentials("http://host/v1?key=k")
     ('http://host/v1', 'http://host/v1')
     """
     plain = re.sub(r"(?<=://)[^\s/?#]+@", "", address, count=1)
-    return re.sub(r"[?#].*", "", plain) if _KEY_IN_QUERY.search(plain) else plain
+    plain = re.sub(r"[?#].*", "", plain) if _KEY_IN_QUERY.search(plain) else plain
+    return _KEY_IN_PATH.sub(_REDACTED, plain)
 
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
     """Return a message with secrets replaced: given ones, held ones and whatever looks like a known key."""
-    return _IN_TEXT.sub(_REDACTED, redact_held(text, secrets))
+    text = _KEY_IN_QUERY.sub(rf"\g<name>{_REDACTED}", redact_held(text, secrets))
+    return _IN_TEXT.sub(_REDACTED, text)
 
 
 def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
@@ -153,9 +159,10 @@ def _held() -> list[str]:
 
 
 def _credentials_in(address: str) -> list[str]:
-    """User name and password of an address together, and the password alone."""
-    found = re.search(_CREDENTIALS_IN_ADDRESS, address)
-    return [] if found is None else [found[0], found[0].partition(":")[2]]
+    """User name and password of an address together, the password alone, and the keys in its query."""
+    found = [f[0] for f in re.finditer(_CREDENTIALS_IN_ADDRESS, address)]
+    keys = [f["key"] for f in _KEY_IN_QUERY.finditer(address)]
+    return [*found, *(each.partition(":")[2] for each in found), *keys]
 
 
 def line_of_secret(text: str) -> int | None:

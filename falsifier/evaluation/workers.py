@@ -165,10 +165,8 @@ def _start_silent_tracker() -> None:
 def _prepare_worker(log_level: int, ending: _End, told: Reader) -> None:
     """Make a worker end with its parent, however that ends, and leave signals such as Ctrl-C to it.
 
-    Args:
-        log_level: the parent's level of the logger for simulations.
-        ending: closed at the other end if the worker is to end in the middle of a simulation.
-        told: who reads what the parent says.
+    ``log_level`` is the parent's for simulations, ``told`` reads what the parent says, and ``ending`` is
+    closed at the other end if the worker is to end in the middle of a simulation.
     """
     import os
     import signal

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance
 from falsifier.core.files import write_whole
-from falsifier.core.secrets import redact, secrets_in, without_secrets
+from falsifier.core.secrets import redact, secrets_in, without_credentials, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
 from falsifier.llm import litellm_adapter
@@ -98,11 +98,17 @@ class LiteLLMChat:
     _unreadable: int = field(init=False, default=0)
 
     @property
+    def address(self) -> str:
+        """Where prompts are sent, without a password or a key; empty: to the provider, or a model file."""
+        address = "" if self.content else server_address(self.llm, self.api_base) or ""
+        return redact(without_credentials(address))
+
+    @property
     def parameters(self) -> Mapping[str, Any]:
         """What is sent in addition to the messages, without secrets."""
         stated = {"effort": self.effort, "content": self.content or None}
         if self.api_base and not self.content:
-            stated["api_base"] = redact(self.api_base)
+            stated["api_base"] = self.address
         return {**{k: v for k, v in stated.items() if v is not None}, **without_secrets(self._options())}
 
     def complete(self, request: ChatRequest) -> ChatReply:
@@ -212,10 +218,13 @@ class LiteLLMChat:
         secrets = (key or "", *secrets_in(self.options))
         # litellm sends it to other providers' servers if it knows no key of theirs.
         others = os.environ.get("OPENAI_API_KEY", "").strip()
-        is_own = key is not None or provider_of(self.llm) in _OF_OPENAI
-        is_meant = is_own or others in secrets  # as an option, in Python
-        advice = f"the key of OpenAI; {unset_key(self.llm)}"
-        withheld = {others: advice} if others and not is_meant else {}
+        is_of_openai = provider_of(self.llm) in _OF_OPENAI
+        is_meant = key is not None or is_of_openai or others in secrets  # as an option, in Python
+        withheld = {} if is_meant else {others: f"the key of OpenAI; {unset_key(self.llm)}"}
+        withheld[""] = f"a key of blanks only; {unset_key(self.llm)}"
+        stated = {*secrets, *map(str, self.options.values())}
+        dropped = [] if is_of_openai else litellm_adapter.headers_of_openai()
+        dropped = [(name, value) for name, value in dropped if value not in stated]
         litellm_adapter.load_litellm()
         arguments = self._arguments(request)
         left = request.seconds_left
@@ -236,7 +245,8 @@ class LiteLLMChat:
 
         try:
             seconds = timeout if left is None else min(timeout, left)
-            return cleaned(within(seconds, ask, never=_not_to(self.llm), withheld=withheld), secrets)
+            never = () if is_of_openai else (litellm_adapter.HOST_OF_OPENAI,)
+            return cleaned(within(seconds, ask, never=never, withheld=withheld, dropped=dropped), secrets)
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
                 error, llm=self.llm, api_base=self.api_base, secrets=secrets, options=self.options
@@ -386,11 +396,6 @@ def connect(
         attempts=attempts,
         cache=cache,
     )
-
-
-def _not_to(llm: str) -> frozenset[str]:
-    """Hosts that are not those of an LLM's server: litellm sends to OpenAI's if it knows no other one."""
-    return frozenset() if provider_of(llm) in _OF_OPENAI else frozenset({"api.openai.com"})
 
 
 def _sent(message: Message, *, marks: bool) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
-from falsifier.core.secrets import redact
+from falsifier.core.secrets import redact, without_credentials
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
@@ -136,12 +136,12 @@ def classify(
     The ``options`` are those that the user passes on, by name.
     """
     provider, address = known(llm), server_address(llm, api_base)
-    where = f"{llm} at {redact(address, secrets)}: " if address else f"{llm}: "
+    told = redact(without_credentials(address or ""), secrets)
+    where = f"{llm} at {told}: " if address else f"{llm}: "
     if address and _is_refused(error) and (urlsplit(address).hostname or "") in _THIS_MACHINE:
         start = f"the server with '{provider.start}'" if provider.start else "the LLM's server"
         return TransientChatError(
-            f"{llm}: nothing is listening at {redact(address, secrets)}: start {start}, "
-            f"or correct {setting('api_base')}",
+            f"{llm}: nothing is listening at {told}: start {start}, or correct {setting('api_base')}",
             patience=_LOCAL_PATIENCE,
         )
     said = redact(printable(str(error)), secrets)

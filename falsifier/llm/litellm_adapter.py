@@ -10,6 +10,8 @@ github.com/BerriAI/litellm that tells of it:
 - It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` tells its own handler how to
   make one.
 - Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124): ``completed``.
+- Without an address it asks OpenAI, whoever the provider is (1.106.2, no issue): ``HOST_OF_OPENAI``. That
+  library takes headers from the environment, whatever server it asks: ``headers_of_openai``.
 - Of some providers it drops an effort that they take, unless the parameter is named (1.106.2, #14039):
   ``Provider.names_effort``.
 - It lists prices that nobody knows as zero (huggingface, 1.106.2, no issue): ``listed_price``.
@@ -31,6 +33,12 @@ from falsifier.llm.providers import PROVIDERS, known, provider_of, stated_addres
 from falsifier.llm.transport import guarded_client
 from falsifier.llm.usage import Price
 
+HOST_OF_OPENAI = "api.openai.com"
+_OF_ACCOUNT = {
+    "OPENAI_ORGANIZATION": "OpenAI-Organization",
+    "OPENAI_ORG_ID": "OpenAI-Organization",
+    "OPENAI_PROJECT_ID": "OpenAI-Project",
+}
 _ENVIRONMENT = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",
     "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",
@@ -77,6 +85,14 @@ def completed(llm: str, **arguments: Any) -> Any:
         arguments["max_retries"] = 0
     # What the LLM does not accept is omitted; dropped_parameters() tells it.
     return load_litellm().completion(model=llm, drop_params=True, **arguments)
+
+
+def headers_of_openai() -> list[tuple[str, str]]:
+    """Headers of the environment that are for OpenAI's server: who pays, and what else the user states."""
+    lines = [f"{name}: {os.environ.get(variable, '')}" for variable, name in _OF_ACCOUNT.items()]
+    lines += os.environ.get("OPENAI_CUSTOM_HEADERS", "").split("\n")
+    headers = [line.partition(":") for line in lines]
+    return [(name.strip(), value.strip()) for name, _, value in headers if value.strip()]
 
 
 def without_trace(text: str) -> str:

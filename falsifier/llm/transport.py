@@ -94,18 +94,19 @@ def within(
     *,
     never: Collection[str] = (),
     withheld: Mapping[str, str] = MappingProxyType({}),
+    dropped: Collection[tuple[str, str]] = (),
 ) -> T:
     """Return what an action returns, or give it up after so many seconds and cut its connections.
 
     Nothing is sent to the hosts ``never``, and no key that is ``withheld``: each with whose it is, and what
-    to do.
+    to do. Headers that are ``dropped``, by name and value, are left out.
 
     Raises:
         TimeoutError: if it has not returned by then.
         RefusedReplyError: if a server's reply was refused.
         BrokenReplyError: if the action failed because of the connection, or of a reply that is not readable.
     """
-    call = _Call(never, withheld)
+    call = _Call(never, withheld, dropped)
     outcome: SimpleQueue[tuple[T | None, BaseException | None]] = SimpleQueue()
 
     def work() -> None:
@@ -161,8 +162,10 @@ def _is_importing(thread: Thread) -> bool:
 class _Call:
     """The connections of one call, why a reply was refused, and what was wrong with the last one."""
 
-    def __init__(self, never: Collection[str], withheld: Mapping[str, str]) -> None:
-        self.never, self.withheld = never, withheld
+    def __init__(
+        self, never: Collection[str], withheld: Mapping[str, str], dropped: Collection[tuple[str, str]]
+    ) -> None:
+        self.never, self.withheld, self.dropped = never, withheld, dropped
         self.refusal = ""
         self.fault: BrokenReplyError | None = None
         self._lock = Lock()
@@ -236,8 +239,11 @@ class _Guarded(httpx.BaseTransport):
         if request.url.host in call.never:
             own = f"the address of your server: {setting('api_base', 'URL')}"
             call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
+        for name, value in call.dropped:
+            if request.headers.get(name) == value:
+                del request.headers[name]
         for value in request.headers.values():
-            if advice := call.withheld.get(value.removeprefix("Bearer ").strip()):
+            if value and (advice := call.withheld.get(value.removeprefix("Bearer ").strip())):
                 call.refuse(f"nothing was sent to {request.url.host}: it would have got {advice}")
         # A connection kept from an earlier call would be unknown here and could not be cut.
         request.headers["Connection"] = "close"

@@ -70,14 +70,8 @@ def usage_of(
     What a server reports may be wrong. A count that cannot be true (negative, not an integer, 0 for a text)
     is estimated, and a cost that cannot be true is unknown: otherwise the limits of a run would not hold.
 
-    Args:
-        response_usage: as the provider sent it, with OpenAI's field names; None or zeros: no counts, and
-            tokens are counted here.
-        llm: name of the LLM.
-        request: what was sent.
-        text: what was received.
-        price: price stated by the user; overrides any reported cost.
-        reported_cost: US dollars as computed by the client library; None if the price is unknown.
+    ``response_usage`` is what the provider sent, with OpenAI's field names; without counts, tokens are
+    counted here. The user's ``price`` overrides the ``reported_cost``, which the client library computed.
     """
     prompt = possible_count(getattr(response_usage, "prompt_tokens", None))
     completion = possible_count(getattr(response_usage, "completion_tokens", None))

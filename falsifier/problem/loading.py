@@ -112,24 +112,10 @@ def load_problem(
 ) -> Problem:
     """Load one problem.
 
-    Args:
-        target: see ProblemSource; a path too. The requirement's name is optional if the spec has only one.
-        stl: a formula, or a template with its arguments, to use instead of the spec's requirement.
-        profile: name of a profile of the spec, e.g. ``instance2``.
-        parameterization: ``free``: engines may choose control points within the spec's limits; ``fixed``:
-            only the control points of the spec are allowed.
-        shortest_piece: minimum time in s between two control points of every input, which makes all inputs
-            free; None: the spec's or the default limits.
-        inputs: overrides for the spec's inputs; see InputChoice.
-        parameters: overrides for the spec's parameters; see ParameterChoice.
-        stop_time: end of each simulation in s.
-        output_interval: step of the monitored time grid in s.
-        time_limit: maximum wall-clock time of one simulation in s.
-        interface: interface with which the FMU is simulated.
-        context: files that a language model may read, ``fmu`` or ``none``; see ProblemSource.
-        omit: outputs not to record, such as one that becomes NaN and that no formula names.
-        allow: what the FMU may do beyond what the spec allows: ``write:PATH``, ``read:PATH``, ``programs``.
-        deny: what it may not do: ``network``.
+    ``target``, a path too, ``profile``, ``parameterization``, ``shortest_piece`` and ``context`` are those of
+    ProblemSource; the requirement's name is optional if the spec has only one. ``stl`` is a formula, or a
+    template with its arguments, in place of the spec's requirement. All others are those of Problem.from_fmu,
+    and override what the spec states.
 
     Raises:
         SpecError: naming the file, the key and the remedy.

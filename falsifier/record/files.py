@@ -18,7 +18,7 @@ from pydantic import BaseModel, ValidationError
 from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import JournalError, first_fault
+from falsifier.errors import JournalError, first_fault, written
 
 _LOG = logging.getLogger(__name__)
 
@@ -156,6 +156,19 @@ def can_be_a_folder(directory: Path) -> Iterator[None]:
         raise JournalError(
             f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
         ) from None
+
+
+def check_unused(directory: Path) -> None:
+    """Check that a folder that is to be written has no content; what a killed process left in it is empty.
+
+    Raises:
+        JournalError: if it has any, which users may have changed, or cannot be a folder.
+    """
+    with can_be_a_folder(directory):
+        for path in directory.iterdir() if directory.exists() else ():
+            if next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size:
+                other = f"choose another {written('--out', 'directory')}, new or empty"
+                raise JournalError(f"{directory} has files, which are kept: {other}")
 
 
 def set_aside(path: Path) -> Path:

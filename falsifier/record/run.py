@@ -23,7 +23,7 @@ from falsifier.problem.loading import load_source, load_sources, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.files import CAMPAIGN
+from falsifier.record.files import CAMPAIGN, check_unused
 from falsifier.record.journal import JOURNAL, STOP, holds_run, open_journal, simulated
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
@@ -118,7 +118,7 @@ def falsify(
             start from does not fit it.
         ModelError: if the FMU cannot be used.
         ChatError: if the language model cannot be asked; raised before the first simulation.
-        JournalError: if the directory already contains a run.
+        JournalError: if the directory is not empty; a run in it can be resumed.
 
     >>> falsify("AT1", budget=20).status  # doctest: +SKIP
     'falsified'
@@ -141,6 +141,8 @@ def falsify(
         raise SpecError("budget: tokens and cost limit a language model, and none is named; drop the limit")
     name = engine if isinstance(engine, str | None) else engine.name
     settings = _settings(llm)
+    if directory is not None and len(groups) > 1:
+        check_unused(path_of("directory", directory))
     results: dict[str, Result] = {}
     for group in groups:
         request = RunRequest(
@@ -287,6 +289,8 @@ def carry_out(
                 f"{directory} contains a journal without its manifest, so its run is unknown: "
                 "choose another directory, or delete it"
             )
+        if directory is not None and not begun and not resume:
+            check_unused(directory)
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         recorded = manifest.read(directory) if begun and directory else None
         told = told_problems(request, problems, recorded.contexts if recorded else {})

@@ -11,9 +11,6 @@ from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
 from falsifier.search import DEFAULT_SIMULATIONS
 
 # What to say if a cost is limited that cannot be known.
-UNKNOWN_PRICE = (
-    "the price of {} is unknown, so its cost cannot be limited: state it ({}), or limit the tokens"
-)
 # What requests to a language model use beside their cost, which may be unknown.
 USED = ("without_reply", "kept", "prompt_tokens", "completion_tokens", "reasoning_tokens")
 
@@ -21,6 +18,14 @@ USED = ("without_reply", "kept", "prompt_tokens", "completion_tokens", "reasonin
 def stated_price() -> str:
     """Return how the reader states the price of a language model."""
     return written("--llm-option price=SENT:RECEIVED", "price=(SENT, RECEIVED)")
+
+
+def unknown_price(llm: str) -> SpecError:
+    """The error of a limit of the cost that cannot hold; what is resumed keeps the price of its start."""
+    return SpecError(
+        f"the price of {llm} is unknown, so its cost cannot be limited: limit the tokens, or state it where "
+        f"the run or campaign is started ({stated_price()})"
+    )
 
 
 class LimitReached(FalsifierError):
@@ -133,7 +138,7 @@ class Budget:
             return f"the budget of {counted(self.tokens, 'token')} is used up"
         if self.cost is not None:
             if spent.cost is None:
-                raise SpecError(UNKNOWN_PRICE.format("this language model", stated_price()))
+                raise unknown_price("this language model")
             if spent.cost >= self.cost:
                 return f"the budget of {self.cost:g} US dollars is used up"
         return None

@@ -22,6 +22,7 @@ class RunStarted:
         engines: name of each problem's engine.
         budget: limits of the run.
         searched: the part of the search space that the engines use.
+        server: address to which prompts go, if it is not the provider's own.
         replayed: number of evaluations taken from the run's journal.
     """
 
@@ -29,6 +30,7 @@ class RunStarted:
     engines: tuple[str, ...]
     budget: Budget
     searched: SearchSpace
+    server: str = ""
     replayed: int = 0
 
 

@@ -129,12 +129,14 @@ class _Loop:
     last_error: str = ""
     last_defect: str = ""
     is_answered: bool = False
+    server: str = ""
     unrecorded: str = ""
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
 
         def wrap(chat: Chat) -> Chat:
+            self.server = getattr(chat, "address", "")
             return RunChat(chat, self.budget, self.clock, self.steps.exchanges)
 
         for state in self.states:
@@ -151,6 +153,7 @@ class _Loop:
                 engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
                 searched=self.searched,
+                server=self.server,
                 replayed=self.steps.replayed,
             )
         )

@@ -12,7 +12,7 @@ from falsifier.errors import SpecError, setting
 from falsifier.llm.messages import Chat
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
-from falsifier.search.budget import UNKNOWN_PRICE, stated_price
+from falsifier.search.budget import unknown_price
 from falsifier.search.request import LLMSettings, RunRequest
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
 def check_price(llm: LLMSettings, max_cost: float | None) -> None:
     """Reject a limit of the cost that cannot hold; SpecError if the price is unknown."""
     if max_cost is not None and price_of(llm) is None:
-        raise SpecError(UNKNOWN_PRICE.format(llm.name, stated_price()))
+        raise unknown_price(llm.name)
 
 
 def price_of(llm: LLMSettings) -> "Price | None":

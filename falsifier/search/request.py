@@ -60,6 +60,11 @@ class LLMSettings(Strict):
     anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 
+    @property
+    def told(self) -> str:
+        """Its name, and where its server is, if that is not the provider's own."""
+        return f"{self.name} at {self.api_base}" if self.api_base else self.name
+
     @model_validator(mode="before")
     @classmethod
     def _address_of_environment(cls, given: Any, info: ValidationInfo) -> Any:

@@ -129,12 +129,8 @@ class _Compiler:
     ) -> Location:
         """Append one step and return the location of its result.
 
-        Args:
-            function: what it calculates.
-            first: first sample of its result and of its operands.
-            last: last sample of them.
-            operands: their locations.
-            ahead: by how many samples the first and the last one of the operands are later.
+        ``first`` and ``last`` are samples of the result and of its operands; those of the operands are later
+        by ``ahead`` samples, each.
         """
         start, end = first + ahead[0], last + ahead[1] + 1
         reads = [slice(location.at(start), location.at(end)) for location in operands]

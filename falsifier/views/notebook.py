@@ -1,4 +1,4 @@
-"""How problems, trajectories, verdicts and results look in notebooks.
+"""How problems, results and what they consist of look in notebooks.
 
 The values do not depend on this module: their formatters are registered with IPython by type name. The markup
 consists of plain tables and PNG images, so that code hosts display it too::
@@ -10,14 +10,19 @@ consists of plain tables and PNG images, so that code hosts display it too::
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import candidate_facts, counted
+from falsifier.counterexamples.explain import Explanation
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import Verdict, in_words
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import el, join, picture, table
+from falsifier.views.model_text import info_text
 from falsifier.views.text import Fact, broken_facts, margin_facts, result_facts, seconds_text
 
 # Images are stored in the notebook file; at this resolution about 20 kB each.
@@ -29,7 +34,7 @@ _SHOWN_QUESTIONS = 5
 
 
 def register() -> None:
-    """Let IPython show problems, verdicts, evaluations, trajectories and results; outside it do nothing."""
+    """Let IPython show these values; outside it do nothing."""
     from IPython.core import getipython
 
     shell: Any = getipython.get_ipython()
@@ -109,6 +114,10 @@ _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
     Problem: problem_html,
     Verdict: lambda verdict: table((), [*broken_facts(verdict), *margin_facts(verdict, {}, {})]),
     Evaluation: evaluation_html,
+    Candidate: lambda candidate: table((), candidate_facts(candidate)),
+    Confirmation: lambda c: join(el("p", f"{c.outcome}: {c.reason}"), evaluation_html(c.evaluation)),
+    Explanation: lambda explanation: el("p", explanation.text),
+    ModelInfo: lambda info: el("pre", info_text(info)),
     Trajectory: trajectory_html,
     Result: result_html,
 }

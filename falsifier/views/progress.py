@@ -154,7 +154,8 @@ class News:
                 known = counted(event.replayed, "evaluation")
                 replayed = f", {known} from the journal" if event.replayed else ""
                 formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
-                return [*formulas, f"engine {event.engines[0]}{replayed}", *_choices(event)]
+                sent = f", prompts go to {event.server}" if event.server else ""
+                return [*formulas, f"engine {event.engines[0]}{sent}{replayed}", *_choices(event)]
             case Evaluated(evaluation=ended, spent=spent):
                 told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):

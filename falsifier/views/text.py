@@ -34,15 +34,15 @@ def result_text(result: Result) -> str:
     head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
     head += f"{untested(result.findings)} ({seconds_text(result.spent)})"
     lines = [head, *fact_lines(result_facts(result))]
+    place = shlex.quote(str(result.directory))
     if result.directory is not None and result.directory.is_dir():
         lines.append(f"  files          {result.directory}")
         lines += [f"  picture        {picture}" for picture in _pictures(result)]
-        if _can_continue(result):
-            lines.append(_continue_line(result.directory))
-        elif result.status == "not falsified" and result.best is not None:
-            place = shlex.quote(str(result.directory))
+        if result.status == "not falsified" and result.best is not None:
             nearest = f"falsifier explain {place} (the nearest miss)"
             lines.append(f"to look closer: {nearest}, falsifier coverage {place} (what was tried)")
+    if result.directory is not None and _can_continue(result):
+        lines.append(_continue_line(result.directory))
     if result.status == "failed":
         lines.append(f"failed: {result.reason}")
     return "\n".join(map(one_line, lines))
@@ -167,8 +167,8 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
         return []
     values = []
     for name, value in verdict.values.items():
-        label = labels.get(name, {}).get(int(value), "")
-        words = (f"{name} = {value:.6g}", units.get(name, ""), label and f"({label})")
+        label = labels[name].get(int(value)) if labels.get(name) else None
+        words = (f"{name} = {value:.6g}", units.get(name), label and f"({label})")
         values.append(" ".join(filter(None, words)))
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
@@ -228,6 +228,8 @@ def _can_continue(result: Result) -> bool:
 
 
 def _continue_line(directory: Path) -> str:
+    if not directory.is_dir():
+        return f"{directory} was moved or deleted; if it was moved, to continue: falsifier resume NEW_PLACE"
     return f"to continue: falsifier resume {shlex.quote(str(directory))}"
 
 

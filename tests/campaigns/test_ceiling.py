@@ -66,7 +66,7 @@ def test_the_listed_price_is_not_that_of_another_server() -> None:
 )
 def test_a_cost_that_cannot_be_known_is_not_limited(limits: dict[str, Any], tmp_path: Path) -> None:
     unknown = LLMSettings(name="hosted_vllm/x", api_base="http://127.0.0.1:9")
-    with pytest.raises(SpecError, match=r"the price of hosted_vllm/x is unknown.*state it \(price="):
+    with pytest.raises(SpecError, match=r"the price of hosted_vllm/x is unknown.*started \(price="):
         run_campaign(asked(unknown, **limits), tmp_path / "c")
     assert not (tmp_path / "c").exists()
     check_request(asked(unknown.model_copy(update={"price": (1.0, 2.0)}), **limits))

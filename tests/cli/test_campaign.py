@@ -31,7 +31,8 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
 def test_a_cost_that_cannot_be_known_is_not_limited(limit: tuple[str, str], tmp_path: Path) -> None:
     asked = ("--llm", "hosted_vllm/x", "--api-base", "http://127.0.0.1:9", "--yes", "--out", "c", *limit)
     done = falsifier("bench", NEVER, "--runs", "1", *asked, cwd=tmp_path)
-    assert (done.code, "--llm-option price=SENT:RECEIVED" in done.err) == (2, True), done.err
+    told = "limit the tokens, or state it where the run or campaign is started (--llm-option price="
+    assert (done.code, told in done.err) == (2, True), done.err
     assert "limited to" not in done.err and not (tmp_path / "c").exists()
 
 
@@ -123,16 +124,16 @@ def test_methods_are_all_combinations(command: Any, requested: list[Any]) -> Non
 
 
 def test_engines_that_ask_no_language_model_run_beside_those_that_do(
-    command: Any, requested: list[Any]
+    command: Any, requested: list[Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("OPENAI_API_BASE", "http://me:word@127.0.0.1:9")
     engines = ("--engine", "llm", "--engine", "uniform", "--engine", "hybrid")
-    command("bench", HARD, "--runs", "1", *engines, "--llm", "x/y", "--llm", "x/z", "--max-cost", "2")
+    done = command("bench", HARD, "--runs", "1", *engines, "--llm", "openai/y", "--llm", "x/z")
     (request,) = requested
-    asked = [(r.engine, r.llm and r.llm.name, r.budget.cost) for r in request.runs]
-    assert asked == [
-        *(("llm", "x/y", 2.0), ("llm", "x/z", 2.0), ("uniform", None, None)),
-        *(("hybrid", "x/y", 2.0), ("hybrid", "x/z", 2.0)),
-    ]
+    y, z = "openai/y at http://127.0.0.1:9", "x/z"  # which has an address of its own
+    asked = [(r.engine, r.llm and r.llm.told) for r in request.runs]
+    assert asked == [("llm", y), ("llm", z), ("uniform", None), ("hybrid", y), ("hybrid", z)]
+    assert f"questions to {y}, {z}; the price is unknown" in done.stderr
 
 
 def test_a_language_model_that_no_engine_asks_is_refused(tmp_path: Path) -> None:

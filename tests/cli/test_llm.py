@@ -91,6 +91,7 @@ def test_two_replies_falsify_at1(tmp_path: Path) -> None:
     assert found["spent"]["simulations"] == found["spent"]["calls"] == 2
     assert found["counterexample"]["robustness"] == pytest.approx(-0.2133, abs=1e-3)
     assert found["counterexample"]["rationale"] == "full throttle throughout"
+    assert f"engine openai/gpt-5-mini MP4, prompts go to {server.url}\n" in done.err
     assert "best robustness +0.418" in done.err
     assert "Sample" not in first
     for part in ("robustness 0.419", "82.5", "81.5", "20.0 s", "119.6"):

@@ -54,7 +54,7 @@ def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
         shown = falsifier(*asked(server, "my.toml"), cwd=tmp_path, env=ENV)
         done = falsifier(*asked(server, "my.toml"), "--choose", "1", cwd=tmp_path, env=ENV)
         assert len(server.received) == 1  # the second time from the cache
-    assert shown.code == 0, shown.err
+    assert (shown.code, shown.err) == (0, f"asking openai/gpt-5-mini at {server.url}\n")
     assert (
         "1. G[0,20] (speed <= 120)\n   in words   At all times from 0 to 20 s, speed is at most 120."
         in shown.out

@@ -33,6 +33,7 @@ KEYS = (
         ("A_B_CREDENTIALS_1", "x"),
         ("MY_ACCESS_KEYS", "x"),
         ("ADDRESS", "https://me:hunter22@host"),
+        ("ADDRESS", "https://host/v1?x=1&sig=hunter22"),
         *(("PLAIN", key) for key in KEYS),
     ],
 )
@@ -92,6 +93,7 @@ def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         "-----BEGIN RSA PRIVATE KEY-----",
         "db_password = 'hunter22x'",
         "https://me:secret1@example.org/a",
+        "https://example.org/a?token=secret1",
         "Authorization: Bearer abcdefgh",
         *(f"limit = {key}" for key in KEYS),
     ],
@@ -119,6 +121,7 @@ def test_secrets_of_settings_sources_and_key_files_are_found(line: str) -> None:
         "password=argv[1];",
         "password = getenv(NAME);",
         "const char *password = config->password;",
+        "https://example.org/a?api-version=2024-10-21&monkey=banana",
         "Authorization: mailto:someone@example.org",
         '<a href="mailto://someone@example.org">',
     ],

@@ -20,10 +20,7 @@ def version() -> int:
 def without(number: int, error: int, bits: int = 0) -> None:
     """Let this process and what it starts live on a system without a system call, for good.
 
-    Args:
-        number: of the call.
-        error: what the call returns.
-        bits: only if its second argument has one of these.
+    It returns the error; with ``bits``, only if its second argument has one of these.
     """
     # Load the number; if it is this one, load the argument; if it has the bits, return the error.
     steps = [(0x20, 0, 0, 0), (0x15, 0, 3, number), (0x20, 0, 0, 24), (0x45, 0, 1, bits)]

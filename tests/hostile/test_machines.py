@@ -162,6 +162,7 @@ def test_a_search_that_cannot_be_recorded_any_more_shows_its_best(
     told = capsys.readouterr().out
     assert f"failed: the run cannot be recorded: {place}/" in told
     assert (f"to continue: falsifier resume {place}" in told) == place.exists() == (not moved)
+    assert (f"{place} was moved or deleted; if it was moved, to continue: falsifier resume " in told) == moved
     (resumed,) = resume(tmp_path / "moved" if moved else place, problems=[impossible()])
     assert resumed.status == "not falsified" and len(resumed.evaluations) == 5
 

@@ -61,9 +61,7 @@ def test_the_key_comes_from_the_providers_variables(
         ("gemini/gemini-2.5-flash", "GEMINI_API_KEY or GOOGLE_API_KEY"),
     ],
 )
-def test_a_missing_or_empty_key_names_its_variables(
-    llm: str, variables: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_key_names_its_variables(llm: str, variables: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "  ")
     with pytest.raises(ChatError, match=f"{llm}: no API key: set {variables}"):
         connect(llm)
@@ -150,14 +148,18 @@ def test_a_short_text_in_place_of_the_key_of_openai_hinders_nobody(monkeypatch: 
         )
 
 
+@pytest.mark.parametrize(
+    ("key", "whose"), [("sk-openai", "the key of OpenAI"), ("  ", "a key of blanks only")]
+)
 @pytest.mark.parametrize("llm", ["nvidia_nim/x", "perplexity/x", "deepinfra/x"])
-def test_the_key_of_openai_goes_to_no_other_provider(llm: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_of_openai_goes_to_no_other_provider(
+    llm: str, key: str, whose: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """litellm takes it where it knows no other one."""
-    monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
+    monkeypatch.setenv("OPENAI_API_KEY", key)
     with serving(Step("an answer")) as server:
-        with pytest.raises(
-            ChatError, match=r"sent to 127\.0\.0\.1: it would have got the key of OpenAI; set .*_API_KEY"
-        ) as caught:
+        refused = rf"sent to 127\.0\.0\.1: it would have got {whose}; set .*_API_KEY"
+        with pytest.raises(ChatError, match=refused) as caught:
             connect(llm, api_base=server.url, attempts=1).complete(QUESTION)
         assert not server.received and "sk-openai" not in str(caught.value)
 
@@ -165,9 +167,14 @@ def test_the_key_of_openai_goes_to_no_other_provider(llm: str, monkeypatch: pyte
 @pytest.mark.parametrize("llm", ["custom_openai/x", "litellm_proxy/x", "xinference/x"])
 def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
-    with serving(Step("an answer")) as server:
+    for variable in ("OPENAI_ORGANIZATION", "OPENAI_ORG_ID", "OPENAI_PROJECT_ID"):
+        monkeypatch.setenv(variable, "account")
+    monkeypatch.setenv("OPENAI_CUSTOM_HEADERS", "X-Account: account")
+    with serving(Step("an answer"), Step("an answer")) as server:
         assert connect(llm, api_base=server.url, attempts=1).complete(QUESTION).text == "an answer"
-    assert [r.headers["Authorization"] for r in server.received] == [f"Bearer {NO_KEY}"]
+        connect("openai/x", api_base=server.url).complete(QUESTION)
+    assert [r.headers["Authorization"] for r in server.received] == [f"Bearer {NO_KEY}", "Bearer sk-openai"]
+    assert [list(r.headers.values()).count("account") for r in server.received] == [0, 3]
 
 
 def test_a_missing_key_that_only_litellm_misses_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -219,9 +226,7 @@ def test_a_key_that_no_request_can_contain_is_refused_and_not_shown(
     assert "sk-" not in str(caught.value)
 
 
-def test_an_address_of_the_environment_is_recorded_and_has_its_own_price(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_address_of_the_environment_is_recorded_and_priced(monkeypatch: pytest.MonkeyPatch) -> None:
     own = LLMSettings(name="openai/gpt-5-mini")
     assert own.api_base is None and price_of(own) is not None
     monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:1/v1")
@@ -232,10 +237,17 @@ def test_an_address_of_the_environment_is_recorded_and_has_its_own_price(
         open_chat(own)
 
 
+@pytest.mark.parametrize(
+    ("private", "plain"),
+    [
+        ("http://me:word@127.0.0.1:1/v1", "http://127.0.0.1:1/v1"),
+        ("http://127.0.0.1:1/v1?x=1&apikey=word12", "http://127.0.0.1:1/v1"),
+        ("http://127.0.0.1:1/hf-ordinary/sk-abcdefghijklmnopq", "http://127.0.0.1:1/hf-ordinary/[redacted]"),
+    ],
+)
 def test_an_address_is_recorded_without_its_password_and_used_with_it(
-    monkeypatch: pytest.MonkeyPatch,
+    private: str, plain: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    private, plain = "http://me:word@127.0.0.1:1/v1", "http://127.0.0.1:1/v1"
     monkeypatch.setenv("OPENAI_API_BASE", private)
     settings = LLMSettings(name="openai/mine")
     assert settings.api_base == plain
@@ -245,6 +257,8 @@ def test_an_address_is_recorded_without_its_password_and_used_with_it(
     monkeypatch.delenv("OPENAI_API_BASE")
     chats.append(open_chat(settings))
     assert [chat.api_base for chat in chats] == [private, plain, plain]  # type: ignore[attr-defined]
+    with pytest.raises(ChatSetupError, match="would be recorded; drop it"):
+        connect("openai/mine", api_base=private)
     monkeypatch.setenv("OPENAI_API_BASE", "http://me:a/word@127.0.0.1:2/v1")
     with pytest.raises(ChatSetupError, match=r"OPENAI_API_BASE in the environment: .* as %2F") as caught:
         LLMSettings(name="openai/mine")

@@ -40,8 +40,8 @@ def told(error: Exception | str, llm: str = "m", api_base: str | None = None) ->
 
 def test_no_secret_and_no_stack_survives_classification() -> None:
     said = "it was my-secret-key. Traceback (most recent call last): lots"
-    error = str(told(said, "openai/x", "http://me:my-secret-key@host/v1"))
-    assert "my-secret-key" not in error and "Traceback" not in error and "openai/x" in error
+    error = str(told(said, "openai/x", "http://me:my-secret-key@host/v1?token=my-secret"))
+    assert "my-secret" not in error and "Traceback" not in error and "openai/x at http://host/v1:" in error
     trace = "litellm.APIError: \nTraceback (most recent call last): content_policy_violation"
     assert "content filter" not in str(told(trace)), "a stack trace is not what the server says"
 

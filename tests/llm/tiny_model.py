@@ -33,13 +33,7 @@ _TEMPLATE = """\
 
 
 def write_tiny_model(file: Path, *, context: int = 65_536, seed: int = 0) -> None:
-    """Write a model with random weights.
-
-    Args:
-        file: the file to write.
-        context: number of tokens that it claims to be trained for.
-        seed: of the weights.
-    """
+    """Write a model with random weights, which claims to be trained for so many tokens of context."""
     tokens = [*_SPECIAL, *(f"<0x{byte:02X}>" for byte in range(256))]
     values: dict[str, Value] = {
         "general.architecture": "llama",

@@ -55,12 +55,7 @@ class Driver:
     ) -> dict[str, Array]:
         """Outputs by name on the evenly spaced grid of the inputs, shape (samples,) each.
 
-        Args:
-            inputs: values at every grid time, each held until the next one.
-            outputs: names of real or integer variables.
-            stop_time: last grid time in s.
-            samples: number of grid times, both ends included.
-            parameters: values set before the start.
+        Inputs are values at every grid time, each held until the next one; both ends are grid times.
         """
         grid = tuple(np.linspace(0.0, stop_time, samples).tolist())
         held = {name: Signal(grid, tuple(u.tolist()), "constant") for name, u in inputs.items()}

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from IPython.core.formatters import DisplayFormatter
 
-from falsifier import Evaluation, evaluate, falsify
+from falsifier import Evaluation, evaluate, explain, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.views.notebook import register
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
@@ -47,7 +47,11 @@ def test_a_violating_result_shows_its_robustness_and_a_picture(notebook: Noteboo
     result = falsify(hard(), "corners", budget=10)
     html = notebook.html(result)
     assert result.counterexample is not None
-    assert f"{result.counterexample.evaluation.robustness:+.6g} (violated" in html
+    problem, found = result.problem, result.counterexample.evaluation
+    shown = (result.counterexample, found.candidate, problem.info, explain(problem, found))
+    words = ("<p>confirmed: a fresh sim", "u constant 1", "<pre>lag  FMI", "<p>HARD requires: ")
+    assert all(each in notebook.html(value) for value, each in zip(shown, words, strict=True))
+    assert f"{found.robustness:+.6g} (violated" in html
     (picture,) = pictures(html)
     assert {OUTPUT, INPUT, CRITICAL} <= colours(picture), "what decided is drawn"
 

@@ -72,9 +72,7 @@ class Explorer:
     def propose(self, rng: np.random.Generator, *, aimed: bool = False) -> Proposal:
         """Return the next input: one that reached a rare mark, continued differently after it.
 
-        Args:
-            rng: random generator.
-            aimed: whether new values are drawn between the levels at which something changes.
+        ``aimed``: new values are drawn between the levels at which something changes.
         """
         programs = self._aimed if aimed else self.programs
         if not programs.has_inputs:

@@ -106,12 +106,7 @@ class Programs:
     ) -> Array:
         """Return the program that is the same up to a time, followed after a pause by a span of another one.
 
-        Args:
-            rng: random generator.
-            point: the program to continue, shape (d,).
-            time: end in s of what is kept of it.
-            source: the program that the span is taken from, shape (d,).
-            span: its start and end in s.
+        Programs have shape (d,); ``span`` is start and end in s of what is taken from ``source``.
         """
         result = self._parameters(rng, point)
         pause = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2))))) - 1.0

@@ -31,16 +31,9 @@ def propose_change(
 ) -> tuple[Array, str]:
     """Return a change of one of the best points, or a random point, and what it is.
 
-    What comes after the time that decided a cost cannot lower it, so such changes are not proposed.
-
-    Args:
-        layout: layout of the points.
-        points: what was simulated, shape (n, d).
-        costs: shape (n,).
-        decided: time in s by which the inputs had decided each cost, shape (n,).
-        rng: random generator.
-        risk: returns from 0 to 1 how likely the simulations of points fail, shape (m,).
-        draws: number of random points among which the least risky one is chosen.
+    What comes after the time in s by which the inputs had ``decided`` a cost, shape (n,), cannot lower it, so
+    such changes are not proposed. ``points`` were simulated, shape (n, d). Of ``draws`` random points, the
+    one with the least ``risk`` is chosen: from 0 to 1, how likely the simulations of points fail, shape (m,).
     """
     if len(costs) >= _FEWEST and rng.random() >= _FRESH:
         children = _changes(layout, points, costs, decided, rng)

@@ -41,15 +41,9 @@ def plan(
 ) -> Array:
     """Return the most promising point that has not been simulated yet, or one that has if none else is found.
 
-    Args:
-        predict: returns the predicted costs of points.
-        layout: layout of the points.
-        elites: best simulated points, shape (e, d).
-        critical: their critical times as shares of the horizon, shape (e,).
-        seen: all simulated or pending points, shape (s, d).
-        outputs: number of predicted outputs.
-        settings: sizes of the populations.
-        rng: random generator.
+    ``predict`` returns the predicted costs of points from a number of ``outputs``. ``elites`` are the best
+    simulated points, shape (e, d), ``critical`` their critical times as shares of the horizon, shape (e,),
+    and ``seen`` all simulated or pending points, shape (s, d).
     """
     share = min(1.0, _MOST_SIGNALS / (outputs + len(layout.groups)))
     first, later = (max(round(share * n), _PARENTS) for n in (settings.pool, settings.children))

@@ -57,10 +57,8 @@ class Policy:
     def choose(self, arms: Sequence[str], reserved: Mapping[str, float], rng: np.random.Generator) -> str:
         """Draw one of the arms that can propose now.
 
-        Args:
-            arms: names of the arms.
-            reserved: shares of the turns that no rating takes away, together less than 1; others have none.
-            rng: random generator.
+        ``reserved`` are shares of the turns that no rating takes away, together less than 1; other arms have
+        none.
         """
         kept = np.array([reserved.get(arm, 0.0) for arm in arms])
         brought, turns = (np.array([each[arm] for arm in arms]) for each in (self._brought, self._turns))

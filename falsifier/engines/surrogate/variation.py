@@ -49,13 +49,8 @@ def mutations(
 ) -> Array:
     """Return children, shape (count, d), each with one to three changes of a parent, some also crossed over.
 
-    Args:
-        layout: layout of the points.
-        rng: random generator.
-        parents: points to change, shape (p, d).
-        count: number of children.
-        critical: critical time of each parent as a share of the horizon, shape (p,), or None if unknown. If
-            known, half of the changes of held cells end there, because only earlier inputs led to it.
+    ``critical`` are the critical times of the parents, shape (p, d), as shares of the horizon, shape (p,). If
+    known, half of the changes of held cells end there, because only earlier inputs led to it.
     """
     chosen = rng.integers(0, len(parents), count)
     children = _crossed(layout, rng, parents[chosen], parents)

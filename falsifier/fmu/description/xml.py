@@ -24,14 +24,11 @@ class _SeenError(Exception):
 def read_xml(text: bytes, shown: str, wrong: type[ModelError] | type[SpecError]) -> Element:
     """Return the root element of a document.
 
-    Args:
-        text: the document.
-        shown: what errors call it.
-        wrong: the error to raise if it is not well-formed, declares a document type, or is too deep or too
-            large.
+    Errors call the document ``shown``.
 
     Raises:
-        ModelError, SpecError: the one that was given.
+        ModelError, SpecError: the one that is ``wrong``, if it is not well-formed, declares a type, or
+            is too deep or too large.
     """
     refused = f"{shown}: refused because it"
     if text.count(b"<") > _MAX_SIGNS:

@@ -136,12 +136,9 @@ def encoded(
 ) -> bytes:
     """Return what the guard of a worker is told; see worker/platform/guard.c.
 
-    Args:
-        rights: what the FMU may do.
-        folders: its own folders, the working folder first.
-        hidden: what it may not read.
-        memory: bytes that its processes may use together; 0: no limit.
-        command: the program that the process becomes, which is Wine; empty: the worker itself.
+    ``folders`` are the FMU's own, the working folder first, and ``hidden`` what it may not read. Its
+    processes may use ``memory`` bytes together; 0: no limit. The process becomes the program ``command``,
+    which is Wine; empty: the worker itself.
     """
     own = [str(path) for path in (*map(Path.resolve, folders), *rights.writable)]
     parts = [bytes([_WRITABLE]) + os.fsencode(path) for path in own]

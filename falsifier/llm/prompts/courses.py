@@ -148,17 +148,10 @@ def course(
 ) -> str:
     """Return breakpoints as ``time:value``, joined by straight lines, and envelopes and periods between them.
 
-    What is less exact than claimed says so.
-
-    Args:
-        times: time grid in s.
-        column: the signal.
-        clock: decimals of times.
-        tolerance: distance from the signal that is wanted, in its own unit; one number or one per time.
-        slower_than: oscillations with at least this period in s are told point by point, if points suffice.
-        claimed: distance that the reader is told in general; default: the largest that is wanted.
-        kept: times in s at which a breakpoint is wanted in any case.
-        most: maximum number of other breakpoints.
+    ``clock`` is the number of decimals of times, ``tolerance`` the distance from the signal that is wanted,
+    in its own unit, one number or one per time. Oscillations with at least the period ``slower_than`` are
+    told point by point, if points suffice. What is less exact than ``claimed``, by default the largest
+    distance that is wanted, says so. ``most`` limits the breakpoints beside those at the times ``kept``.
     """
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), times.shape)
     kept, claimed = tuple(kept), float(allowed.max()) if claimed is None else claimed
@@ -219,16 +212,9 @@ def breakpoints(
     Ramer-Douglas-Peucker with distances along the value axis, as multiples of what is allowed; the worst
     segment is divided first, so that a limited number of points goes where it is needed most.
 
-    Args:
-        times: time grid in s.
-        column: the signal.
-        tolerance: distance that is allowed; one number or one per time.
-        first: distance that is allowed anywhere; segments that exceed it are divided before all others.
-        most: maximum number of points in addition to those kept.
-        kept: indices to choose in any case.
-
-    Returns:
-        Indices in order.
+    ``tolerance`` is the distance that is allowed, one number or one per time; segments that exceed the one
+    ``first`` are divided before all others. ``most`` is the maximum number of points beside the indices
+    ``kept``, which are chosen in any case. Returns indices in order.
     """
     allowed = np.maximum(np.broadcast_to(tolerance, times.shape), np.finfo(np.float64).tiny)
     chosen = sorted({0, *kept, len(times) - 1})
@@ -248,11 +234,8 @@ def oscillations(
 ) -> list[Swing]:
     """Intervals in which a signal has at least six turning points, each pair closer than half a period.
 
-    Args:
-        times: time grid in s.
-        column: the signal.
-        slower_than: period in s from which a movement is no oscillation in this sense.
-        tolerance: allowed distance of the signal; default: a fiftieth of its span.
+    From the period ``slower_than`` in s on, a movement is none. The ``tolerance`` is the allowed distance of
+    the signal; default: a fiftieth of its span.
     """
     usual = _RIPPLE_SHARE * float(np.ptp(column))
     allowed = np.broadcast_to(

@@ -141,12 +141,9 @@ class Questions:
     ) -> tuple[Message, ...]:
         """Return the messages of the next question: the constant part, then what changes.
 
-        Args:
-            count: number of candidates wanted.
-            simulations: maximum number of simulations of the run; None: no limit, or unknown.
-            pending: candidates without an evaluation yet.
-            notes: lines about the search as a whole, from the engine that leads it.
-            lessons: what the LLM wrote down in its last reply.
+        ``count`` candidates are wanted, those ``pending`` have no evaluation yet. ``notes`` are lines about
+        the search as a whole, from the engine that leads it, ``lessons`` what the LLM wrote down in its last
+        reply. ``simulations`` is the maximum of the run; None: no limit, or unknown.
 
         Raises:
             ChatError: if the question is too long even without samples.

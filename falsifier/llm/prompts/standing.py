@@ -304,11 +304,8 @@ def _reply(view: View, count: int) -> Iterator[str]:
 def reply_form(view: View, count: int, *, named: bool, own: bool) -> str:
     """Say in which form a reply is, with blanks in place of numbers: none are shown before the first sample.
 
-    Args:
-        view: the problem.
-        count: number of candidates wanted.
-        named: whether inputs and parameters are told by name; else a reply is one list of numbers.
-        own: whether the reply has lessons, and control points of its own where these are free.
+    Unless inputs and parameters are ``named``, a reply is one list of numbers. ``own``: it has lessons, and
+    control points of its own where these are free.
     """
     space, parts = view.space, [f'"rationale": "{_RATIONALE}"']
     is_free = own and any(r.free for r in space.inputs)
