@@ -19,8 +19,9 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 from falsifier.stl.formula import Predicate
 
-# Probabilities of the same done again, and of a new end from an earlier time; else one from then.
-_AGAIN, _EARLIER = 0.6, 0.1
+# Probabilities of the same done again, of that with something else tried each time, and of a new end from an
+# earlier time; else one from then.
+_AGAIN, _TRIED, _EARLIER = 0.6, 0.15, 0.1
 # Of what is done again, the share without a stretch before it, and that with all that led there; the shortest
 # span otherwise, as a share of the time until then.
 _SOONER, _FROM_START, _SHORTEST = 0.5, 0.3, 0.05
@@ -78,8 +79,11 @@ class Ladder:
         kind = rng.random()
         if kind < _AGAIN:
             return Proposal(self._again(rng, reached), f"{where}, done again and again")
+        if kind < _AGAIN + _TRIED:
+            point = programs.tried_again(rng, reached.point, reached.time, _span(rng, reached.time))
+            return Proposal(point, f"{where}, and something else tried after each time that it is done again")
         # Now and then from an earlier time: it may have been too late.
-        time = reached.time * (rng.random() if kind < _AGAIN + _EARLIER else 1.0)
+        time = reached.time * (rng.random() if kind < _AGAIN + _TRIED + _EARLIER else 1.0)
         return Proposal(programs.another_end(rng, reached.point, time), f"{where}, continued differently")
 
     def _deciding(self, verdict: Verdict) -> tuple[str, float] | None:
@@ -115,9 +119,13 @@ class Ladder:
         point, time = reached.point, reached.time
         if rng.random() < _SOONER:
             point, time = self._programs.sooner(rng, point, time)
-        is_all = rng.random() < _FROM_START
-        span = time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
-        return self._programs.again(rng, point, time, span)
+        return self._programs.again(rng, point, time, _span(rng, time))
+
+
+def _span(rng: np.random.Generator, time: float) -> float:
+    """Draw how much in s of what was done before a time is done again."""
+    is_all = rng.random() < _FROM_START
+    return time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
 
 
 def _margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:

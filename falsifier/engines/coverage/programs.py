@@ -55,6 +55,9 @@ class Programs:
         self._groups = [slice(int(group[0]), int(group[-1]) + 1) for group in layout.groups]
         self._times = [np.asarray(coding.times) for coding in layout.codings]
         self._longest = max((len(times) for times in self._times), default=1)
+        steps = [float(np.diff(times).min()) for times in self._times if len(times) > 1]
+        self._step = min(steps, default=1.0)  # shortest time in s between two control points
+        self._end = max((float(times[-1]) for times in self._times), default=0.0)  # the last one's
 
     @property
     def has_inputs(self) -> bool:
@@ -92,13 +95,9 @@ class Programs:
         pace = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2)))))
         if rng.random() < _INDEPENDENT and not any(self._layout.is_fine):
             pace = 0.5
-        moving = rng.random(len(self._times)) >= _KEPT
-        if moving.size:
-            moving[rng.integers(len(moving))] = True
-        for j, times in enumerate(self._times):
-            if moving[j]:
-                start = int(np.searchsorted(times, time, side="right"))
-                self._fill(rng, j, point[self._groups[j]], start, pace)
+        for j in self._moving(rng):
+            start = int(np.searchsorted(self._times[j], time, side="right"))
+            self._fill(rng, j, point[self._groups[j]], start, pace)
         return point
 
     def repeated(
@@ -139,6 +138,30 @@ class Programs:
             values[stop:] = values[first + np.arange(len(values) - stop) % span]
         return result
 
+    def tried_again(self, rng: np.random.Generator, point: Array, time: float, length: float) -> Array:
+        """Return the program that does something else, then what it did before a time, again and again.
+
+        What it did before is that of ``length`` s; something else takes as long at most.
+
+        A step that is wrong often leads back to where the way began: one simulation tries several.
+        """
+        result, moving = self._parameters(rng, point), self._moving(rng)
+        length = max(length, self._step)
+        while time < self._end:
+            longest = max(self._step, min(length, (self._end - time) / 2.0))
+            back = time + float(np.exp(rng.uniform(np.log(self._step), np.log(longest))))
+            for j, (times, group) in enumerate(zip(self._times, self._groups, strict=False)):
+                start, stop, end = np.searchsorted(times, (time, back, back + length), side="right")
+                values = result[group]
+                last = float(values[start - 1]) if start else None
+                values[start:stop] = (
+                    last if last is not None and j not in moving else self._level(rng, j, last)
+                )
+                first = int(np.searchsorted(times, time - length, side="right"))
+                values[stop:end] = values[first : first + end - stop].copy()
+            time = back + length
+        return result
+
     def sooner(self, rng: np.random.Generator, point: Array, time: float) -> tuple[Array, float]:
         """Return the program without a stretch before a time, and that time in it: the rest comes sooner."""
         result = point.copy()
@@ -150,6 +173,13 @@ class Programs:
             moved = len(values) - stop
             values[first : first + moved] = values[stop:].copy()
         return result, time - cut
+
+    def _moving(self, rng: np.random.Generator) -> list[int]:
+        """Draw the inputs that do not keep their values, at least one if there are inputs."""
+        moving = rng.random(len(self._times)) >= _KEPT
+        if moving.size:
+            moving[rng.integers(len(moving))] = True
+        return np.flatnonzero(moving).tolist()
 
     def _parameters(self, rng: np.random.Generator, point: Array) -> Array:
         point = point.copy()
