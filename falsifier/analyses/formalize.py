@@ -114,11 +114,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     rejected: list[str] = []
 
     def read(text: str) -> None:
-        """Keep the readings of a reply if they are as many as those of an earlier one.
-
-        Raises:
-            RejectedReplyError: stating what is wrong with each invalid one.
-        """
+        """Keep a reply's readings if they are as many as before; RejectedReplyError says what is wrong."""
         nonlocal readings
         valid: list[Reading] = []
         problems: list[str] = []

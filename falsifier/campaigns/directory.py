@@ -47,11 +47,7 @@ def is_campaign(directory: Path) -> bool:
 
 
 def check_new(directory: Path) -> None:
-    """Check that no campaign and no run was started in a directory, and that nothing else is in it.
-
-    Raises:
-        JournalError: if that is not so.
-    """
+    """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has."""
     if is_campaign(directory) or holds_run(directory):
         what = "campaign" if is_campaign(directory) else "run"
         raise JournalError(

@@ -132,11 +132,7 @@ class Sentry:
             self.notes.append(note)
 
     def refuse_unused(self) -> None:
-        """Refuse names of checked files at which nothing was looked: they may be misspelt.
-
-        Raises:
-            SpecError: naming them.
-        """
+        """Refuse checked files at which nothing was looked: they may be misspelt; SpecError naming them."""
         if self._unused:
             raise SpecError(
                 f"context: checked names {', '.join(sorted(self._unused))}, which is not read; use the "

@@ -274,11 +274,7 @@ def _check_variables(problem: Problem) -> None:
 
 
 def check_limits(problem: Problem) -> None:
-    """Check that only values between the model's limits will be tried.
-
-    Raises:
-        SpecError: naming the range that exceeds them.
-    """
+    """Check that all values to be tried are within the model's limits; SpecError naming a range."""
     for each in problem.space.ranges:
         if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
             raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
@@ -290,11 +286,7 @@ def check_problem(given: object) -> None:
 
 
 def check_names(problems: Iterable[Problem]) -> None:
-    """Check that no two problems have the same name: results and records go by the name.
-
-    Raises:
-        SpecError: naming the name that occurs twice.
-    """
+    """Check that no two problems have the same name, by which results go; SpecError naming it."""
     seen: set[str] = set()
     for problem in problems:
         if problem.name in seen:

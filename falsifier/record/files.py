@@ -143,11 +143,7 @@ def is_intact(path: Path, content: bytes) -> bool:
 
 @contextmanager
 def can_be_a_folder(directory: Path) -> Iterator[None]:
-    """Name a path that can never be a folder.
-
-    Raises:
-        JournalError: in place of the error of the operating system that says so.
-    """
+    """Name a path that can never be a folder, in a JournalError instead of the operating system's error."""
     try:
         yield
     except OSError as error:

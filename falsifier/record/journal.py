@@ -190,11 +190,7 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
 
 
 def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[None]:
-    """Hold the lock of a run directory.
-
-    Raises:
-        JournalError: if another process still writes to it after so many s.
-    """
+    """Hold the lock of a run directory; JournalError if another process writes to it for so many s."""
     busy = f"{directory}: another process is writing to this run; wait until it ends"
     return files.locked(directory / LOCK, busy=busy, patience=patience)
 
@@ -239,11 +235,7 @@ class JournalReader:
         return self.path.exists() and self.path.stat().st_size < self.offset
 
     def new(self) -> Iterator[Record]:
-        """Yield the complete records written since the last call.
-
-        Raises:
-            JournalError: if a line is invalid or of another run.
-        """
+        """Yield the complete records since the last call; JournalError if a line is not one of these."""
         if not self.path.exists() or self.path.stat().st_size == self.offset:
             return
         with self.path.open("rb") as file:

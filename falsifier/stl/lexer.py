@@ -80,11 +80,7 @@ class Token:
 
 
 def tokenize(text: str) -> list[Token]:
-    """Return the tokens of a text; the last one marks its end.
-
-    Raises:
-        FormulaError: pointing at a character that cannot start a token.
-    """
+    """Return the tokens of a text and one for its end; FormulaError pointing at what cannot start a token."""
     tokens: list[Token] = []
     position = 0
     while position < len(text):

@@ -63,11 +63,7 @@ class Description:
         return can_run_windows() and interface not in libraries.here and interface in libraries.windows
 
     def slot(self, name: str) -> Slot:
-        """Return how to access a numeric variable.
-
-        Raises:
-            ModelError: if the name is unknown (with the most similar one) or the variable is a string.
-        """
+        """Return how to access a numeric variable; ModelError if its name is unknown, or it is a string."""
         if name not in self.slots:
             raise ModelError(f"{self.info.name}: no variable {name!r}; {did_you_mean(name, self.slots)}")
         if self.slots[name].type == "String":

@@ -31,11 +31,7 @@ class Order:
     through_wine: bool = False  # whether to simulate the library for Windows
 
     def load(self, folder: Path, *, logging: bool) -> bytes:
-        """Return the request to load what was unpacked to a folder.
-
-        Raises:
-            ModelError: if an FMU has no library for this machine.
-        """
+        """Return the request to load what was unpacked; ModelError if an FMU has nothing for this machine."""
         network = self.network
         options = {"logging": logging, "through_wine": self.through_wine}
         parts = (encoding.fmu(network.members[k], folder / str(k), **options) for k in network.order)
