@@ -144,6 +144,7 @@ def test_what_follows_a_time_is_drawn_again_and_what_precedes_it_is_kept(time: f
         for other in (
             programs.another_end(drawn(seed + 100), point, time),
             programs.repeated(drawn(seed), point, time, programs.fresh(drawn(seed + 50)), (1.0, 4.0)),
+            programs.tried_again(drawn(seed), point, time, 1.0),
         ):
             for coding, group in zip(layout.codings, layout.groups, strict=False):
                 kept = np.asarray(coding.times) <= time
@@ -151,6 +152,13 @@ def test_what_follows_a_time_is_drawn_again_and_what_precedes_it_is_kept(time: f
             assert other.min() >= 0.0 and other.max() <= 1.0
             changed |= bool((other != point).any())
     assert changed
+
+
+def test_the_way_to_a_step_returns_after_each_try() -> None:
+    way, point = [0.11, 0.22, 0.33], np.full(50, 0.5)
+    point[:3] = way
+    tried = Programs(layout_of(inputs=1)).tried_again(drawn(0), np.append(point, 0.5), 0.4, 0.6)[:50]
+    assert sum(tried[k : k + 3].tolist() == way for k in range(48)) > 3
 
 
 def test_discrete_inputs_take_their_values_only() -> None:
