@@ -63,8 +63,6 @@ _PRIORS = {
 _PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
-# Reserved share of the region elsewhere, if it knows all that can be searched.
-_WHERE_SLOPES_LEAD = {"region": 0.3}
 # The arms with a share of turns that no rating takes away.
 _SIMPLE = ("coverage", "uniform", "corners", "cma")
 # Of these, those that do not go on from what was reached: something new that they reach is chance, no merit.
@@ -287,11 +285,7 @@ class Surrogate:
         arms = [arm for arm in _PRIORS if can.get(arm, True)]
         is_trial = self._asked < len(self._opening) + self.settings.trial
         reserved = {} if is_trial else dict.fromkeys(_SIMPLE, self.settings.reserved)
-        if lead:
-            reserved |= _WHERE_LEVELS_LEAD
-        elif not is_trial and not any(self.layout.is_fine):
-            reserved |= _WHERE_SLOPES_LEAD
-        return self._policy.choose(arms, reserved, rng)
+        return self._policy.choose(arms, reserved | (_WHERE_LEVELS_LEAD if lead else {}), rng)
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         self._switched += 1
