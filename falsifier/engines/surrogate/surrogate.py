@@ -63,6 +63,8 @@ _PRIORS = {
 _PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
+# The same where there are only parameters, which the region searches best.
+_OF_PARAMETERS = {"region": 0.7}
 # The arms with a share of turns that no rating takes away.
 _SIMPLE = ("coverage", "uniform", "corners", "cma")
 # Of these, those that do not go on from what was reached: something new that they reach is chance, no merit.
@@ -285,7 +287,8 @@ class Surrogate:
         arms = [arm for arm in _PRIORS if can.get(arm, True)]
         is_trial = self._asked < len(self._opening) + self.settings.trial
         reserved = {} if is_trial else dict.fromkeys(_SIMPLE, self.settings.reserved)
-        return self._policy.choose(arms, reserved | (_WHERE_LEVELS_LEAD if lead else {}), rng)
+        leading = _WHERE_LEVELS_LEAD if lead else {} if has_inputs or is_trial else _OF_PARAMETERS
+        return self._policy.choose(arms, reserved | leading, rng)
 
     def _switch(self, rng: np.random.Generator) -> Pending:
         self._switched += 1
