@@ -82,7 +82,9 @@ def _published(entry: dict[str, Any] | None) -> str:
 def seeds_from(text: str) -> range:
     """Return the seeds that a command line names: ``7`` or ``100-109``, both ends included."""
     first, _, last = text.partition("-")
-    return range(int(first), int(last or first) + 1)
+    if not (seeds := range(int(first), int(last or first) + 1)):
+        raise argparse.ArgumentTypeError(f"{text}: expected FIRST-LAST with FIRST <= LAST")
+    return seeds
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS
 from falsifier.problem.spec import Spec, parse_spec
 from falsifier.problem.templates import TEMPLATES
-from tests.command import ROOT, forked
+from tests.command import ROOT, commands, forked
 
 WRITTEN = [
     ROOT / "README.md",
@@ -108,17 +108,6 @@ def test_marks_are_replaced_by_tables(site: dict[str, Page]) -> None:
     ] == []
     assert [name for name in VARIANTS if name not in llms] == []
     assert f"{DEFAULT_ENGINE} (default)" in engines and f"{DEFAULT_VARIANT} (default)" in llms
-
-
-def commands(group: click.Group, *names: str) -> Iterator[tuple[str, click.Command]]:
-    context = click.Context(group)
-    for name in group.list_commands(context):
-        command = group.get_command(context, name)
-        assert command is not None
-        if isinstance(command, click.Group):
-            yield from commands(command, *names, name)
-        else:
-            yield " ".join((*names, name)), command
 
 
 def test_the_command_page_has_every_command_and_option(site: dict[str, Page]) -> None:

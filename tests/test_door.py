@@ -12,6 +12,7 @@ from falsifier.core.files import bundled
 from falsifier.errors import FalsifierError
 from tests.command import ROOT
 from tests.problems import easy
+from tests.searches import Wrapped
 
 AT = bundled("fmus") / "AT.fmu"
 USER = ROOT / "tests" / "user_code.py"
@@ -59,6 +60,15 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "no runs": (
         lambda: untyped.cross(["AT1"], ["uniform"], seeds=[], budget=1),
         "expected at least one of each",
+    ),
+    "an engine of one's own in a campaign": (
+        lambda: untyped.cross(["AT1"], [Wrapped(easy()), "uniform"], seeds=[0], budget=1),
+        "searchers: .* got an engine made in Python, which cannot be in a campaign: for each seed, call fal",
+    ),
+    "a class as engine": (lambda: untyped.falsify(easy(), Wrapped), "expected an instance, such as Wrapped"),
+    "a list of trajectories": (
+        lambda: untyped.Monitor(untyped.parse("x <= 1"), 1.0, 2).batch([]),
+        "columns: expected arrays by signal name, each with a row per trajectory",
     ),
     "a text of problems": (
         lambda: untyped.cross("AT1", ["uniform"], seeds=[0], budget=1),

@@ -18,9 +18,7 @@ from falsifier.errors import (
     written,
 )
 
-TREE = [
-    value for value in vars(errors).values() if isinstance(value, type) and issubclass(value, FalsifierError)
-]
+TREE = [v for v in vars(errors).values() if isinstance(v, type) and issubclass(v, FalsifierError)]
 
 
 def test_every_error_is_of_one_tree_and_never_ends_like_a_falsification() -> None:

@@ -189,14 +189,9 @@ def test_importing_the_plugin_loads_nothing_else() -> None:
         "import pytest, sys; before = set(sys.modules); import pytest_falsifier; "
         "print(*(set(sys.modules) - before))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.split() == ["pytest_falsifier"]
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+    printed = subprocess.check_output([sys.executable, "-c", code], env=env, text=True)
+    assert printed.split() == ["pytest_falsifier"]
 
 
 def test_specs_of_one_name_have_their_own_counterexamples_and_what_is_unused_is_told(

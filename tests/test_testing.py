@@ -21,9 +21,7 @@ class Refused(Exception):
 
 class OutOfRange(Wrapped):
     def ask(self, n: int = 1) -> list[Candidate]:
-        far = {
-            name: replace(s, values=(9.0,) * len(s.values)) for name, s in self.inner.ask()[0].signals.items()
-        }
+        far = {n: replace(s, values=(9.0,) * len(s.values)) for n, s in self.inner.ask()[0].signals.items()}
         return [replace(c, signals=far) for c in self.inner.ask(n)]
 
 

@@ -113,7 +113,7 @@ _KEYS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "allow": ("list", "what the FMU was allowed, paths relative to this file; null: as the spec says"),
         "deny": ("list", "what it was denied"),
         "falsifier": ("string", "version that wrote it"),
-        "sum": ("string", "checksum of the file up to here; without it, nothing is checked"),
+        "sum": ("string", "checksum of the file up to the comma before it; without it, nothing is checked"),
     },
 }
 

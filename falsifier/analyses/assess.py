@@ -9,9 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
+import numpy as np
+
 from falsifier.core.arguments import finite, whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted
+from falsifier.engines.box import Proposal
 from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -22,6 +25,18 @@ from falsifier.search.vacuity import Vacuity
 from falsifier.stl.margins import margin_words, signed
 
 Progress = Callable[[int], None]
+
+
+class Draws(Uniform):
+    """The engine ``uniform``, but with each allowed number of an integer or enumeration equally likely."""
+
+    def _propose(self, rng: np.random.Generator) -> Proposal:
+        point = super()._propose(rng).point
+        for r, group in zip(self.box.space.ranges, self.box.groups, strict=True):
+            if r.kind != "real" and r.low < r.high:
+                drawn = np.array([r.numbers[int(share * len(r.numbers))] for share in point[group]])
+                point[group] = (drawn - r.low) / (r.high - r.low)
+        return Proposal(point, "uniform random")
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +150,7 @@ def assess(
     The bound is exact whatever the system is, as long as inputs are drawn as stated.
 
     Args:
-        problem: what to simulate; inputs are drawn as the engine ``uniform`` does.
+        problem: what to simulate; every number is drawn on its own, each that is allowed equally likely.
         budget: maximum number of simulations.
         seed: seed of the random numbers.
         confidence: confidence of the bound, and of the interval, between 0 and 1.
@@ -160,7 +175,7 @@ def assess(
     if not problem.space.names:
         raise SpecError("nothing to vary; give at least one input or parameter a range")
     check_limits(problem)
-    engine, vacuity = Uniform(problem, seed=seed), Vacuity(problem)
+    engine, vacuity = Draws(problem, seed=seed), Vacuity(problem)
     drawn: list[Evaluation] = []
     interrupted = False
     try:
@@ -230,7 +245,7 @@ def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | N
 
 
 def _distribution_text(space: SearchSpace) -> str:
-    """Describe what the engine ``uniform`` draws from: each control point and parameter on its own."""
+    """Describe what is drawn: each control point and parameter on its own."""
     parts = [
         *(_input_text(r, space) for r in space.inputs),
         *(f"{p.name} uniform in {_range_text(p)}" for p in space.parameters),
@@ -254,5 +269,5 @@ def _input_text(r: InputRange, space: SearchSpace) -> str:
 
 def _range_text(r: InputRange | ParameterRange) -> str:
     unit = f" {r.unit}" if r.unit else ""
-    rounded = "" if r.kind == "real" else ", rounded to an allowed number"
-    return f"[{r.low:g}, {r.high:g}]{unit}{rounded}"
+    allowed = "" if r.kind == "real" else ", each allowed number equally likely"
+    return f"[{r.low:g}, {r.high:g}]{unit}{allowed}"

@@ -334,9 +334,7 @@ def cells_of(r: Range, values: Array) -> Cells:
 
 def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
     """Return the name of each value of a Boolean or enumeration; empty for other kinds."""
-    if kind == "boolean":
-        return {0: "false", 1: "true"}
-    return {number: label for label, number in items}
+    return {0: "false", 1: "true"} if kind == "boolean" else {number: label for label, number in items}
 
 
 def pace_of(signal: Signal, r: Range, stop_time: float) -> str:

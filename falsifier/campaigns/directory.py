@@ -38,7 +38,7 @@ class CampaignRecord(Surroundings):
 
     request: CampaignRequest
     hashes: dict[str, str] = Field(description="SHA-256 of all FMUs and specs, by path.")
-    sum: str = Field("", description="Checksum of the file up to here.")
+    sum: str = Field("", description="Checksum of the file up to the comma before it.")
 
 
 def is_campaign(directory: Path) -> bool:

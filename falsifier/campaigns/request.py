@@ -1,5 +1,6 @@
 """What a campaign runs and what that may cost: methods, requests, run names."""
 
+import reprlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -18,7 +19,7 @@ from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
-from falsifier.search.budget import Budget, stated_price
+from falsifier.search.budget import Budget, budget_of, stated_price
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest, Strict
 
@@ -94,12 +95,27 @@ class CampaignRequest(Strict):
 Searcher = str | LLMSettings | tuple[str, LLMSettings]
 
 
+def _pair(searcher: object) -> tuple[str | None, LLMSettings | None]:
+    match searcher:
+        case str():
+            return searcher, None
+        case LLMSettings():
+            return None, searcher
+        case (str() as engine, LLMSettings() as llm):
+            return engine, llm
+    got = reprlib.repr(searcher)
+    if hasattr(searcher, "ask"):
+        got = "an engine made in Python, which cannot be in a campaign: for each seed, call falsify(problem, "
+        got += "engine, directory='own/run0'), then falsifier report own shows all of them"
+    raise SpecError(f"searchers: expected names of engines, LLMSettings, or pairs of both, got {got}")
+
+
 def cross(
     problems: Iterable[ProblemSource | str],
     searchers: Iterable[Searcher],
     *,
     seeds: Iterable[int],
-    budget: Budget,
+    budget: Budget | int,
 ) -> tuple[RunRequest, ...]:
     """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
@@ -107,28 +123,26 @@ def cross(
         problems: what is searched; for engines that choose no control points, with fixed parameterizations.
         searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
-        budget: limits of each run; those of tokens and cost hold for language models.
+        budget: limits of each run, or a number of simulations; tokens and cost limit language models.
 
     Raises:
-        SpecError: if one of them is no list, or is empty.
+        SpecError: if one of them is no list, is empty, or holds what cannot be in a campaign, such as an
+            engine made in Python.
     """
     lists = (
         list_of("problems", problems, ProblemSource | str, "targets such as 'AT1'"),
-        list_of("searchers", searchers, str | LLMSettings | tuple, "engines and language models"),
+        [_pair(each) for each in list_of("searchers", searchers, object, "engines and language models")],
         [whole("seeds", seed, least=0) for seed in list_of("seeds", seeds, object, "numbers")],
     )
     if not all(lists):
         raise SpecError("problems, searchers and seeds: expected at least one of each")
     runs: dict[str, RunRequest] = {}
-    for problem, searcher, seed in product(*lists):
-        engine = searcher if isinstance(searcher, str) else None
-        llm = searcher if isinstance(searcher, LLMSettings) else None
-        if isinstance(searcher, tuple):
-            engine, llm = searcher
+    given = budget_of(budget)
+    for problem, (engine, llm), seed in product(*lists):
         used = ProblemSource(target=problem) if isinstance(problem, str) else problem
         if used.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
             used = used.model_copy(update={"parameterization": "fixed"})
-        limits = budget if llm else replace(budget, tokens=None, cost=None)
+        limits = given if llm else replace(given, tokens=None, cost=None)
         run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=limits, keep="best")
         runs[run_name(run)] = run
     return tuple(runs.values())

@@ -206,9 +206,7 @@ def _load(requests: Iterable[RunRequest]) -> dict[ProblemSource, Problem]:
         problem = problems[source] = load_source(source)
         other = targets.setdefault(problem.name, source.target)
         if other != source.target:
-            raise SpecError(
-                f"{other} and {source.target} are both named {problem.name!r}: rename one of them"
-            )
+            raise SpecError(f"{other} and {source.target} are both named {problem.name!r}: rename one")
     return problems
 
 

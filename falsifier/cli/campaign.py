@@ -141,9 +141,7 @@ def bench(
         runs=cross(problems, searchers, seeds=range(seed, seed + runs), budget=budget), limits=totals
     )
     if table != "main" and not llms:
-        raise click.UsageError(
-            f"--table {table}: shows language models; name one with --llm, or leave it out"
-        )
+        raise click.UsageError(f"--table {table}: shows language models; name one with --llm, or drop it")
     directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
     check_new(directory)
     check_request(request)

@@ -1,5 +1,6 @@
 """Commands: their help in groups, the check of their arguments, and how options are added to them."""
 
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -23,28 +24,38 @@ OPTION_GROUPS = {
     ),
     "Output": ("--out", "--table", "--fmu-log", "--quiet", "--json", "--help"),
 }
+# What to do instead of giving an option several times, if that is not only to leave one out.
+_INSTEAD_OF_SEVERAL = {
+    "--stl": "run one after the other, or write them to a spec as [requirements.NAME] (falsifier init "
+    "MODEL.fmu begins one) and use falsifier run my.toml"
+}
 # From this number of options on, --help has headings.
 _MANY = 12
 
 
 class Command(click.Command):
-    """A command whose help lists many options in groups, and that refuses empty arguments."""
+    """A command whose help lists many options in groups, and that refuses empty and repeated arguments."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse the arguments.
 
         Raises:
-            click.UsageError: if one is empty: as a path it would mean the current folder; or if a number is
-                none, or beyond its limits.
+            click.UsageError: if one is empty: as a path it would mean the current folder; if a number is
+                none, or beyond its limits; or if an option that has one value is given several.
         """
         for before, given in zip(["", *args], args, strict=False):
             if not given or (given.startswith("--") and given.find("=") == len(given) - 1):
-                option = given.removesuffix("=") or (before if before.startswith("-") else "")
-                empty = f"{option}: the value is empty" if option else "an argument is empty"
+                name = given.removesuffix("=") or (before if before.startswith("-") else "")
+                empty = f"{name}: the value is empty" if name else "an argument is empty"
                 raise click.UsageError(
                     f"{empty}; expected a name, a path or a number (is a variable of the shell not set?)", ctx
                 )
         try:
+            for option, count in Counter(self.make_parser(ctx).parse_args(list(args))[2]).items():
+                is_single = isinstance(option, click.Option) and not (option.multiple or option.is_flag)
+                if count > 1 and is_single and not ctx.resilient_parsing:  # which completes words
+                    instead = _INSTEAD_OF_SEVERAL.get(option.opts[-1], "give one")
+                    raise click.UsageError(f"{option.opts[-1]}: given {count} times; {instead}", ctx)
             return super().parse_args(ctx, args)
         except click.BadParameter as error:
             expected = _number_text(error.param.type) if error.param else ""

@@ -199,7 +199,8 @@ def _spec_of(given: Path) -> Path | None:
     """Return the spec that is given, or that of the bundled requirement whose name is; None for an FMU."""
     if (target := Target.parse(str(given))).kind == "spec":
         return Path(target.file)
-    if given.parent == Path() and not given.suffix and not (given.is_file() or _bundled_fmu(given).is_file()):
+    is_file = given.parent != Path() or given.suffix or given.is_file() or _bundled_fmu(given).is_file()
+    if target.kind == "python" or not is_file:
         return find_spec(str(given))[0]
     return None
 

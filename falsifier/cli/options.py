@@ -95,15 +95,6 @@ def parameterized(text: str) -> Parameterized:
     return found
 
 
-def _only_one(_context: click.Context, option: click.Parameter, formulas: tuple[str, ...]) -> str | None:
-    if len(formulas) > 1:
-        raise click.UsageError(
-            f"--{option.name}: given {len(formulas)} times; run one after the other, or write them to a spec "
-            "as [requirements.NAME] (falsifier init MODEL.fmu begins one) and use falsifier run my.toml"
-        )
-    return formulas[0] if formulas else None
-
-
 def policy_options(command: Function) -> Function:
     """Add what FMUs may do."""
     return add(
@@ -143,13 +134,7 @@ def stl_option(
     text: str = "Formula to use instead of the spec's requirement; or a template with its arguments, such as "
     "'settles signal=speed reference=80 within=2% time=3'.",
 ) -> Decorator:
-    return click.option(
-        "--stl",
-        multiple=True,  # so that a second one is an error and does not silently replace the first
-        callback=_only_one,
-        metavar="FORMULA",
-        help=text,
-    )
+    return click.option("--stl", metavar="FORMULA", help=text)
 
 
 def target_argument(command: Function) -> Function:
@@ -299,7 +284,7 @@ def _total(text: str) -> tuple[str, float]:
         return name, number(limit) and _TOTALS[name](limit)
     except (KeyError, ValueError):
         expected = ", ".join(f"{name}=N" for name in _TOTALS)
-        raise click.UsageError(f"--total {text}: expected {expected}, for example cost=5") from None
+        raise click.UsageError(f"--total {text}: expected {expected} (N > 0), for example cost=5") from None
 
 
 def _totals(

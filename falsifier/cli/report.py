@@ -59,9 +59,7 @@ def report(
     outputs = ((arch_comp, _ARCH_COMP, ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
     named = [(file, begins, ending) for file, begins, ending in outputs if file is not None]
     if len({file.resolve() for file, _, _ in named}) < len(named):
-        raise click.UsageError(
-            "--out, --csv and --arch-comp: expected a file for each, got one for two of them"
-        )
+        raise click.UsageError("--out, --csv and --arch-comp: expected a file for each, got one for two")
     for file, begins, ending in named:
         if file.parent != first:  # whether that is a run is seen when it is read
             files.in_existing_folder(file)

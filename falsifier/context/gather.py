@@ -102,7 +102,8 @@ def gather(
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
         # Encodings may have hidden a secret before, and escapes of JSON still do.
-        whole = _ESCAPE.sub(_unescaped, "\n".join((text, *(t.text for t in readable.found))))
+        joined = "\n".join((text, *(t.text for t in readable.found)))
+        whole = _ESCAPE.sub(lambda found: chr(int(found[1], 16)) if found[1] else found[2], joined)
         otherwise = _LEAVE_OUT if file.is_named else NAME_THEM
         sentry.look(whole, f"{file.path}, as it is told", file.path, otherwise)
         form = f"{readable.forms[i][0]}{', because the rest is too long' if i else ''}"
@@ -176,10 +177,6 @@ def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -
         if low <= level <= high
     }
     return [Crossing(name, level) for level in sorted(levels)[:_MAX_CROSSINGS]]
-
-
-def _unescaped(found: re.Match[str]) -> str:
-    return chr(int(found[1], 16)) if found[1] else found[2]
 
 
 def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:

@@ -5,13 +5,14 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from falsifier.core.arguments import finite, instance
+from falsifier.core.fixed import FixedDict
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError, in_section
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """One proposed simulation.
+    """One proposed simulation, read-only.
 
     Attributes:
         signals: input signals by name.
@@ -31,6 +32,7 @@ class Candidate:
     def __post_init__(self) -> None:
         for what, values in (("signals", self.signals), ("parameters", self.parameters)):
             instance(what, values, Mapping, f"{what} by name")
+            object.__setattr__(self, what, FixedDict(values))
         for name, signal in self.signals.items():
             instance(f"signals, {name!r}", signal, Signal, "a Signal")
         for name, value in self.parameters.items():

@@ -68,8 +68,8 @@ def one_line(text: str) -> str:
 
 def python_docstring(text: str) -> str:
     """Return a text of several lines as a Python string in triple quotes."""
-    written = (c if c == "\n" or (c.isprintable() and c not in '"\\') else _python_escape(c) for c in text)
-    return f'"""{"".join(written)}"""'
+    kept = (f"\\{c}" if c in '"\\' else c if c == "\n" or c.isprintable() else repr(c)[1:-1] for c in text)
+    return f'"""{"".join(kept)}"""'
 
 
 def modelica_string(text: str) -> str:
@@ -134,10 +134,6 @@ def markdown_code(text: str) -> str:
     line = one_line(text)
     longest = max(map(len, re.findall("`+", line)), default=0)
     return f"`{line}`" if not longest else f"{'`' * (longest + 1)} {line} {'`' * (longest + 1)}"
-
-
-def _python_escape(character: str) -> str:
-    return f"\\{character}" if character in '"\\' else repr(character)[1:-1]
 
 
 def digits(value: float) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import one_of, positive
+from falsifier.core.fixed import fixed
 from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
@@ -19,10 +20,7 @@ Causality = Literal["input", "output", "parameter", "calculatedParameter", "loca
 Interface = Literal["co-simulation", "model-exchange"]
 
 # What descriptions of FMUs and of systems, and fmpy, call the interfaces.
-INTERFACE_TAGS: Mapping[Interface, str] = {
-    "co-simulation": "CoSimulation",
-    "model-exchange": "ModelExchange",
-}
+INTERFACE_TAGS: Mapping[Interface, str] = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
 # Smallest and largest number by type name; Integer (FMI 1 and 2) has 32 bits.
 _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
     "Boolean": (0, 1),
@@ -305,8 +303,8 @@ class Experiment:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """The trajectory's time grid in s, shape (samples,)."""
-        return np.linspace(0.0, self.stop_time, self.samples)
+        """The trajectory's time grid in s, shape (samples,), read-only."""
+        return fixed(np.linspace(0.0, self.stop_time, self.samples))
 
 
 class Model(Protocol):
@@ -343,8 +341,8 @@ class FunctionModel:
     """A Python function as a model, for tutorials and tests.
 
     Attributes:
-        function: called as ``function(times, inputs, parameters)`` with the time grid, shape (n,), all
-            inputs of ``info`` by name, sampled or constant, shape (n,) each, and the parameter values by
+        function: called as ``function(times, inputs, parameters)`` with the time grid, shape (n,), read-only,
+            all inputs of ``info`` by name, sampled or constant, shape (n,) each, and the parameter values by
             name; returns one array of shape (n,) per output name. It must be importable (no lambda) if it is
             to run in other processes.
         info: name, description and variables; inputs, parameters and outputs must be listed.
@@ -367,7 +365,7 @@ class FunctionModel:
             SimulationError: if the function raises an exception, omits an output, or returns an array of the
                 wrong shape or a value that is not finite.
         """
-        times = experiment.times
+        who, times = self.info.name, experiment.times
         constant = {v.name: parameters.get(v.name, v.start_number or 0.0) for v in self.info.inputs}
         inputs = {name: np.full(times.shape, value, dtype=np.float64) for name, value in constant.items()}
         inputs |= {name: signal.sample(times) for name, signal in signals.items()}
@@ -375,31 +373,26 @@ class FunctionModel:
         try:
             outputs = self.function(times, inputs, others)
         except (Exception, SystemExit) as error:
-            raise SimulationError(f"{self.info.name}: {type(error).__name__}: {error}") from error
+            raise SimulationError(f"{who}: {type(error).__name__}: {error}") from error
         if not isinstance(outputs, Mapping):
             raise SimulationError(
-                f"{self.info.name}: the function returned {type(outputs).__name__}; expected a dictionary of "
-                "outputs by name"
+                f"{who}: the function returned {type(outputs).__name__}; expected a dictionary by output name"
             )
         columns: dict[str, NDArray[np.float64]] = {}
         for name in experiment.outputs:
             if name not in outputs:
                 raise SimulationError(
-                    f"{self.info.name}: the function did not return the output {name!r}; "
-                    f"{did_you_mean(name, outputs)}"
+                    f"{who}: the function did not return the output {name!r}; {did_you_mean(name, outputs)}"
                 )
             try:
                 columns[name] = np.array(outputs[name]).astype(np.float64, casting="same_kind")
             except (TypeError, ValueError):
-                raise SimulationError(
-                    f"{self.info.name}: output {name!r} is not an array of real numbers"
-                ) from None
+                raise SimulationError(f"{who}: output {name!r} is not an array of real numbers") from None
             if columns[name].shape != times.shape:
                 raise SimulationError(
-                    f"{self.info.name}: output {name!r} has shape {columns[name].shape}, "
-                    f"expected {times.shape}"
+                    f"{who}: output {name!r} has shape {columns[name].shape}, expected {times.shape}"
                 )
-        check_finite(self.info.name, times, columns)
+        check_finite(who, times, columns)
         return Trajectory(times, columns, {v.name: v.unit for v in self.info.outputs if v.unit})
 
     def close(self) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import one_of, positive
+from falsifier.core.fixed import fixed
 from falsifier.errors import SpecError
 
 Interpolation = Literal["pchip", "linear", "constant"]
@@ -140,9 +141,7 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
 def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
     """Return the values at the first ``count`` sampling instants of a held signal, shape (count,)."""
     assert signal.hold is not None, "only held signals have sampling instants"
-    values = _interpolate(signal, np.arange(count, dtype=np.float64) * signal.hold)
-    values.flags.writeable = False
-    return values
+    return fixed(_interpolate(signal, np.arange(count, dtype=np.float64) * signal.hold))
 
 
 def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -178,9 +177,7 @@ def _pchip(times: tuple[float, ...], values: tuple[float, ...]) -> NDArray[np.fl
         (t, y, d, (3.0 * m - 2.0 * d - e) / h, (d + e - 2.0 * m) / (h * h))
         for t, y, (d, e), m, h in zip(times, values, pairwise(slopes), secants, steps, strict=False)
     ]
-    table = np.array([*rows, (times[-1], values[-1], 0.0, 0.0, 0.0)])
-    table.flags.writeable = False
-    return table
+    return fixed(np.array([*rows, (times[-1], values[-1], 0.0, 0.0, 0.0)]))
 
 
 def inner_slope(step: float, next_step: float, secant: float, next_secant: float) -> float:
@@ -202,9 +199,7 @@ def end_slope(step: float, next_step: float, secant: float, next_secant: float) 
     slope = ((2.0 * step + next_step) * secant - step * next_secant) / (step + next_step)
     if slope * secant <= 0.0:
         return 0.0
-    if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant):
-        return 3.0 * secant
-    return slope
+    return 3.0 * secant if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant) else slope
 
 
 def _constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:

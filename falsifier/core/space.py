@@ -69,14 +69,18 @@ class Range:
         one_of(f"{what}: kind", self.kind, get_args(ValueKind))
         if self.kind == "real":
             return
-        possible = [n for _, n in self.items] or [ceil(low), floor(high)]
-        numbers = [n for n in possible if low <= n <= high]
-        if not numbers:
+        if not (numbers := self.numbers):
             missing = "item of the enumeration" if self.items else "integer"
             raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
         # Engines try the bounds, so these must be numbers that are allowed.
-        object.__setattr__(self, "low", float(min(numbers)))
-        object.__setattr__(self, "high", float(max(numbers)))
+        object.__setattr__(self, "low", float(numbers[0]))
+        object.__setattr__(self, "high", float(numbers[-1]))
+
+    @property
+    def numbers(self) -> Sequence[int]:
+        """The integers in it that are allowed, in order."""
+        items = sorted({n for _, n in self.items if self.low <= n <= self.high})
+        return items if self.items else range(ceil(self.low), floor(self.high) + 1)
 
     @property
     def label(self) -> str:
@@ -341,19 +345,20 @@ def _admitted_signal(r: InputRange, times: tuple[float, ...], signal: Signal) ->
 def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
     count = len(signal.times)
     if r.free is None:
-        raise CandidateError(
-            f"{r.label}: expected {r.control_points} evenly spaced control points with "
-            f"{r.interpolation} interpolation, got {count} with {signal.interpolation}"
-        )
+        expected = f"{r.control_points} evenly spaced control points with {r.interpolation} interpolation"
+        got = f"{count} with {signal.interpolation}"
+        if count == r.control_points and signal.interpolation == r.interpolation:
+            even = even_times(count, stop_time=stop_time, interpolation=r.interpolation)
+            given, time = max(zip(signal.times, even, strict=True), key=lambda pair: abs(pair[0] - pair[1]))
+            got = f"one at {given:.9g} s instead of {time:.9g} s"
+        raise CandidateError(f"{r.label}: expected {expected}, got {got}")
     if r.kind != "real" and signal.interpolation != "constant" and count > 1:
         raise CandidateError(
             f"{r.label}: values of type {r.kind} cannot have {signal.interpolation} interpolation; "
             f'use "constant"'
         )
-    if count > r.free.max_control_points:
-        raise CandidateError(
-            f"{r.label}: {count} control points; at most {r.free.max_control_points} are allowed"
-        )
+    if count > (most := r.free.max_control_points):
+        raise CandidateError(f"{r.label}: {count} control points; at most {most} are allowed")
     gaps = np.diff(signal.times)
     if gaps.size and gaps.min() < r.free.min_interval * (1 - 1e-6):
         k = int(gaps.argmin())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance
 from falsifier.core.files import write_whole
+from falsifier.core.fixed import FixedDict, fixed
 from falsifier.errors import MonitorError, did_you_mean
 
 # Maximum number of distinct values, all integers, of a real signal that is taken for discrete.
@@ -21,7 +22,7 @@ TIME_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory:
-    """Signals sampled on one time grid.
+    """Signals sampled on one time grid, read-only.
 
     Attributes:
         times: sample times in s, shape (n,), from 0 with a constant step.
@@ -61,6 +62,12 @@ class Trajectory:
             )
         if not (len(self) and abs(self.times[0]) <= bound.sum()):
             raise MonitorError(f"times: expected 0 s as the first one, got {self.times[:1].tolist()}")
+        object.__setattr__(self, "times", fixed(self.times))
+        object.__setattr__(self, "columns", FixedDict((n, fixed(c)) for n, c in self.columns.items()))
+
+    def __reduce__(self) -> tuple[type["Trajectory"], tuple[object, ...]]:
+        """Pickle the arguments: an array that is unpickled can be changed."""
+        return Trajectory, (self.times, self.columns, self.units, self.log)
 
     def __len__(self) -> int:
         return int(self.times.shape[0])

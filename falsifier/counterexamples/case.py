@@ -202,9 +202,8 @@ def nearest_miss(directory: Path, name: str) -> Case:
 def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     """Return the requirement that was named, the only one, or the only one with a counterexample."""
     found = [name for name in described.names if (place / store.file_of(name, shared=True)).exists()]
-    if requirement is None and len(found) == 1:
-        return found[0]
-    return described.of(requirement).requirement.name
+    is_clear = requirement is None and len(found) == 1
+    return found[0] if is_clear else described.of(requirement).requirement.name
 
 
 def known_inputs(place: Path, problem: Problem) -> Fitted:

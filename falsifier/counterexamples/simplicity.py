@@ -37,9 +37,7 @@ def rest_value(problem: Problem, ranged: Range) -> float | None:
         known = problem.info[ranged.name].start_number if ranged.name in problem.info else None
     if known is not None and ranged.low <= known <= ranged.high:
         return known
-    if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high:
-        return 0.0
-    return None
+    return 0.0 if isinstance(ranged, InputRange) and ranged.low <= 0.0 <= ranged.high else None
 
 
 def simplicity(problem: Problem, candidate: Candidate) -> Key:

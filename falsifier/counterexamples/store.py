@@ -78,7 +78,9 @@ class StoredCounterexample(Strict):
     )
     deny: tuple[str, ...] = Field((), description="What it was denied.")
     falsifier: str = __version__
-    sum: str = Field("", description="Checksum of the file up to here; without it, nothing is checked.")
+    sum: str = Field(
+        "", description="Checksum of the file up to the comma before it; without it, nothing is checked."
+    )
 
     @property
     def origin(self) -> Origin:

@@ -46,12 +46,7 @@ class Briefing:
     """
 
     def __init__(
-        self,
-        problem: Problem,
-        *,
-        variant: str | None = None,
-        anonymous: bool = False,
-        llm: str = "",
+        self, problem: Problem, *, variant: str | None = None, anonymous: bool = False, llm: str = ""
     ) -> None:
         self._problem, self.variant = told_context(problem, variant, anonymous=anonymous)
         self._view = View.of(self._problem)
@@ -83,9 +78,7 @@ class Briefing:
     def describe(self, candidate: Candidate) -> str:
         """Return a candidate in one line; as a point if the prompt variant shows no names."""
         told = self.hidden(candidate)
-        if not self.variant.has("names"):
-            return "; ".join(as_point(self.view, told))
-        return in_one_line(told)
+        return in_one_line(told) if self.variant.has("names") else "; ".join(as_point(self.view, told))
 
     def reason(self, text: str) -> str:
         """Return a reason as the LLM may read it; empty if it has a name that the variant does not show."""

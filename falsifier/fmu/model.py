@@ -174,9 +174,7 @@ def fmu_files(model: Model) -> dict[Path, str]:
     """Return the paths of a model's FMUs with the SHA-256 of each; empty for a Python function."""
     if isinstance(model, FmuModel):
         return {model.path: model.sha256}
-    if isinstance(model, System):
-        return {part.fmu: part.sha256 for part in model.parts.values()}
-    return {}
+    return {part.fmu: part.sha256 for part in model.parts.values()} if isinstance(model, System) else {}
 
 
 def is_packaged(model: Model) -> bool:

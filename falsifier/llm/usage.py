@@ -104,9 +104,7 @@ def possible_count(reported: Any) -> int:
 
 
 def _believable(cost: Any) -> float | None:
-    if not isinstance(cost, int | float) or not isfinite(cost) or cost < 0:
-        return None
-    return float(cost)
+    return float(cost) if isinstance(cost, int | float) and isfinite(cost) and cost >= 0 else None
 
 
 def tokens_sent(request: ChatRequest, llm: str) -> int:

@@ -50,6 +50,8 @@ def find_spec(target: str) -> tuple[Path, str | None]:
     parts = Target.parse(target)
     if parts.kind == "spec":
         return Path(parts.file), parts.requirement or None
+    if parts.kind == "python":
+        raise SpecError(f"{target}: expected an FMU, a spec or a bundled name, not a problem made in Python")
     name, requirement = target.partition(":")[0], parts.requirement
     specs = {path.stem: path for path in sorted(bundled("specs").glob("*.toml")) if path.stem != "published"}
     if name in specs:

@@ -64,9 +64,7 @@ def _input(name: str, info: ModelInfo) -> Variable:
     _check_unconnected(name, info)
     variable = _variable(name, info.inputs, f"the {info.noun} has no such input")
     if variable.kind == "string":
-        raise SpecError(
-            "this input is a string; it keeps its start value, and can be neither set nor searched"
-        )
+        raise SpecError("this input is a string; it keeps its start value and cannot be set or searched")
     return variable
 
 

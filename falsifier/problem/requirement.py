@@ -119,7 +119,11 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
 
 
 def _unknown(name: str, info: ModelInfo) -> str:
-    """Say that a signal is unknown: the most similar one, and what is usually named."""
+    """Say that a signal is unknown: an item's number, or the most similar one and what is usually named."""
+    word = name.strip("'")
+    if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
+        told = ", ".join(items[:3])
+        return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"
     usual = [v.name for v in (*info.observables, *info.inputs) if v.kind != "string"]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))

@@ -238,7 +238,7 @@ def _range(option: str) -> tuple[str, InputChoice]:
         pass
     raise SpecError(
         f"--search {option}: expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search "
-        f"{name or 'throttle'}=0:100:7; to keep it constant: --set {name or 'throttle'}=VALUE"
+        f"throttle=0:100:7; to keep it constant: --set {name or 'throttle'}=VALUE"
     )
 
 

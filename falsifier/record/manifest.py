@@ -111,7 +111,7 @@ class Manifest(Surroundings):
     contexts: dict[str, Context] = Field(
         {}, description="What the language model was told of context files, by requirement."
     )
-    sum: str = Field("", description="Checksum of the file up to here.")
+    sum: str = Field("", description="Checksum of the file up to the comma before it.")
 
     @property
     def names(self) -> tuple[str, ...]:

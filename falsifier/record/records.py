@@ -23,7 +23,7 @@ class _Record(BaseModel):
 
     line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
     run: str = Field("", description="Name of the run that wrote the line, as in its manifest.")
-    sum: str = Field("", description="Checksum of the line up to here.")
+    sum: str = Field("", description="Checksum of the line up to the comma before it.")
 
 
 class AskedRecord(_Record):
@@ -133,6 +133,4 @@ def parse_line(line: bytes, number: int, run: str | None = None) -> Record:
 
 def elapsed_at(record: Record) -> float:
     """Wall-clock time of the run in s when a record was written."""
-    if isinstance(record, ConfirmedRecord | EndedRecord):
-        return record.spent.seconds
-    return record.elapsed
+    return record.spent.seconds if isinstance(record, ConfirmedRecord | EndedRecord) else record.elapsed

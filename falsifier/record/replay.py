@@ -50,7 +50,8 @@ class ReplayedSteps(Steps):
         if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
             raise JournalError(
                 f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "
-                "journal, which was written with other settings or another version; start a new run"
+                "journal, which was written with other settings, another version, or an engine that does not "
+                "propose the same again, as engines must; start a new run"
             )
         return candidates, record.n, record.seconds
 

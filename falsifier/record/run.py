@@ -27,8 +27,7 @@ from falsifier.record.files import CAMPAIGN, check_unused
 from falsifier.record.journal import JOURNAL, STOP, holds_run, open_journal, simulated
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
-from falsifier.search import DEFAULT_SIMULATIONS
-from falsifier.search.budget import Budget
+from falsifier.search.budget import Budget, budget_of
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
@@ -97,8 +96,8 @@ def falsify(
 
     Args:
         problem: what to falsify: a Problem, or a target of ``falsifier run`` such as ``"AT1"``; or a list.
-        engine: name of an engine, or an engine made in Python; default: ``surrogate``, or the language model
-            if one is given.
+        engine: name of an engine, or for one requirement an engine made in Python; default: ``surrogate``,
+            or the language model if one is given.
         llm: name of a language model such as ``"openai/gpt-5-mini"``, its settings, or a chat with it.
         budget: limits; a plain number limits the simulations. Default: 100 simulations.
         seed: seed of an engine given by name.
@@ -130,16 +129,16 @@ def falsify(
     if not problems:
         raise SpecError("problem: the list is empty; expected Problems, or targets such as 'AT1'")
     check_names(problems)
-    _check_engine(engine)
     seed, jobs = whole("seed", seed, least=0), whole("jobs", jobs, least=1)
-    limits = _budget(budget)
+    limits = Budget() if budget is None else budget_of(budget)
     groups, known = alike(problems), list_of("start_from", start_from, Candidate, "Candidate")
     listeners = list_of("listeners", listeners, Callable, "functions")
     chat = None if isinstance(llm, LLMSettings | str | None) else llm
-    made = None if isinstance(engine, str | None) else engine
+    made = None if isinstance(engine, str) else engine
+    _check_made(made)
     if llm is None and made is None and (limits.tokens or limits.cost):
         raise SpecError("budget: tokens and cost limit a language model, and none is named; drop the limit")
-    name = engine if isinstance(engine, str | None) else engine.name
+    name = engine if made is None else made.name
     settings = _settings(llm)
     if directory is not None and len(groups) > 1:
         check_unused(path_of("directory", directory))
@@ -191,6 +190,7 @@ def resume(
         SpecError: if the budget is less than what a run has spent.
     """
     problems = list_of("problems", problems, Problem, "Problem")
+    _check_made(engine)
     directory = path_of("directory", directory, "the directory of a run")
     places = runs_in(directory)
     by_name = {problem.name: problem for problem in problems}
@@ -201,9 +201,9 @@ def resume(
         if budget is not None:
             request = request.model_copy(update={"budget": _changed(request.budget, budget, place)})
         if engine is None and request.llm is None and described.engine not in ENGINES:
-            raise JournalError(
-                f"{place}: this run's engine was made in Python: call resume() with engine=..."
-            )
+            raise JournalError(f"{place}: its engine was made in Python: call resume() with engine=...")
+        if engine is not None and engine.name != described.engine:
+            raise JournalError(f"{place}: this run has the engine {described.engine!r}, not {engine.name!r}")
         if not problems and not request.problems:
             raise JournalError(
                 f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
@@ -338,27 +338,20 @@ def _problem(given: Falsifiable) -> Problem:
     return load_source(given if isinstance(given, ProblemSource) else ProblemSource(target=str(given)))
 
 
-def _check_engine(engine: object) -> None:
-    """Check that an engine is a name, or has what an engine needs."""
-    is_made = (
-        hasattr(engine, "ask") and hasattr(engine, "tell") and isinstance(getattr(engine, "name", 0), str)
-    )
-    if not is_made and not isinstance(engine, str | None):
-        raise SpecError(
-            f"engine: expected a name, or an object with name, ask() and tell(), got {type(engine).__name__}"
-        )
+def _check_made(engine: Engine | None) -> None:
+    """Check that an engine made in Python, if one is given, has what an engine needs."""
+    if isinstance(engine, type):
+        raise SpecError(f"engine: expected an instance, such as {engine.__name__}(), got the class")
+    methods = (getattr(engine, name, None) for name in ("ask", "tell"))
+    if not (engine is None or (all(map(callable, methods)) and isinstance(getattr(engine, "name", 0), str))):
+        expected = "an object with name, ask() and tell(), or in falsify() a name"
+        raise SpecError(f"engine: expected {expected}, got {type(engine).__name__}")
 
 
 def _sources(problems: Sequence[Problem]) -> tuple[ProblemSource, ...]:
     """Where the problems come from; empty if any of them was made or changed in Python."""
     sources = [reloadable(problem) for problem in problems]
     return tuple(s for s in sources if s is not None) if all(sources) else ()
-
-
-def _budget(given: Budget | int | None) -> Budget:
-    if isinstance(given, Budget):
-        return given
-    return Budget(DEFAULT_SIMULATIONS if given is None else whole("budget", given, least=1))
 
 
 def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:

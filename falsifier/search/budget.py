@@ -10,7 +10,6 @@ from falsifier.errors import ChatError, FalsifierError, SpecError, written
 from falsifier.llm.messages import Chat, ChatReply, ChatRequest, Exchange, Usage
 from falsifier.search import DEFAULT_SIMULATIONS
 
-# What to say if a cost is limited that cannot be known.
 # What requests to a language model use beside their cost, which may be unknown.
 USED = ("without_reply", "kept", "prompt_tokens", "completion_tokens", "reasoning_tokens")
 
@@ -146,6 +145,11 @@ class Budget:
     def seconds_left(self, spent: Spent) -> float | None:
         """Seconds that the budget still allows; None without a limit."""
         return None if self.seconds is None else max(0.0, self.seconds - spent.seconds)
+
+
+def budget_of(given: Budget | int) -> Budget:
+    """Return the limits that a user gave; a plain number limits the simulations."""
+    return given if isinstance(given, Budget) else Budget(whole("budget", given, least=1))
 
 
 # A wait for a reply may end this much before the time that it was given.

@@ -114,7 +114,7 @@ class VacuousImplication:
     @property
     def text(self) -> str:
         """The finding in words."""
-        over = _moment(self.window)
+        over = f"at {seconds(self.window[0])}" if self.window[0] == self.window[1] else _over(self.window)
         off = "exactly on its limit" if is_on_limit(self.margin) else f"false by {number(-self.margin)}"
         never, near = "not", f"it was {off}"
         if self.window[0] < self.window[1]:
@@ -255,10 +255,6 @@ def valued(side: Expression, values: Mapping[str, float], margin: float, unit: s
 def _over(window: tuple[float, float] | None) -> str:
     start, end = window or (0.0, 0.0)
     return f"over [{number(start)}, {number(end)}] s"
-
-
-def _moment(window: tuple[float, float]) -> str:
-    return f"at {seconds(window[0])}" if window[0] == window[1] else _over(window)
 
 
 def seconds(time: float) -> str:

@@ -18,9 +18,7 @@ def implies(first: stl.Formula, second: stl.Formula) -> bool:
     True
     """
     first, second = _plain(first), _plain(second)
-    if first == second:
-        return True
-    return _by_parts(first, second) or _by_operator(first, second)
+    return first == second or _by_parts(first, second) or _by_operator(first, second)
 
 
 def _by_parts(first: stl.Formula, second: stl.Formula) -> bool:
@@ -105,6 +103,4 @@ def _covers(outer: stl.Window | None, inner: stl.Window | None) -> bool:
 
 
 def _meet(one: stl.Window | None, other: stl.Window | None) -> bool:
-    if one is None or other is None:
-        return True
-    return max(one.start, other.start) <= min(one.end, other.end)
+    return one is None or other is None or max(one.start, other.start) <= min(one.end, other.end)

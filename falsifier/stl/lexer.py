@@ -44,12 +44,19 @@ _HINTS = {
 UNITS = {
     "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
 }  # fmt: skip
-# What was meant by a name.
+_PAST = (
+    "there are no operators on the past; for 20 s, write G (a -> once[0,2] b) as "
+    "G[0,18] (F[2,2] a -> F[0,2] b), which begins at 2 s"
+)
+# What was meant by a name; single capitals are operators only as they are written.
 _INSTEAD = {
+    **dict.fromkeys(("once", "historically", "since", "previous", *"HOPSY"), _PAST),
+    **dict.fromkeys(("W", "weak_until", "weakuntil"), "a W b is ((a or b) U b) or G a"),
+    **dict.fromkeys(("R", "release"), "a R b is (b U (a and b)) or G b"),
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
     "u": "operators are capital letters: write U", "alw": "write G or always", "ev": "write F or eventually",
-    "iff": "write <->", "xor": "write not (a <-> b)", "release": "a R b is not (not a U not b)",
+    "iff": "write <->", "xor": "write not (a <-> b)",
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
 _BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
@@ -107,10 +114,15 @@ def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaEr
 
 def hint_for(token: Token) -> str:
     """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
-    word = token.text.partition("[")[0].lower().rstrip("_")  # as Breach writes alw_[0,20]
+    written = token.text.partition("[")[0].rstrip("_")  # as Breach writes alw_[0,20]
+    word = written.lower()
     if token.kind != "name":
         return ""
-    return _INSTEAD.get(word) or (f"write operators in lower case: {word}" if word in RESERVED else "")
+    return (
+        _INSTEAD.get(written)
+        or _INSTEAD.get(word)
+        or (f"write operators in lower case: {word}" if word in RESERVED else "")
+    )
 
 
 def hint_at(tokens: Sequence[Token], index: int) -> str:

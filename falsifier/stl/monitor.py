@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import instance, positive, whole
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl.breach import Breach, find_breach
@@ -78,6 +79,7 @@ class Monitor:
     Raises:
         FormulaError: if the formula is not parsed, a window extends past the end of the grid or a bound is
             not a multiple of the step.
+        SpecError: if the step is not positive, or samples is no positive whole number.
     """
 
     formula: Formula
@@ -90,11 +92,8 @@ class Monitor:
     def __post_init__(self) -> None:
         if not isinstance(self.formula, Formula):
             raise FormulaError(f"a monitor needs a formula; use parse({self.formula!r})")
-        if not (self.step > 0 and np.isfinite(self.step) and self.samples >= 1):
-            raise FormulaError(
-                "a time grid needs a positive step and at least one recorded time, "
-                f"got {self.step}, {self.samples}"
-            )
+        positive("step", self.step)
+        object.__setattr__(self, "samples", whole("samples", self.samples, least=1))
         program = compile_formula(self.formula, step=self.step, samples=self.samples)
         object.__setattr__(self, "_program", program)
         object.__setattr__(self, "watched", tuple(_watched(program.root)))
@@ -198,6 +197,7 @@ class Monitor:
         Raises:
             MonitorError: naming the first trajectory that cannot be evaluated, and the signal.
         """
+        instance("columns", columns, Mapping, "arrays by signal name, each with a row per trajectory")
         return fill_many(self._program, columns)
 
     def _take_buffer(self) -> NDArray[np.float64]:

@@ -210,20 +210,15 @@ class _Parser:
         is_pair = token.text in ("min", "max")
         if is_pair != (len(operands) > 1):
             wanted = "two or more expressions" if is_pair else "one expression"
-            self._fail(
-                f"{token.text} expects {wanted}, got {len(operands)}", token.position, "check the commas"
-            )
+            self._fail(f"{token.text} expects {wanted}, got {len(operands)}", token.position, "check commas")
         return expression.Call(cast(expression.Function, token.text), tuple(operands))
 
     def _close(self, opening: lexer.Token) -> None:
         if not self._accept(")"):
-            self._fail(
-                f"expected ')' before {self._next.shown}",
-                self._next.position,
-                f"it closes the '(' at position {opening.position + 1}"
-                if self._next.kind in ("end", "symbol")
-                else lexer.JOIN,
-            )
+            token, closes = self._next, f"it closes the '(' at position {opening.position + 1}"
+            hint = lexer.hint_for(token) or lexer.hint_for(self.tokens[self.index - 1])
+            hint = hint or (closes if token.kind in ("end", "symbol") else lexer.JOIN)
+            self._fail(f"expected ')' before {token.shown}", token.position, hint)
 
     # -- windows -----------------------------------------------------------------------------------------
 

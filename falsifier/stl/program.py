@@ -213,7 +213,7 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
         if name not in columns:
             raise MonitorError(f"no signal {name!r} in the batch; {did_you_mean(name, columns)}")
     used = [np.asarray(columns[name], dtype=np.float64) for name in program.signals]
-    shapes = {column.shape for column in columns.values()}
+    shapes = {np.shape(column) for column in columns.values()}
     count = len(next(iter(columns.values()))) if columns else 0
     if shapes != {(count, program.samples)}:
         raise MonitorError(f"expected columns of shape (m, {program.samples}), got {sorted(shapes)}")

@@ -33,9 +33,7 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
         for name, value in attributes.items()
         if value is not None
     )
-    if tag in _VOID:
-        return Html(f"<{tag}{given}>")
-    return Html(f"<{tag}{given}>{join(*children)}</{tag}>")
+    return Html(f"<{tag}{given}>" + ("" if tag in _VOID else f"{join(*children)}</{tag}>"))
 
 
 def join(*parts: str) -> Html:

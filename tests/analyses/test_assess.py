@@ -1,14 +1,16 @@
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from falsifier.analyses.assess import Searched, assess, lower_bound, upper_bound
+from falsifier.analyses.assess import Draws, Searched, assess, lower_bound, upper_bound
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
@@ -148,8 +150,16 @@ def test_what_a_probability_is_of_is_said() -> None:
     held = InputRange("v", 0, 1, control_points=3, hold=0.5, interpolation="pchip")
     problem = replace(lag_problem(inputs=2, limit=4), space=SearchSpace((gear, held), (), 10.0))
     text = assess(problem, budget=3).text
-    assert "u constant, uniform in [1, 4], rounded to an allowed number" in text
+    assert "u constant, uniform in [1, 4], each allowed number equally likely" in text
     assert "v with 3 control points 5 s apart, pchip, held for 0.5 s" in text and "not drawn" not in text
+
+
+def test_each_allowed_number_is_equally_likely() -> None:
+    gear = InputRange("u", 1, 4, kind="integer", interpolation="constant")
+    mode = ParameterRange("x0", 1, 5, kind="enumeration", items=(("hold", 5), ("down", 1), ("up", 2)))
+    drawn = Draws(replace(lag_problem(), space=SearchSpace((gear,), (mode,), 10.0)), seed=0).ask(1200)
+    numbers = Counter((c.signals["u"].values[0], c.parameters["x0"]) for c in drawn)
+    assert numbers.keys() == set(product((1, 2, 3, 4), (1, 2, 5))) and min(numbers.values()) > 70
 
 
 def test_at_a_bound_so_few_or_so_many_are_just_as_improbable_as_stated() -> None:

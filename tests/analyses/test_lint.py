@@ -87,10 +87,7 @@ control_points = 2
 
 @pytest.mark.parametrize(
     ("formula", "told"),
-    [
-        ("F[0,1] limp", "has few values, because limp is Boolean"),
-        ("G[0,9] (limp -> power <= 30)", ""),
-    ],
+    [("F[0,1] limp", "has few values, because limp is Boolean"), ("G[0,9] (limp -> power <= 30)", "")],
 )
 def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formula: str, told: str) -> None:
     path = spec(tmp_path, f"{HEATER}[requirements.R]\nformula = '{formula}'\n")

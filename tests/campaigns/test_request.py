@@ -22,7 +22,7 @@ def test_a_campaign_is_requirements_times_searchers_times_seeds() -> None:
     # An engine that never chooses control points is not said to have done so.
     kinds = [r.problems[0].parameterization for r in runs[::3]]
     assert kinds == ["fixed", "fixed", "free", "fixed", "fixed", "fixed"]
-    assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=Budget(7)) == runs[:2]
+    assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=7) == runs[:2]
 
 
 def test_names_are_readable_and_differ_with_anything_that_matters() -> None:

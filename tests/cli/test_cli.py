@@ -2,7 +2,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -10,7 +9,7 @@ import pytest
 
 from falsifier.cli import cli
 from falsifier.core.files import bundled
-from tests.command import ROOT, falsifier
+from tests.command import ROOT, commands, falsifier
 
 
 @pytest.mark.parametrize(
@@ -20,6 +19,8 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--search", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "--budget 0: expected a whole number from 1 to"),
         (["check", "AT1", "--budget", "-1"], "--budget -1: expected a whole number from 0 to"),
+        (["run", "AT1", "--seed", "1", "--seed=2"], "--seed: given 2 times; give one"),
+        (["info", "python:tests.problems:easy"], "bundled name, not a problem made in Python"),
         (["init", ""], "an argument is empty"),
         (["run", "AT1", "--out", ""], "--out: the value is empty"),
         (["run", "AT1:R1"], "no requirement 'R1': AT1 is itself a requirement, of AT"),
@@ -52,7 +53,7 @@ from tests.command import ROOT, falsifier
         (["run", "AT1", "--max-cost", "nan"], "--max-cost nan: expected a positive number"),
         (["run", "AT1", "--max-tokens", "0"], "--max-tokens 0: expected a whole number from 1 on"),
         (["run", "AT1", "--stop-time", "inf"], "--stop-time inf: expected a positive number"),
-        (["bench", "AT1", "--total", "seconds=0"], "--total seconds=0: expected simulations=N"),
+        (["bench", "AT1", "--total", "seconds=0"], "cost=N (N > 0), for example cost=5"),
         (
             ["margin", "AT1", "--stl", "G (speed <= {limit})", "--between", "160:100"],
             "--between 160:100: expected LOW:HIGH with LOW < HIGH",
@@ -149,19 +150,11 @@ def test_commands_start_with_few_packages(arguments: str, allowed: set[str] | No
 
 def test_options_are_few_and_mean_the_same_everywhere() -> None:
     options: dict[str, set[str]] = {}
-    for command in commands(cli):
+    for _, command in commands(cli):
         for option in (p for p in command.params if isinstance(p, click.Option)):
             options.setdefault(option.opts[-1], set()).add(option.type.name)
     assert 40 < len(options) <= 60
     assert not [name for name, types in options.items() if len(types) > 1]
-
-
-def commands(group: click.Group) -> Iterator[click.Command]:
-    context = click.Context(group)
-    for name in group.list_commands(context):
-        command = group.get_command(context, name)
-        assert command is not None
-        yield from commands(command) if isinstance(command, click.Group) else (command,)
 
 
 @pytest.mark.parametrize(

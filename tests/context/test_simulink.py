@@ -28,9 +28,7 @@ BLOCK = 'Block {{\nBlockType {0}\nName "{1}"\n{2}\n}}\n'
 
 def drawn(folder: Path, blocks: Iterable[str], wires: Iterable[tuple[str, str]] = ()) -> Diagram:
     """A model of these blocks, each ``Type name`` with lines for its content behind it."""
-    text = "".join(
-        BLOCK.format(*block.partition("\n")[0].split(), block.partition("\n")[2]) for block in blocks
-    )
+    text = "".join(BLOCK.format(*b.partition("\n")[0].split(), b.partition("\n")[2]) for b in blocks)
     for source, target in wires:
         text += f'Line {{\nSrcBlock "{source}"\nSrcPort 1\nDstBlock "{target}"\nDstPort 1\n}}\n'
     path = folder / "m.mdl"

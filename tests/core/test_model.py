@@ -61,6 +61,7 @@ def test_an_input_without_a_signal_is_constant(given: dict[str, float], level: f
         (lambda *_: 1 / 0, ("level",), "tank: ZeroDivisionError: division by zero"),
         (lambda *_: sys.exit("no licence"), ("level",), "tank: SystemExit: no licence"),
         (lambda times, *_: {"level": times[:-1]}, ("level",), r"'level' has shape \(10,\), expected \(11,\)"),
+        (lambda t, *_: t.fill(0), ("level",), "tank: ValueError: .*read-only"),
         (lambda *_: None, ("level",), "the function returned NoneType; expected a dictionary"),
         (lambda *_: (1.0, 2.0), ("level",), "the function returned tuple; expected a dictionary"),
         (lambda *_: {"level": ["high"] * 11}, ("level",), "output 'level' is not an array of real numbers"),

@@ -157,9 +157,7 @@ def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told(
     assert not engine.turns.is_llm_next, "an answer that was not simulated has not helped"
     asked += drive(engine, judge, rounds=37)
     assert course(asked) == "L" + 39 * "S"
-    told = [
-        note for note in script.notes[2] if "was not simulated: sample 1 differs from it by at most" in note
-    ]
+    told = [n for n in script.notes[2] if "was not simulated: sample 1 differs from it by at most" in n]
     assert len(told) == 1 and "10 % of each range" in told[0]
 
 

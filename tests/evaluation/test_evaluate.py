@@ -1,3 +1,4 @@
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,13 @@ def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> No
     assert found.trajectory.names == ("x", "u")
     assert found.trajectory.units == {"x": "m", "u": "V"}
     assert found.seconds >= 0
+    shared: Any
+    for shared in (found, pickle.loads(pickle.dumps(found))):  # by engines, listeners and the result
+        columns = shared.trajectory.columns
+        assert not any(array.flags.writeable for array in (shared.trajectory.times, *columns.values()))
+        for change in (columns.clear, columns.popitem, shared.candidate.signals.clear):
+            with pytest.raises(TypeError, match=r"read-only; dict\(...\) makes a copy"):
+                change()
 
 
 def test_a_parameter_of_the_candidate_goes_before_the_problems() -> None:

@@ -176,8 +176,7 @@ def test_children_end_and_folders_are_swept_when_the_simulating_process_is_kille
 
 
 @pytest.mark.skipif(
-    not posix.can_confine() and os.getuid() != 0,
-    reason="processes of other programs cannot be protected",
+    not posix.can_confine() and os.getuid() != 0, reason="processes of other programs cannot be protected"
 )
 def test_an_fmu_reads_no_secrets_of_other_processes(tmp_path: Path) -> None:
     environment = {"SOME_API_KEY": "hostile-test-secret-1", "LICENSE": "port@host"}

@@ -136,10 +136,7 @@ def test_a_picture_that_cannot_be_drawn_is_a_message(
 
 @pytest.mark.parametrize("moved", [False, True])
 def test_a_search_that_cannot_be_recorded_any_more_shows_its_best(
-    moved: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    moved: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     record = Journal.__call__
     place = tmp_path / "run"

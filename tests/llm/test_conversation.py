@@ -24,11 +24,7 @@ def asked(*script: str | ChatReply | Exception) -> tuple[int, ScriptedChat, list
 
 @pytest.mark.parametrize(
     "reply",
-    [
-        ChatReply(text="0"),
-        ChatReply(text="0", finish_reason="length"),
-        ChatReply(text="", reasoning="0"),
-    ],
+    [ChatReply(text="0"), ChatReply(text="0", finish_reason="length"), ChatReply(text="", reasoning="0")],
 )
 def test_a_complete_answer_is_read_wherever_it_stands(reply: ChatReply) -> None:
     value, chat, (exchange,) = asked(reply)

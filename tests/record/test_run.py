@@ -210,6 +210,8 @@ class TestResume:
         falsify(EASY, Wrapped(easy()), budget=2, directory=tmp_path / "engine")
         with pytest.raises(JournalError, match="engine="):
             resume(tmp_path / "engine")
+        with pytest.raises(JournalError, match="has the engine 'wrapped', not 'uniform'"):
+            resume(tmp_path / "engine", engine=make_engine("uniform", easy(), seed=0))
         (result,) = resume(tmp_path / "engine", engine=Wrapped(easy()), budget=3)
         assert result.spent.simulations == 3
 

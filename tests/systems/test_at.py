@@ -37,8 +37,7 @@ def shifts(gear: Array) -> list[list[float]]:
 
 
 @pytest.mark.parametrize(
-    ("run", "kind"),
-    [*((run, "held") for run in GOLDEN["runs"]), ("B", "continuous"), ("E", "continuous")],
+    ("run", "kind"), [*((run, "held") for run in GOLDEN["runs"]), ("B", "continuous"), ("E", "continuous")]
 )
 def test_golden_runs(run: str, kind: Kind) -> None:
     case = GOLDEN["runs"][run]

@@ -55,9 +55,7 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
     assert "falsified; HARD: violation confirmed" in front_end.lines[-1]
 
 
-def test_a_cause_is_told_once_and_that_most_have_failed(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_cause_is_told_once_and_that_most_have_failed(capsys: pytest.CaptureFixture[str]) -> None:
     problem = lag_problem("G[0,10] (x <= 2)", response=mostly_broken)
     with make_display() as display:
         result = falsify(problem, "uniform", budget=20, seed=1, listeners=[display])

@@ -13,7 +13,6 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
 from falsifier.core.model import Kind, Model, ModelInfo, Variable
-from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
 
@@ -42,7 +41,9 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
         after = _values(problem, candidate, variable, times)
         if after is not None:
             signal = candidate.signals.get(variable.name)
-            stepped = signal is not None and _steps(variable, signal)
+            stepped = signal is not None and (
+                signal.hold is not None or signal.interpolation == "constant" or variable.kind != "real"
+            )
             before = np.concatenate((after[:1], after[:-1])) if stepped else after
             columns[variable.name] = np.stack((before, after), axis=1).ravel()
     rows = np.stack((np.repeat(times, 2), *columns.values()))
@@ -71,10 +72,6 @@ def _values(
         return values if variable.kind == "real" else np.rint(values)
     value = problem.parameters.get(variable.name, variable.start_number)
     return None if value is None else np.full(times.shape, float(value))
-
-
-def _steps(variable: Variable, signal: Signal) -> bool:
-    return signal.hold is not None or signal.interpolation == "constant" or variable.kind != "real"
 
 
 def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.float64]]]:

@@ -79,9 +79,7 @@ class Explorer:
             return Proposal(programs.fresh(rng), "random parameters: without inputs, nothing can be kept")
         mark = self._choose(rng)
         if mark is None:
-            return Proposal(
-                programs.fresh(rng), "a random program of the inputs: nothing has been reached yet"
-            )
+            return Proposal(programs.fresh(rng), "a random program of the inputs: nothing was reached yet")
         reached = self._reached[mark]
         reached.tries += 1
         where = f"the input that made {describe(mark)} at {reached.time:.3g} s"

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import InputRange, ParameterRange, nearest_value
+from falsifier.core.space import InputRange, ParameterRange
 from falsifier.engines.layout import Array, Layout
 
 # Discrete inputs with more values than this are drawn like real ones.
@@ -225,11 +225,7 @@ def _cuts(ranged: InputRange | ParameterRange, values: Sequence[float]) -> NDArr
 
 def _levels(ranged: InputRange | ParameterRange) -> NDArray[np.float64] | None:
     """Return the values in [0, 1] of a discrete input; None for a real one and for very many values."""
-    if ranged.kind == "real" or ranged.high - ranged.low > _MAX_LEVELS * 4:
+    width = ranged.high - ranged.low
+    if ranged.kind == "real" or width > _MAX_LEVELS * 4 or len(ranged.numbers) > _MAX_LEVELS:
         return None
-    numbers: Sequence[float] = sorted(
-        {nearest_value(ranged, n) for n in range(int(np.floor(ranged.low)), int(np.ceil(ranged.high)) + 1)}
-    )
-    if len(numbers) > _MAX_LEVELS:
-        return None
-    return (np.array(numbers) - ranged.low) / ((ranged.high - ranged.low) or 1.0)
+    return (np.array(ranged.numbers) - ranged.low) / (width or 1.0)

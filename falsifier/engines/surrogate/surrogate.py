@@ -147,7 +147,9 @@ class Surrogate:
                 if pending.predicted is not None and sample is not None:
                     cost, violated = self.history.scaled_cost(), sample.robustness < 0
                     self.forecasts.judge(pending.predicted, sample.margins, cost, violated=violated)
-            elif sample is not None and self._is_near_extreme(point):
+            elif sample is not None and all(  # constant near a bound
+                np.abs(point[g] - np.rint(point[g][0])).max() <= _NEAR_EXTREME for g in self.layout.groups
+            ):
                 self._corners.hear(self._corners.box.point(evaluation.candidate), sample.robustness)
 
     def foresee(self, candidates: Sequence[Candidate]) -> list[Verdict]:
@@ -354,10 +356,6 @@ class Surrogate:
         """Return the predicted margins of points, shape (m, d)."""
         inputs = self.layout.inputs(points, self.grid)
         return self.history.scaled_cost().margins(dynamics.predict(inputs), inputs)
-
-    def _is_near_extreme(self, point: Array) -> bool:
-        """Whether each input is constant near a bound."""
-        return all(np.abs(point[g] - np.rint(point[g][0])).max() <= _NEAR_EXTREME for g in self.layout.groups)
 
     def _change(self, rng: np.random.Generator) -> Pending:
         samples, horizon = self.history.samples, self.grid.step * self.grid.cells

@@ -40,12 +40,7 @@ def random_points(layout: Layout, rng: np.random.Generator, count: int) -> Array
 
 
 def mutations(
-    layout: Layout,
-    rng: np.random.Generator,
-    parents: Array,
-    count: int,
-    *,
-    critical: Array | None = None,
+    layout: Layout, rng: np.random.Generator, parents: Array, count: int, *, critical: Array | None = None
 ) -> Array:
     """Return children, shape (count, d), each with one to three changes of a parent, some also crossed over.
 

@@ -88,8 +88,6 @@ def make_plan(
         if slot.refusal or slot.type != "String" or slot.size != 1:
             reason = slot.refusal or "it is not a single string"
             raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
-    times = experiment.times
-    times.flags.writeable = False
     return Plan(
         model=model,
         inputs=inputs,
@@ -97,7 +95,7 @@ def make_plan(
         outputs=experiment.outputs,
         units={name: variables[name].unit for name in experiment.outputs if variables[name].unit},
         limits={n: limits for n in (*inputs, *parameters) if (limits := variables[n].type_limits)},
-        times=times,
+        times=experiment.times,
         every=round(experiment.output_interval / experiment.step),
         pieces=pieces,
         max_step=experiment.step,

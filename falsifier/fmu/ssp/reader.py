@@ -124,9 +124,7 @@ class _Reader:
         """Collect the elements of a system description that stands for the element at a path."""
         file = package.description
         if (key := file.resolve()) in above:
-            raise SpecError(
-                f"{package.shown}: the system contains itself, at {at}; remove one of the references"
-            )
+            raise SpecError(f"{package.shown}: the system contains itself, at {at}; remove a reference")
         shown = package.shown if package.shown.endswith(file.name) else f"{package.shown}: {file.name}"
         with opened(file, shown, "SystemStructureDescription") as root:
             version = root.get("version", "")

@@ -314,14 +314,12 @@ def _index(times: Array, time: float) -> int:
 
 def _pairs(points: Points, clock: int) -> str:
     """Points as ``time:value``; no two that read as different values have the same time."""
-    values = [_value(value, allowed) for _, value, allowed in points]
+    values = [  # with the digits that what they may be off by leaves
+        plain(value, decimals_for(_OF_DIGITS * allowed, 1)) if allowed else f"{value:.9g}"
+        for _, value, allowed in points
+    ]
     while True:
         told = list(zip((plain(time, clock) for time, _, _ in points), values, strict=True))
         if clock >= _FINEST_CLOCK or not any(a[0] == b[0] and a[1] != b[1] for a, b in pairwise(told)):
             return " ".join(dict.fromkeys(f"{time}:{value}" for time, value in told))
         clock += 1
-
-
-def _value(value: float, allowed: float) -> str:
-    """A value with the digits that what it may be off by leaves."""
-    return plain(value, decimals_for(_OF_DIGITS * allowed, 1)) if allowed else f"{value:.9g}"

@@ -39,9 +39,7 @@ def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
     >>> decimals_for(119.6), decimals_for(0.05)
     (1, 5)
     """
-    if not isfinite(scale) or scale == 0:
-        return 0
-    return max(0, digits - 1 - floor(log10(abs(scale))))
+    return max(0, digits - 1 - floor(log10(abs(scale)))) if isfinite(scale) and scale != 0 else 0
 
 
 def column_decimals(column: NDArray[np.float64], *, margin: float | None = None) -> int:

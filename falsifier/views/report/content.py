@@ -138,7 +138,8 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     if not found:
         judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
         found = [judged[min(judged)]] if judged else []
-    return section_of(name, by_method, list(map(_shown, found)))
+    shown = [_shrunk(run) or shown_of(run, _recorded(run)) for run in found]
+    return section_of(name, by_method, shown)
 
 
 def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
@@ -156,10 +157,6 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
         by_method,
         sorted(shown, key=lambda one: (not one.is_shrunk, one.run.simulations)),
     )
-
-
-def _shown(run: Run) -> Shown:
-    return _shrunk(run) or shown_of(run, _recorded(run))
 
 
 def _recorded(run: Run) -> Candidate:

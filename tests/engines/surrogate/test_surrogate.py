@@ -42,11 +42,7 @@ def oscillator_problem(formula: str) -> Problem:
     return Problem(FunctionModel(_oscillator, info), Requirement("R", parse(formula)), space, experiment)
 
 
-def _oscillator(
-    times: Array,
-    inputs: dict[str, Array],
-    parameters: dict[str, float],
-) -> dict[str, Array]:
+def _oscillator(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
     step, x, v = times[1] - times[0], 0.0, 0.0
     column = np.empty_like(times)
     for k, u in enumerate(inputs["u"]):

@@ -46,9 +46,8 @@ def bad_replies(first: list[float]) -> list[str]:
 def test_no_name_is_told_that_the_variant_hides(name: str, variant: str, *, anonymous: bool) -> None:
     problem = load_problem(name)
     low, high = problem.space.bounds.T
-    first = low + 0.25 * (high - low)
-    if name == "PulseMeter":  # it is Boolean
-        first = np.resize([0.0, 1.0], len(low))
+    is_boolean = name == "PulseMeter"
+    first = np.resize([0.0, 1.0], len(low)) if is_boolean else low + 0.25 * (high - low)
     requests, done = list[ChatRequest](), list[Evaluation]()
     for bad in bad_replies(first.tolist()):
         chat = ScriptedChat([json.dumps({"point": first.tolist()}), bad, bad, bad])

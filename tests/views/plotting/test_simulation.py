@@ -59,9 +59,7 @@ def test_what_broke_is_marked_and_what_decided_is_only_a_ring() -> None:
     assert evaluation.verdict is not None and evaluation.verdict.predicate == "u >= 0.9"
     figure = plot_evaluation(problem, evaluation)
     condition, consequence, _ = figure.axes
-    (ring,), (dot,) = (
-        [line for line in ax.get_lines() if line.get_marker() == "o"] for ax in figure.axes[:2]
-    )
+    (ring,), (dot,) = ([x for x in ax.get_lines() if x.get_marker() == "o"] for ax in figure.axes[:2])
     assert (xs(dot).tolist(), dot.get_markerfacecolor()) == ([10.0], CRITICAL)
     assert (xs(ring).tolist(), ring.get_markerfacecolor()) == ([evaluation.verdict.critical_time], "none")
     assert len(consequence.patches) == 2, "the window of the requirement, and when it was violated"
