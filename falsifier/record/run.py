@@ -19,7 +19,7 @@ from falsifier.engines.protocol import KNOWN, Engine
 from falsifier.errors import JournalError, SpecError, written
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
-from falsifier.problem.loading import load_source, load_sources, reloadable
+from falsifier.problem.loading import load_source, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -210,9 +210,9 @@ def resume(
             )
         if not problems:
             manifest.check_in_sight(place, request.problems)
-            loaded = load_sources(request.problems)
+            loaded = [load_source(source) for source in request.problems]
         elif by_name.keys() >= set(described.names):
-            loaded = [by_name[name] for name in described.names]
+            loaded = [p for group in alike(by_name[name] for name in described.names) for p in group]
         else:
             raise JournalError(
                 f"{place}: this run searched {', '.join(described.names)}: give all of them in problems=[...]"
