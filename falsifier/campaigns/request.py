@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cache
 from hashlib import sha256
 from itertools import product
 from math import inf
@@ -16,10 +17,11 @@ from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
+from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget, stated_price
-from falsifier.search.parameterization import engine_parameterization
+from falsifier.search.parameterization import engine_parameterization, parameterization_of
 from falsifier.search.request import LLMSettings, RunRequest, Strict
 
 _HASH_DIGITS = 10
@@ -104,13 +106,14 @@ def cross(
     """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
     Args:
-        problems: what is searched; for engines that choose no control points, with fixed parameterizations.
+        problems: what is searched; where the engine or the problem allows no other control points, as fixed.
         searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
         budget: limits of each run; those of tokens and cost hold for language models.
 
     Raises:
-        SpecError: if one of them is no list, or is empty.
+        SpecError: if one of them is no list, or is empty, or a problem is not valid.
+        ModelError: if an FMU cannot be read.
     """
     lists = (
         list_of("problems", problems, ProblemSource | str, "targets such as 'AT1'"),
@@ -120,13 +123,15 @@ def cross(
     if not all(lists):
         raise SpecError("problems, searchers and seeds: expected at least one of each")
     runs: dict[str, RunRequest] = {}
+    space = cache(lambda source: load_source(source).space)
     for problem, searcher, seed in product(*lists):
         engine = searcher if isinstance(searcher, str) else None
         llm = searcher if isinstance(searcher, LLMSettings) else None
         if isinstance(searcher, tuple):
             engine, llm = searcher
         used = ProblemSource(target=problem) if isinstance(problem, str) else problem
-        if used.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
+        is_open = used.parameterization == "free" and used.shortest_piece is None
+        if is_open and "fixed" in (engine_parameterization(engine, llm), parameterization_of(space(used))):
             used = used.model_copy(update={"parameterization": "fixed"})
         limits = budget if llm else replace(budget, tokens=None, cost=None)
         run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=limits, keep="best")

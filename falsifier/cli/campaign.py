@@ -26,7 +26,7 @@ from falsifier.campaigns import (
 from falsifier.campaigns.analysis import load, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import check_new, is_campaign
-from falsifier.campaigns.request import Searcher, ceiling, method_of
+from falsifier.campaigns.request import Method, Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli import llm_options, options
@@ -148,10 +148,13 @@ def bench(
     check_new(directory)
     check_request(request)
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
-    for method in dict.fromkeys(map(method_of, request.runs)):
-        allowed = ", if the spec allows it" if method.parameterization == "free" else ""
-        name = replace(method, parameterization="fixed").label
-        warn(f"{name}: {method.parameterization} parameterization{allowed}")
+    searched: dict[Method, set[str]] = {}
+    for run in request.runs:
+        searched.setdefault(method_of(run), set()).add(run.problems[0].name)
+    for method, names in searched.items():
+        label = replace(method, parameterization="fixed").label
+        of = "" if names == set().union(*searched.values()) else f" of {', '.join(sorted(names))}"
+        warn(f"{label}: {method.parameterization} parameterization{of}")
     _agree(request, yes=yes)
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, listeners=[show])

@@ -18,7 +18,7 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("Falsification\n")
     assert "HARD" in result.stdout
-    assert "4 runs in c" in result.stderr
+    assert "4 runs in c\nuniform: fixed parameterization\n" in result.stderr
     assert "[4/4]" in result.stderr
     assert "| HARD | uniform | 2/2 |" in (tmp_path / "c" / "table-main.md").read_text()
     assert (tmp_path / "c" / "table-main.csv").read_text().startswith("requirement,method,FR")
@@ -106,16 +106,17 @@ def requested(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 def test_methods_are_all_combinations(command: Any, requested: list[Any]) -> None:
-    command(
-        *("bench", HARD, "--runs", "1", "--seed", "5", "--max-cost", "2", "--total", "cost=9"),
+    done = command(
+        *("bench", "AT1", HARD, "--runs", "1", "--seed", "5", "--max-cost", "2", "--total", "cost=9"),
         *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024@high", "--llm-option", "price=1:2"),
         *("--variant", "MP4", "--variant", "MP5", "--anonymous"),
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = requested
     asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problems[0].parameterization) for r in request.runs}
-    # A prompt that does not offer control points to choose is searched once, with the fixed ones.
-    assert len(asked) == len(request.runs) == 6
+    # With a prompt or a problem that offers no control points to choose, the fixed ones are searched once.
+    assert (len(asked), len(request.runs)) == (6, 10)
+    assert "gpt-5-nano low MP5, neutral names: free parameterization of AT1\n" in done.stderr
     assert ("openai/gpt-5-nano", "low", "MP5", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}
