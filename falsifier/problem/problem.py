@@ -159,15 +159,15 @@ class Problem:
         """Return the problem with another formula, of which all signals are recorded."""
         requirement = Requirement(self.name, formula, description)
         inputs = [v.name for v in self.info.inputs]
-        recording = self.recording(name for name in requirement.formula.signals if name not in inputs)
-        return replace(recording, requirement=requirement)
+        more = (name for name in requirement.formula.signals if name not in inputs)
+        return replace(self.recording((*self.experiment.outputs, *more)), requirement=requirement)
 
     def recording(self, names: Iterable[str]) -> "Problem":
-        """Return the problem with more variables recorded; its source says so, too."""
-        more = tuple(name for name in dict.fromkeys(names) if name not in self.experiment.outputs)
-        source = self.source and self.source.model_copy(update={"record": (*self.source.record, *more)})
-        outputs = (*self.experiment.outputs, *more)
-        return replace(self, experiment=replace(self.experiment, outputs=outputs), source=source)
+        """Return the problem with these variables recorded before its own; its source says so, too."""
+        outputs = tuple(dict.fromkeys((*names, *self.experiment.outputs)))
+        source = self.source and self.source.model_copy(update={"record": outputs})
+        changed = replace(self, experiment=replace(self.experiment, outputs=outputs), source=source)
+        return self if outputs == self.experiment.outputs else changed
 
     @property
     def info(self) -> ModelInfo:
