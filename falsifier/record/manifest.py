@@ -23,7 +23,7 @@ from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
-from falsifier.search.parameterization import parameterization_of, searched_space
+from falsifier.search.parameterization import engine_parameterization, parameterization_of, searched_space
 from falsifier.search.request import RunRequest, Strict
 
 MANIFEST = "manifest.json"
@@ -191,7 +191,7 @@ def describe(
     file_hashes; None: as they are now.
     """
     problem = problems[0]
-    space = problem.space
+    space, used = problem.space, engine_parameterization(request.engine, request.llm)
     return Manifest(
         **environment(),
         run=token_hex(4),
@@ -201,7 +201,7 @@ def describe(
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
         components=problem.info.components,
-        parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
+        parameterization=parameterization_of(searched_space(space, used)),
         inputs=space.inputs,
         parameters=space.parameters,
         not_searched=problem.held,

@@ -32,7 +32,7 @@ from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
-from falsifier.search.parameterization import searched_space
+from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Steps
@@ -324,7 +324,7 @@ def carry_out(
             known=known,
             steps=steps,
             jobs=request.jobs,
-            searched=searched_space(problems[0].space, request.engine, request.llm),
+            used=engine_parameterization(request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,
         )

@@ -35,7 +35,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
 
 
 def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, searched_space(problem.space, engine, None))
+    finding = inexpressible(problem, engine_parameterization(engine, None))
     return finding.text if finding else ""
 
 
@@ -49,6 +49,7 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     assert stated.source is not None
     asked = stated.source.model_copy(update={"parameterization": "fixed"})
     assert told(replace(stated, source=asked)).endswith("To try them: shortest_piece=0.05.")
+    assert told(stated, "cma").endswith("To try them: engine='surrogate' with shortest_piece=0.05.")
     assert told(replace(stated, source=None)).endswith(" InputRange(..., free=Freedom(200, 0.05)).")
 
 
@@ -57,7 +58,8 @@ def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
     assert not told(free)
     assert "engine='surrogate'" in told(free, "cma")
     fixed = load_problem("AT1", parameterization="fixed")
-    assert "parameterization='free'" in told(fixed)
+    assert told(fixed).endswith("To try them: parameterization='free'.")
+    assert told(fixed, "cma").endswith("To try them: engine='surrogate' with parameterization='free'.")
 
 
 def test_constant_and_held_inputs_are_described_as_such() -> None:
@@ -94,9 +96,9 @@ def test_a_language_model_chooses_control_points_if_its_prompt_offers_that() -> 
 
 def test_a_search_is_not_called_free_if_its_engine_is_not() -> None:
     space = lag_problem(free=FREE).space
-    assert parameterization_of(searched_space(space, "surrogate", None)) == "free"
-    assert parameterization_of(searched_space(space, "cma", None)) == "fixed"
-    assert parameterization_note(searched_space(space, "cma", None)) == (
+    assert parameterization_of(searched_space(space, "free")) == "free"
+    assert parameterization_of(searched_space(space, "fixed")) == "fixed"
+    assert parameterization_note(searched_space(space, "fixed")) == (
         "fixed parameterization: u (4 control points, linear)"
     )
 
