@@ -23,7 +23,7 @@ from falsifier.campaigns import (
     run_campaign,
     suite,
 )
-from falsifier.campaigns.analysis import load, read_published
+from falsifier.campaigns.analysis import load, not_begun, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import check_new, is_campaign
 from falsifier.campaigns.request import Method, Searcher, ceiling, method_of
@@ -204,7 +204,8 @@ def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet:
 
 def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
-    runs, published = load(directory), read_published()
+    begun, published = load(directory), read_published()
+    runs = [*begun, *not_begun(directory, begun)]
     tables = {name: make(runs, published) for name, make in TABLES.items()}
     for name, made in tables.items():
         if made.rows:

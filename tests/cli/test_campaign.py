@@ -81,9 +81,11 @@ def test_a_limit_that_is_reached_by_a_complete_campaign_stops_nothing(command: A
 
 
 def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:
-    stopped = bench(command, "--out", "c", "--total", "simulations=5")
+    stopped = bench(command, "--out", "c", "--total", "simulations=1")
     assert stopped.exit_code == 3
-    assert "the budget of 5 simulations is used up" in stopped.stderr
+    rates = [line.split("  ")[:3] for line in stopped.stdout.splitlines()[4:6]]
+    assert rates[1] == ["impossible", " uniform", "0/0 +2"], "no run of it has begun"
+    assert "the budget of 1 simulation is used up" in stopped.stderr
     assert "falsifier resume c" in stopped.stderr
     resumed = command("resume", "c", "--total", "simulations=1000", "--quiet")
     assert resumed.exit_code == 0, resumed.output
