@@ -150,11 +150,7 @@ def load_problems(target: str | PathLike[str], *, profile: str | None = None) ->
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
-    """Return one source per requirement of a spec; if the source names one, return only that.
-
-    Raises:
-        SpecError: if the target is neither a spec file nor a bundled name.
-    """
+    """Return a source per requirement of a spec, or of the one that is named; SpecError if it is no spec."""
     if source.parts.kind in ("fmu", "python"):
         return [source]
     path, requirement = find_spec(source.target)

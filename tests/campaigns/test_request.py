@@ -7,8 +7,6 @@ from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
 
 AT1 = ProblemSource(target="AT1")
-
-
 NANO = LLMSettings(name="openai/gpt-5-nano", effort="low", variant="MP4")
 
 
@@ -23,6 +21,8 @@ def test_a_campaign_is_requirements_times_searchers_times_seeds() -> None:
     kinds = [r.problems[0].parameterization for r in runs[::3]]
     assert kinds == ["fixed", "fixed", "free", "fixed", "fixed", "fixed"]
     assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=Budget(7)) == runs[:2]
+    with pytest.raises(SpecError, match="the same run twice"):
+        CampaignRequest(runs=runs[:1] * 2).named()
     closed = ProblemSource(target="python:tests.problems:hard")
     both = [closed, closed.model_copy(update={"parameterization": "fixed"})]
     assert [r.problems for r in cross(both, ["surrogate"], seeds=[0], budget=Budget(7))] == [(both[1],)]
@@ -62,9 +62,3 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     named = LLMSettings(name="openai/gpt-5-mini", anonymous=True)
     (run,) = cross([AT1], [named], seeds=[0], budget=Budget(1))
     assert method_of(run).label == "gpt-5-mini, free, neutral names"
-
-
-def test_the_same_run_twice_is_refused() -> None:
-    run = cross([AT1], ["uniform"], seeds=[0], budget=Budget(5))
-    with pytest.raises(SpecError, match="the same run twice"):
-        CampaignRequest(runs=run + run).named()

@@ -57,17 +57,13 @@ def test_free_parameterizations_and_other_profiles_stand_apart_and_without_publi
         assert row[table.header.index("rank")] in (("–",) if apart else ("2 (tie)", "–"))
 
 
-def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
+def test_unfinished_runs_are_counted_apart_but_not_those_that_spent_their_budget(runs: list[Run]) -> None:
     first, *others = [run for run in runs if run.requirement == "NEVER" and run.method.engine == "uniform"]
     table = main_table([replace(first, status="interrupted"), *others], PUBLISHED)
     assert table.rows[0][2] == "0/1 +1"
     assert any(note.startswith("+n") for note in table.notes)
     alone = main_table([replace(first, status="interrupted")], PUBLISHED)
     assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
-
-
-def test_a_run_that_spent_its_budget_counts_whatever_failed_and_notes_say_how_much(runs: list[Run]) -> None:
-    first, *others = [run for run in runs if run.requirement == "NEVER" and run.method.engine == "uniform"]
     mostly = replace(first, status="failed", spent=replace(first.spent, failures=15, kept=7))
     table = main_table([mostly, *others], PUBLISHED)
     assert table.rows[0][2] == "0/2"

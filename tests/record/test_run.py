@@ -130,13 +130,10 @@ def test_an_engine_made_in_python_searches_one_requirement() -> None:
         falsify((easy(), hard()), engine, budget=5)  # type: ignore[call-overload]
 
 
-def test_a_wrong_name_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_directory_is_used_once_and_not_for_a_wrong_name(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="'corners'"):
         falsify(easy(), "corner", directory=tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_a_directory_is_used_once(tmp_path: Path) -> None:
     falsify(EASY, "corners", budget=5, directory=tmp_path)
     with pytest.raises(JournalError, match="resume"):
         falsify(EASY, "corners", budget=5, directory=tmp_path)
