@@ -8,7 +8,7 @@
     frame(runs).groupby(["requirement", "method"]).simulations.mean()
 """
 
-from falsifier.campaigns.runs import Run, columns, frame, load, load_run
+from falsifier.campaigns.runs import Run, columns, frame, load, load_run, not_begun
 from falsifier.campaigns.statistics import Statistics, group, statistics
 from falsifier.campaigns.tables import (
     COLUMNS,
@@ -39,6 +39,7 @@ __all__ = [
     "load",
     "load_run",
     "main_table",
+    "not_begun",
     "read_published",
     "statistics",
 ]

@@ -5,15 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from falsifier.campaigns.directory import (
-    is_campaign,
-    is_worked_on,
-    read_campaign,
-    run_directories,
-    run_directory,
-)
-from falsifier.campaigns.request import method_of
-from falsifier.campaigns.runs import RunProgress, unread_runs
+from falsifier.campaigns.directory import is_campaign, is_worked_on, run_directories, run_directory
+from falsifier.campaigns.runs import RunProgress, requested_runs, unread_runs
 from falsifier.record.summary import RunFollower, RunStatus
 from falsifier.search.budget import Spent
 
@@ -66,11 +59,8 @@ class Follower:
 def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
     """Yield a follower for each run of a campaign, or for each run directory."""
     if is_campaign(directory):
-        for name, request in read_campaign(directory).request.named().items():
-            run = RunProgress(
-                name=name, requirement=request.problems[0].name, method=method_of(request), seed=request.seed
-            )
-            yield RunFollower(run_directory(directory, name), [run])
+        for run in requested_runs(directory):
+            yield RunFollower(run_directory(directory, run.name), [run])
         return
     for place in run_directories(directory):
         yield RunFollower(place, list[RunProgress](unread_runs(place)))

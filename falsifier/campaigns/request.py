@@ -3,6 +3,7 @@
 import reprlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import cache
 from hashlib import sha256
 from itertools import product
 from math import inf
@@ -17,10 +18,11 @@ from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
+from falsifier.problem.loading import load_source
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget, budget_of, stated_price
-from falsifier.search.parameterization import engine_parameterization
+from falsifier.search.parameterization import engine_parameterization, parameterization_of
 from falsifier.search.request import LLMSettings, RunRequest, Strict
 
 _HASH_DIGITS = 10
@@ -120,14 +122,15 @@ def cross(
     """Make the runs of problems x searchers x seeds, in this order; equal ones once.
 
     Args:
-        problems: what is searched; for engines that choose no control points, with fixed parameterizations.
+        problems: what is searched; where the engine or the problem allows no other control points, as fixed.
         searchers: names of engines, language models, or pairs of an engine and the model that advises it.
         seeds: seeds of the engines.
         budget: limits of each run, or a number of simulations; tokens and cost limit language models.
 
     Raises:
         SpecError: if one of them is no list, is empty, or holds what cannot be in a campaign, such as an
-            engine made in Python.
+            engine made in Python, or a problem that is not valid.
+        ModelError: if an FMU cannot be read.
     """
     lists = (
         list_of("problems", problems, ProblemSource | str, "targets such as 'AT1'"),
@@ -137,10 +140,11 @@ def cross(
     if not all(lists):
         raise SpecError("problems, searchers and seeds: expected at least one of each")
     runs: dict[str, RunRequest] = {}
-    given = budget_of(budget)
+    given, space = budget_of(budget), cache(lambda source: load_source(source).space)
     for problem, (engine, llm), seed in product(*lists):
         used = ProblemSource(target=problem) if isinstance(problem, str) else problem
-        if used.shortest_piece is None and engine_parameterization(engine, llm) == "fixed":
+        is_open = used.parameterization == "free" and used.shortest_piece is None
+        if is_open and "fixed" in (engine_parameterization(engine, llm), parameterization_of(space(used))):
             used = used.model_copy(update={"parameterization": "fixed"})
         limits = given if llm else replace(given, tokens=None, cost=None)
         run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=limits, keep="best")

@@ -3,13 +3,13 @@
 A search shared by several requirements appears as one run per requirement.
 """
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from falsifier.campaigns.directory import run_directories
-from falsifier.campaigns.request import Method, method_of_run
+from falsifier.campaigns.directory import is_campaign, read_campaign, run_directories
+from falsifier.campaigns.request import Method, method_of, method_of_run
 from falsifier.counterexamples.store import file_of
 from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
@@ -38,6 +38,16 @@ class RunProgress(Summary):
     method: Method
     seed: int
 
+    @property
+    def simulations(self) -> int:
+        """Number of simulations."""
+        return self.spent.simulations
+
+    @property
+    def counts(self) -> bool:
+        """Whether tables count it, because it ended with a result."""
+        return self.finished
+
 
 @dataclass(eq=False, kw_only=True)
 class Run(RunProgress):
@@ -63,9 +73,10 @@ class Run(RunProgress):
         return self.directory / file_of(self.manifest.requirement.name, shared=self.method.together)
 
     @property
-    def simulations(self) -> int:
-        """Number of simulations."""
-        return self.spent.simulations
+    def counts(self) -> bool:
+        """Whether tables count it: it ended with a result, or spent its budget, whatever failed."""
+        budget, spent = self.manifest.request.budget, replace(self.spent, cost=self.spent.cost or 0.0)
+        return self.finished or (self.status == "failed" and budget.exceeded(spent) is not None)
 
     def columns(self) -> Columns:
         """Read every evaluation; return one row each, as columns of equal length; see evaluation_columns.
@@ -104,6 +115,23 @@ def load(directory: str | Path) -> list[Run]:
         if len(known := formulas[run.requirement]) > 1:
             run.requirement += f"-{known.index(run.manifest.requirement.formula) + 1}"
     return runs
+
+
+def not_begun(directory: Path, begun: Sequence[Run]) -> list[RunProgress]:
+    """Return the runs of a campaign that have not begun, which tables count beside those that have."""
+    names = {run.manifest.request.problems[0].name: run.requirement for run in begun}
+    asked = requested_runs(directory) if is_campaign(directory) else []
+    left = [run for run in asked if run.name not in (other.directory.name for other in begun)]
+    return [replace(run, requirement=names.get(run.requirement, run.requirement)) for run in left]
+
+
+def requested_runs(directory: Path) -> list[RunProgress]:
+    """Return the runs of a campaign as they were asked for, before anything is read of them."""
+    named = read_campaign(directory).request.named().items()
+    return [
+        RunProgress(name=name, requirement=r.problems[0].name, method=method_of(r), seed=r.seed)
+        for name, r in named
+    ]
 
 
 def load_run(directory: str | Path, requirement: str | None = None) -> Run:

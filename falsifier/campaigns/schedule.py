@@ -8,7 +8,7 @@ from pathlib import Path
 
 from falsifier.campaigns.directory import run_directory
 from falsifier.errors import FalsifierError, JournalError
-from falsifier.evaluation.workers import LastingExecutor
+from falsifier.evaluation.workers import LastingExecutor, death
 from falsifier.problem.problem import Problem
 from falsifier.record.journal import STOP
 from falsifier.record.run import StopFile, carry_out
@@ -95,7 +95,7 @@ class Schedule:
                 self._lost.add(task.name)
                 self._waiting.append(task)
             case BrokenExecutor() as error:
-                report(task, f"its worker process died: {error}")
+                report(task, death(error))
             case FalsifierError() as error:
                 report(task, str(error))
             case error:

@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.campaigns.request import Method
-from falsifier.campaigns.runs import Run
+from falsifier.campaigns.runs import RunProgress
 from falsifier.search.budget import Spent
 
 _CONFIDENCE = 0.95
@@ -15,18 +16,20 @@ _RESAMPLES = 2000
 # Fewer runs say so little that an interval would look like more.
 _FEWEST_RUNS = 5
 Interval = tuple[float, float]
+R = TypeVar("R", bound=RunProgress)
 
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
     """Statistics of several runs.
 
-    Except for ``unfinished`` and ``best``, all numbers cover finished runs only.
+    Except for ``unfinished`` and ``best``, all numbers cover finished runs only, which spent their budget or
+    falsified.
 
     Attributes:
         runs: number of finished runs.
         falsified: number of runs with a confirmed counterexample.
-        unfinished: number of runs that failed, were interrupted or are still running.
+        unfinished: number of runs that ended before, are still running, or have not begun.
         mean: mean number of simulations over the falsified runs; None if there is none.
         median: median of the same.
         deviation: sample standard deviation of the same; None below two falsified runs.
@@ -37,6 +40,9 @@ class Statistics:
         seconds: mean wall-clock time per run.
         tokens: mean number of tokens per run.
         cost: mean cost per run in US dollars; None if unknown.
+        simulations: number of simulations of all runs.
+        failures: those among them that failed.
+        kept: replies from the cache in all runs, whose tokens and cost are not counted.
     """
 
     runs: int
@@ -52,12 +58,15 @@ class Statistics:
     seconds: float
     tokens: float
     cost: float | None
+    simulations: int
+    failures: int
+    kept: int
 
 
-def statistics(runs: Iterable[Run]) -> Statistics:
+def statistics(runs: Iterable[RunProgress]) -> Statistics:
     """Compute the statistics of runs of one method on one requirement."""
     runs = list(runs)
-    finished = [run for run in runs if run.finished]
+    finished = [run for run in runs if run.counts]
     counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
     spent = sum((run.spent for run in finished), Spent())
     share = 1 / max(len(finished), 1)
@@ -75,12 +84,15 @@ def statistics(runs: Iterable[Run]) -> Statistics:
         seconds=spent.seconds * share,
         tokens=spent.tokens * share,
         cost=None if spent.cost is None else spent.cost * share,
+        simulations=spent.simulations,
+        failures=spent.failures,
+        kept=spent.kept,
     )
 
 
-def group(runs: Iterable[Run]) -> dict[tuple[str, Method], list[Run]]:
+def group(runs: Iterable[R]) -> dict[tuple[str, Method], list[R]]:
     """Runs by requirement and method, in order of first appearance."""
-    groups: dict[tuple[str, Method], list[Run]] = {}
+    groups: dict[tuple[str, Method], list[R]] = {}
     for run in runs:
         groups.setdefault((run.requirement, run.method), []).append(run)
     return groups

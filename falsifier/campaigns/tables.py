@@ -8,12 +8,12 @@ from functools import cache
 from typing import Any
 
 from falsifier.campaigns.request import Method
-from falsifier.campaigns.runs import Run
+from falsifier.campaigns.runs import RunProgress
 from falsifier.campaigns.statistics import Interval, Statistics, group, statistics
 from falsifier.core.files import bundled
 from falsifier.core.literals import csv_text, markdown_text, one_line
 from falsifier.core.words import aligned
-from falsifier.stl.margins import shown
+from falsifier.stl.margins import signed
 
 NONE = "–"
 # Published means have one decimal, so means are compared with one decimal: 1.3 and 1.34 share a rank.
@@ -163,7 +163,7 @@ class Table:
         return "\n".join([self.title, "", *aligned(rows), *(["", *self.notes] if self.notes else [])])
 
 
-def main_table(runs: Iterable[Run], published: Published) -> Table:
+def main_table(runs: Iterable[RunProgress], published: Published) -> Table:
     """Make a table with one row per requirement and method, and the published results if there are any.
 
     The published results apply to the specs' own (fixed) parameterization of instance 1, so only rows of that
@@ -183,6 +183,9 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
             row += [place, *(_cell(known.get(name)) for name in names)]
         rows.append(tuple(row))
     notes = {_UNFINISHED} if any(s.unfinished for s in found.values()) else set[str]()
+    for told, count in _COUNTED.items():
+        rows_of = (f"{r} {m.label} {n}" for (r, m), s in found.items() if (n := count(s)))
+        notes |= {f"{told}: {listed}." for listed in [", ".join(rows_of)] if listed}
     legend = f"{_LEGEND} {_PUBLISHED_LEGEND}" if names else _LEGEND
     if names:
         named = ((COLUMNS.get(name, name), source) for name, source in published.sources.items() if source)
@@ -191,28 +194,28 @@ def main_table(runs: Iterable[Run], published: Published) -> Table:
     return Table("Falsification", header, tuple(rows), (legend, *sorted(notes)))
 
 
-def ablation_table(runs: Iterable[Run], published: Published) -> Table:
+def ablation_table(runs: Iterable[RunProgress], published: Published) -> Table:
     """Make a table of prompt variants side by side, with the published results for each."""
     ours = _by_column(runs, lambda m: f"{m.variant} ({replace(m, variant='').label})" if m.variant else "")
     theirs = {f"{name} published": scores for name, scores in published.ablation.items()}
     return _side_by_side("Prompt variants: FR / S", ours, theirs)
 
 
-def llms_table(runs: Iterable[Run], published: Published) -> Table:
+def llms_table(runs: Iterable[RunProgress], published: Published) -> Table:
     """Make a table of language models side by side, with the published results."""
     ours = _by_column(runs, lambda m: m.label if m.llm else "")
     theirs = {f"{name} published": scores for name, scores in published.llms.items()}
     return _side_by_side("Language models: FR / S", ours, theirs)
 
 
-TABLES: Mapping[str, Callable[[Iterable[Run], Published], Table]] = {
+TABLES: Mapping[str, Callable[[Iterable[RunProgress], Published], Table]] = {
     "main": main_table,
     "ablation": ablation_table,
     "llms": llms_table,
 }
 
 
-def statistics_json(runs: Iterable[Run]) -> str:
+def statistics_json(runs: Iterable[RunProgress]) -> str:
     """All statistics as JSON: a list of objects, one per requirement and method."""
     rows = [
         {"requirement": requirement, "label": method.label, **asdict(method), **asdict(statistics(members))}
@@ -238,16 +241,17 @@ _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
     "mean 95 %": lambda s: _interval(s.mean_interval, 1),
     "median S": lambda s: _number(s.median, 1),
     "std S": lambda s: _number(s.deviation, 1),
-    "best robustness": lambda s: NONE if s.best is None else f"{shown(s.best):.4g}",
+    "best robustness": lambda s: NONE if s.best is None else signed(s.best, 4),
     "sim. s": lambda s: _number(s.simulation_seconds if s.runs else None, 2),
     "total s": lambda s: _number(s.seconds if s.runs else None, 2),
     "tokens": lambda s: _number(s.tokens if s.runs else None, 0),
     "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
 }
 _LEGEND = (
-    "FR: falsified runs / finished runs. S: simulations per falsified run; std is the sample standard "
-    "deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. Seconds, "
-    "tokens and cost are means per run."
+    "FR: falsified runs / finished runs, which falsified or spent their budget. S: simulations per falsified "
+    "run; std is the sample standard deviation. Intervals, from five runs on: Wilson for FR, percentile "
+    "bootstrap for the mean. Best robustness: the smallest of all runs. Seconds, tokens and cost are means "
+    "per run."
 )
 _PUBLISHED_LEGEND = (
     "Rank: position among all published tools known for the requirement, by FR, then by mean S; ties share "
@@ -257,8 +261,14 @@ _PUBLISHED_LEGEND = (
 
 _LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
 _UNFINISHED = (
-    "+n: n more runs failed or have not ended; of the other numbers, only best robustness includes them."
+    "+n: n more runs failed, have not ended or have not begun; of the other numbers, only best robustness "
+    "includes them."
 )
+# What is said below the table of rows in which it occurs.
+_COUNTED: Mapping[str, Callable[[Statistics], str]] = {
+    "Simulations that failed": lambda s: f"{s.failures} of {s.simulations}" if s.failures else "",
+    "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.kept or ""),
+}
 
 
 def _number(value: float | None, decimals: int) -> str:
@@ -283,7 +293,7 @@ def _cell(cell: Score | None) -> str:
     return f"{tool}{cell.falsified} / {_number(cell.mean, 1)}"
 
 
-def _by_column(runs: Iterable[Run], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
+def _by_column(runs: Iterable[RunProgress], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
     """Scores by column and requirement; methods whose name is empty are omitted."""
     found: dict[str, dict[str, Score]] = {}
     for (requirement, method), members in group(runs).items():

@@ -23,10 +23,10 @@ from falsifier.campaigns import (
     run_campaign,
     suite,
 )
-from falsifier.campaigns.analysis import load, read_published
+from falsifier.campaigns.analysis import load, not_begun, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import check_new, is_campaign
-from falsifier.campaigns.request import Searcher, ceiling, method_of
+from falsifier.campaigns.request import Method, Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli import llm_options, options
@@ -146,10 +146,13 @@ def bench(
     check_new(directory)
     check_request(request)
     warn(f"{counted(len(request.runs), 'run')} in {directory}")
-    for method in dict.fromkeys(map(method_of, request.runs)):
-        allowed = ", if the spec allows it" if method.parameterization == "free" else ""
-        name = replace(method, parameterization="fixed").label
-        warn(f"{name}: {method.parameterization} parameterization{allowed}")
+    searched: dict[Method, set[str]] = {}
+    for run in request.runs:
+        searched.setdefault(method_of(run), set()).add(run.problems[0].name)
+    for method, names in searched.items():
+        label = replace(method, parameterization="fixed").label
+        of = "" if names == set().union(*searched.values()) else f" of {', '.join(sorted(names))}"
+        warn(f"{label}: {method.parameterization} parameterization{of}")
     _agree(request, yes=yes)
     with campaign_display(quiet=quiet) as show:
         outcome = run_campaign(request, directory, jobs=jobs, listeners=[show])
@@ -199,7 +202,8 @@ def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet:
 
 def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) -> NoReturn:
     """Save all tables, print one of them, and exit with the campaign's exit code."""
-    runs, published = load(directory), read_published()
+    begun, published = load(directory), read_published()
+    runs = [*begun, *not_begun(directory, begun)]
     tables = {name: make(runs, published) for name, make in TABLES.items()}
     for name, made in tables.items():
         if made.rows:

@@ -80,11 +80,7 @@ def saved(file: Path, write: Callable[[Path], object]) -> list[Path]:
 
 
 def write_named(file: Path, text: str) -> None:
-    """Write a file that users have named, or a stream such as /dev/stdout, and say so on stderr.
-
-    Raises:
-        OSError: naming the file, of which nothing remains.
-    """
+    """Write a file or stream that users named, and say so; OSError naming it, and nothing remains of it."""
     if file.is_file() or not file.exists():
         write_whole(file.resolve(), text)  # a link is followed, not replaced
     else:

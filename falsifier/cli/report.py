@@ -101,7 +101,7 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
 def _write_arch_comp(directory: Path, path: Path) -> None:
     """Write the runs that have finished; those of several methods to a file each, named after its method."""
     runs = load(directory)
-    finished = [run for run in runs if run.finished]
+    finished = [run for run in runs if run.counts]
     if left_out := len(runs) - len(finished):
         warn(f"{path}: {counted(left_out, 'run')} not finished and left out")
     exported = export(finished)

@@ -25,11 +25,7 @@ def unnamed_file(*, may_be_sealed: bool = False) -> FileIO:
 
 
 def enlarge(file: FileIO, size: int) -> None:
-    """Make a file that is shared with the processes of FMUs larger, to this size in bytes.
-
-    Raises:
-        OSError: if it is larger than files of this process may be, or there is no room.
-    """
+    """Enlarge a file shared with FMU processes to so many bytes; OSError if no larger one may be or fits."""
     try:
         file.truncate(size)
     except OSError as error:

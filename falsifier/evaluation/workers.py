@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from threading import get_ident
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -133,7 +134,16 @@ def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") 
         try:
             return alone.submit(evaluate_any, problem, candidate).result()
         except BrokenExecutor as error:
-            return Evaluation(candidate, "crashed", reason=f"the worker process died: {error}")
+            return Evaluation(candidate, "crashed", reason=death(error))
+
+
+def death(error: BrokenExecutor) -> str:
+    """Say that a worker process died, and what the script lacks without which each does."""
+    script = Path(getattr(sys.modules["__main__"], "__file__", None) or "")
+    if script.is_file() and b"__name__" not in script.read_bytes():
+        guard = 'has no line if __name__ == "__main__": around what starts them'
+        return f"the worker processes died, because they import {script.name} first, and it {guard}"
+    return f"the worker process died: {error}"
 
 
 def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":

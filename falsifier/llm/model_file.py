@@ -77,11 +77,7 @@ def check_model_file(llm: str) -> Path:
 
 
 def served(llm: str) -> ServedModel:
-    """Return the server of a model file; start it if that has not happened.
-
-    Raises:
-        ChatSetupError: as for ``check_model_file``, or if the model cannot be loaded.
-    """
+    """Return a model file's server, started if need be; ChatSetupError if that cannot be used or loaded."""
     path = check_model_file(llm)
     with _LOCK:
         address = _address_of(path) or _start(path)

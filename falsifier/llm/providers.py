@@ -203,11 +203,7 @@ def stated_address(llm: str, api_base: str | None) -> str | None:
 
 
 def check_recorded(llm: str, api_base: str | None) -> None:
-    """Refuse to ask another server than the settings were made with, which name it or the provider's own.
-
-    Raises:
-        ChatSetupError: naming both.
-    """
+    """Refuse to ask another server than the settings' or their provider's own; ChatSetupError naming both."""
     if api_base is None and (now := stated_address(llm, None)):
         variables = " and ".join(_address_variables(llm))
         raise ChatSetupError(

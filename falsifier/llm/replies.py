@@ -85,11 +85,7 @@ class ReplyForm:
         return parts
 
     def read(self, text: str, *, origin: str = "") -> list[Candidate]:
-        """Return the valid candidates of a reply, in order.
-
-        Raises:
-            RejectedReplyError: if none is valid; states what is wrong with each.
-        """
+        """Return a reply's valid candidates in order; RejectedReplyError saying what is wrong if none is."""
         written, valid, defects = candidates_in(text), list[Candidate](), list[str]()
         words = {r.name: _BOOLEAN if _is_truth(r) else dict(r.items) for r in self.space.ranges}
         for number, found in enumerate(written, start=1):

@@ -181,11 +181,7 @@ class _Call:
             self._connections.clear()
 
     def refuse(self, reason: str) -> None:
-        """End the request because of this.
-
-        Raises:
-            httpx.TransportError: always.
-        """
+        """End the request because of this, with an httpx.TransportError."""
         self.refusal = self.refusal or reason
         raise httpx.TransportError(reason)
 

@@ -154,11 +154,7 @@ def _text(seconds: Fraction) -> str:
 
 
 def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
-    """Check that a period in s divides the stop time into no more than MAX_STEPS steps.
-
-    Raises:
-        SpecError: naming the key and the smallest period.
-    """
+    """Check that a period in s makes at most MAX_STEPS steps; SpecError naming key and smallest period."""
     if period is not None and stop_time / period > MAX_STEPS:
         raise SpecError(
             f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:g} s; "

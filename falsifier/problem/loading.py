@@ -23,7 +23,7 @@ from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, w
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
 from falsifier.problem.joining import Joined, join, join_formula
-from falsifier.problem.problem import Problem, alike
+from falsifier.problem.problem import Problem
 from falsifier.problem.sections import ModelChanges, RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import MODEL_FILES, Parameterization, ProblemSource, Target, source_of
@@ -152,11 +152,7 @@ def load_problems(target: str | PathLike[str], *, profile: str | None = None) ->
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
-    """Return one source per requirement of a spec; if the source names one, return only that.
-
-    Raises:
-        SpecError: if the target is neither a spec file nor a bundled name.
-    """
+    """Return a source per requirement of a spec, or of the one that is named; SpecError if it is no spec."""
     if source.parts.kind in ("fmu", "python"):
         return [source]
     path, requirement = find_spec(source.target)
@@ -193,7 +189,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
     else:
         joined, context = _joined(source, searches=searches)
         problem = replace(Problem.of(joined), named_context=context)
-    problem = replace(problem, source=source)
+    problem = replace(problem.recording(source.record), source=source)
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
             raise SpecError("shortest_piece makes inputs free: parameterization must be free, not fixed")
@@ -208,11 +204,6 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         problem = replace(problem, space=problem.space.fixed)
     _LOADED[source] = problem.fingerprint
     return problem
-
-
-def load_sources(sources: Sequence[ProblemSource]) -> list[Problem]:
-    """Load several problems; those that differ only in their requirement record the same signals."""
-    return [problem for group in alike(map(load_source, sources)) for problem in group]
 
 
 def reloadable(problem: Problem) -> ProblemSource | None:
@@ -281,8 +272,8 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
 def _python_problem(source: ProblemSource) -> Problem:
     """Return a problem made in Python."""
     target = source.target
-    plain = source.model_copy(update={"parameterization": "free", "shortest_piece": None, "context": ()})
-    if plain != ProblemSource(target=target):
+    kept = source.model_dump(include={"target", "parameterization", "shortest_piece", "record", "context"})
+    if source != ProblemSource(**kept):
         raise SpecError(f"{target}: options cannot change a problem made in Python; change it in its module")
     _, module, name = [*target.split(":"), "", ""][:3]
     try:

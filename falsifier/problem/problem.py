@@ -160,8 +160,14 @@ class Problem:
         requirement = Requirement(self.name, formula, description)
         inputs = [v.name for v in self.info.inputs]
         more = (name for name in requirement.formula.signals if name not in inputs)
-        outputs = tuple(dict.fromkeys((*self.experiment.outputs, *more)))
-        return replace(self, requirement=requirement, experiment=replace(self.experiment, outputs=outputs))
+        return replace(self.recording((*self.experiment.outputs, *more)), requirement=requirement)
+
+    def recording(self, names: Iterable[str]) -> "Problem":
+        """Return the problem with these variables recorded before its own; its source says so, too."""
+        outputs = tuple(dict.fromkeys((*names, *self.experiment.outputs)))
+        source = self.source and self.source.model_copy(update={"record": outputs})
+        changed = replace(self, experiment=replace(self.experiment, outputs=outputs), source=source)
+        return self if outputs == self.experiment.outputs else changed
 
     @property
     def info(self) -> ModelInfo:
@@ -304,8 +310,5 @@ def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
         bare, fixed = replace(problem.experiment, outputs=()), sorted(problem.parameters.items())
         key = repr((problem.model, problem.space.inputs, problem.space.parameters, bare, fixed))
         groups.setdefault(key, []).append(problem)
-    found = []
-    for group in groups.values():
-        outputs = tuple(dict.fromkeys(name for p in group for name in p.experiment.outputs))
-        found.append([replace(p, experiment=replace(p.experiment, outputs=outputs)) for p in group])
-    return found
+    every = groups.values()
+    return [[p.recording(n for q in group for n in q.experiment.outputs) for p in group] for group in every]

@@ -59,6 +59,8 @@ class ProblemSource(BaseModel):
         shortest_piece: minimum time in s between two control points of every input, which makes all inputs
             free; None: the spec's or the default limits.
         changes: overrides for experiment, inputs and parameters.
+        record: variables to record before those of the spec and the formula: requirements that are searched
+            together record the same.
         context: files that a language model may read beside those that the spec names; ``fmu``: also what
             lies inside the FMU; ``none``: not what the spec names; ``checked:FILE``: a line of this file
             looks like a key and is none.
@@ -73,6 +75,7 @@ class ProblemSource(BaseModel):
     parameterization: Parameterization = "free"
     shortest_piece: Number | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
+    record: tuple[str, ...] = ()
     context: tuple[Recordable, ...] = ()
 
     @field_serializer("changes")

@@ -143,11 +143,7 @@ def _text_of(path: Path) -> str:
 
 
 def parse_spec(data: Mapping[str, Any], *, file: str) -> Spec:
-    """Validate the content of a spec file, as parsed from TOML; errors name the file.
-
-    Raises:
-        SpecError: naming the file, the key and what was expected.
-    """
+    """Validate a spec's content, as parsed from TOML; SpecError naming file, key and what was expected."""
     with in_section(file):
         try:
             spec = Spec.model_validate(data)

@@ -40,11 +40,7 @@ def write_sealed(path: Path, content: BaseModel) -> None:
 
 
 def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
-    """Read a value; errors say what it belongs to, such as ``run``.
-
-    Raises:
-        JournalError: if there is no such file, or it is damaged or not valid.
-    """
+    """Read a value of a ``what``; JournalError if there is no such file, or it is damaged or not valid."""
     try:
         content = path.read_bytes()
         check_seal(content)

@@ -101,11 +101,7 @@ class Journal:
                 )
 
     def write(self, record: Record) -> None:
-        """Append a record.
-
-        Raises:
-            OSError: if it cannot be written, then nothing of it remains in the file; or if the file is gone.
-        """
+        """Append a record; OSError if it cannot be written, of which nothing remains, or the file is gone."""
         size = self._file.seek(0, os.SEEK_END)
         is_due = isinstance(record, _AT_ONCE) or monotonic() - self._synced > _SYNC_PERIOD
         if is_due:

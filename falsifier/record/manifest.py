@@ -23,7 +23,7 @@ from falsifier.problem.problem import Held, Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
-from falsifier.search.parameterization import parameterization_of, searched_space
+from falsifier.search.parameterization import engine_parameterization, parameterization_of, searched_space
 from falsifier.search.request import RunRequest, Strict
 
 MANIFEST = "manifest.json"
@@ -134,11 +134,7 @@ class Manifest(Surroundings):
         return Origin.of(self.requirement.formula, self.hashes)
 
     def of(self, name: str | None) -> "Manifest":
-        """Return the manifest reduced to one requirement; None: to the only one.
-
-        Raises:
-            JournalError: for an unknown name, or none if there are several; it lists the known ones.
-        """
+        """Return it for one requirement; None: the only one. JournalError listing the names if it is none."""
         if name is None and self.shared:
             raise JournalError(
                 f"this run searched {', '.join(self.names)}; choose one: {setting('requirement', 'NAME')}"
@@ -191,7 +187,7 @@ def describe(
     file_hashes; None: as they are now.
     """
     problem = problems[0]
-    space = problem.space
+    space, used = problem.space, engine_parameterization(request.engine, request.llm)
     return Manifest(
         **environment(),
         run=token_hex(4),
@@ -201,7 +197,7 @@ def describe(
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
         components=problem.info.components,
-        parameterization=parameterization_of(searched_space(space, request.engine, request.llm)),
+        parameterization=parameterization_of(searched_space(space, used)),
         inputs=space.inputs,
         parameters=space.parameters,
         not_searched=problem.held,
@@ -237,11 +233,7 @@ def file_hashes(problem: Problem) -> dict[str, str]:
 def check_unchanged(
     directory: Path, recorded: dict[str, str], found: dict[str, str], remedy: str = "start a new run instead"
 ) -> None:
-    """Refuse to go on with a run or campaign if hashes by path, or fingerprints by requirement, have changed.
-
-    Raises:
-        JournalError: naming what has changed.
-    """
+    """Refuse to go on if hashes by path, or fingerprints by requirement, changed; JournalError naming one."""
     for name, digest in found.items():
         if recorded.get(name, digest) != digest:
             raise JournalError(f"{directory}: {name} has changed since the start; {remedy}")

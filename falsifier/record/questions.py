@@ -70,11 +70,7 @@ def _results(records: Iterable[Record], requirement: str) -> dict[int, str]:
 
 
 def exchange_before(records: Iterable[Record], index: int) -> Exchange | None:
-    """Return the last exchange before an evaluation's candidate was suggested; None if there was none.
-
-    Raises:
-        JournalError: if the journal contains no such evaluation.
-    """
+    """Return the last exchange before an evaluation, or None; JournalError if there is no such evaluation."""
     last: Exchange | None = None
     count = 0
     for record in records:

@@ -19,7 +19,7 @@ from falsifier.engines.protocol import KNOWN, Engine
 from falsifier.errors import JournalError, SpecError, written
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
-from falsifier.problem.loading import load_source, load_sources, reloadable
+from falsifier.problem.loading import load_source, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -31,7 +31,7 @@ from falsifier.search.budget import Budget, budget_of
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
 from falsifier.search.make_engines import make_engines, told_problems
-from falsifier.search.parameterization import searched_space
+from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
 from falsifier.search.steps import Steps
@@ -210,9 +210,9 @@ def resume(
             )
         if not problems:
             manifest.check_in_sight(place, request.problems)
-            loaded = load_sources(request.problems)
+            loaded = [load_source(source) for source in request.problems]
         elif by_name.keys() >= set(described.names):
-            loaded = [by_name[name] for name in described.names]
+            loaded = [p for group in alike(by_name[name] for name in described.names) for p in group]
         else:
             raise JournalError(
                 f"{place}: this run searched {', '.join(described.names)}: give all of them in problems=[...]"
@@ -324,7 +324,7 @@ def carry_out(
             known=known,
             steps=steps,
             jobs=request.jobs,
-            searched=searched_space(problems[0].space, request.engine, request.llm),
+            used=engine_parameterization(request.engine, request.llm),
             directory=directory,
             listeners=all_listeners,
         )

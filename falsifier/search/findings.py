@@ -2,16 +2,20 @@
 
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.errors import written
+from falsifier.errors import FalsifierError, written
 from falsifier.problem.grid import default_freedom, smallest_window
+from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection
+from falsifier.problem.source import Parameterization
+from falsifier.search.parameterization import searched_space
 
 # A number that is not part of a name: two errors that differ only in such numbers have the same cause.
 _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)", re.IGNORECASE)
@@ -92,9 +96,12 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     return tuple(sorted(found.values(), key=lambda failure: -failure.count))
 
 
-def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
-    """Return what the fixed control points of a search could not express; None if they left nothing out."""
-    formula = problem.requirement.formula
+def inexpressible(problem: Problem, used: Parameterization) -> Finding | None:
+    """Return what the fixed control points of a search could not express; None if they left nothing out.
+
+    ``used`` is ``fixed`` if the engine never chooses control points.
+    """
+    formula, searched = problem.requirement.formula, searched_space(problem.space, used)
     experiment = problem.experiment
     limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)
     coarse = [r for r in searched.inputs if r.free is None and r.control_points < limits.max_control_points]
@@ -103,7 +110,10 @@ def inexpressible(problem: Problem, searched: SearchSpace) -> Finding | None:
     slow = "; ".join(_fastest(r, searched) for r in coarse)
     window = smallest_window([formula])
     against = "" if window is None else f". The formula's smallest window is {window:g} s"
-    remedy = _remedy(problem, coarse, limits)
+    engine = written(f"--engine {DEFAULT_ENGINE}", f"engine={DEFAULT_ENGINE!r}")
+    remedy = _way(problem, [r.name for r in coarse], limits)
+    if used == "fixed":
+        remedy = f"{engine} with {remedy}" if remedy else f"{engine}, which chooses control points itself"
     return Finding(
         kind="parameterization", text=f"Faster inputs were not tried: {slow}{against}. To try them: {remedy}."
     )
@@ -122,21 +132,23 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
     )
 
 
-def _remedy(problem: Problem, coarse: Sequence[InputRange], limits: FreeSection) -> str:
-    """Say what allows faster inputs, depending on why there were none."""
-    source, own = problem.source, {r.name: r for r in problem.space.inputs}
-    if any(own[r.name].free for r in coarse):
-        engine = written(f"--engine {DEFAULT_ENGINE}", f"engine={DEFAULT_ENGINE!r}")
-        return f"{engine}, which chooses control points itself"
-    stated = {} if source is None else source.changes.inputs
-    points = any(r.name in stated and stated[r.name].control_points for r in coarse)
-    if source is not None and source.parameterization == "fixed" and not points:
-        return written("--parameterization free", "parameterization='free'")
-    count, shortest = limits.max_control_points, limits.min_interval
-    if source is None or source.parts.kind == "python":
+def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
+    """Say what makes inputs free; empty if all of them are, and the engine alone does not use it."""
+
+    def are_free(found: Problem) -> bool:
+        return all(r.free for r in found.space.inputs if r.name in coarse)
+
+    source, count, shortest = problem.source, limits.max_control_points, limits.min_interval
+    if are_free(problem):
+        return ""
+    if source is None:
         return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
     option = written(f"--parameterization free:{shortest:g}", f"shortest_piece={shortest:g}")
-    if source.parts.kind != "spec":
-        return option
-    free = f"free = {{ max_control_points = {count}, min_interval = {shortest:g} }}"
-    return f"{option}, or {free} in [inputs.{coarse[0].name}]"
+    if source.parameterization == "fixed":
+        with suppress(FalsifierError):  # its files may have changed since
+            if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
+                return written("--parameterization free", "parameterization='free'")
+    elif source.parts.kind == "spec":
+        places = " and ".join(f"[inputs.{name}]" for name in coarse)
+        option += f", or free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in {places}"
+    return option

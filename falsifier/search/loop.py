@@ -8,14 +8,15 @@ from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange
 from falsifier.problem.problem import Problem, check_limits, check_names
+from falsifier.problem.source import Parameterization
 from falsifier.search import events
 from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
+from falsifier.search.parameterization import searched_space
 from falsifier.search.requirement_state import RequirementState
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.steps import Steps
@@ -32,7 +33,7 @@ def search(
     known: Sequence[Candidate] = (),
     steps: Steps | None = None,
     jobs: int = 1,
-    searched: SearchSpace | None = None,
+    used: Parameterization = "free",
     directory: Path | None = None,
     listeners: Iterable[events.Listener] = (),
 ) -> list[Result]:
@@ -41,8 +42,8 @@ def search(
     Every simulation is judged against all requirements. The engines of the requirements not yet falsified
     take turns; every engine is told every simulation. A result counts the simulations until its requirement
     was falsified. The problems differ only in their requirement, and each has an engine. Known candidates are
-    simulated before any engine is asked, and count. ``searched`` is the part of the search space that the
-    engines use; default: all of it. Without ``steps``, everything is done in this process. ``directory``,
+    simulated before any engine is asked, and count. ``used`` is ``fixed`` if the engines never
+    choose control points. Without ``steps``, everything is done in this process. ``directory``,
     where the run is recorded, is stated in the results.
 
     Returns:
@@ -63,11 +64,10 @@ def search(
                 "cannot share a search: falsify them one after the other"
             )
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
-    space = searched or problems[0].space
     steps = steps or Steps()
     began = perf_counter() - steps.seconds
     first = _Known(deque(known))
-    loop = _Loop(states, first, space, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
+    loop = _Loop(states, first, used, budget, steps, directory, tuple(listeners), began, steps.unrepeated)
     status: ResultStatus
     try:
         loop.attach()
@@ -116,7 +116,7 @@ class _Loop:
 
     states: list[RequirementState]
     known: _Known
-    searched: SearchSpace
+    used: Parameterization
     budget: Budget
     steps: Steps
     directory: Path | None
@@ -152,7 +152,7 @@ class _Loop:
                 problems=tuple(state.problem for state in self.states),
                 engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
-                searched=self.searched,
+                searched=searched_space(self.states[0].problem.space, self.used),
                 server=self.server,
                 replayed=self.steps.replayed,
             )
@@ -352,7 +352,7 @@ class _Loop:
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
         results = [
-            state.result(status, reason, searched=self.searched, spent=self.clock(), directory=self.directory)
+            state.result(status, reason, used=self.used, spent=self.clock(), directory=self.directory)
             for state in self.states
         ]
         overall = "falsified" if all(r.falsified for r in results) else status

@@ -22,9 +22,9 @@ def engine_parameterization(engine: str | None, llm: LLMSettings | None) -> Para
     return "free" if variant_named(llm.variant).has("freedom") else "fixed"
 
 
-def searched_space(space: SearchSpace, engine: str | None, llm: LLMSettings | None) -> SearchSpace:
-    """Return the space as it is searched: without freedom that is not used."""
-    return space if engine_parameterization(engine, llm) == "free" else space.fixed
+def searched_space(space: SearchSpace, used: Parameterization) -> SearchSpace:
+    """Return the space as it is searched: without freedom that the engine does not use."""
+    return space if used == "free" else space.fixed
 
 
 def parameterization_of(space: SearchSpace) -> Parameterization:

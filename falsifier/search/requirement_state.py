@@ -4,13 +4,14 @@ from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
 
-from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine, HasRemarks
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+from falsifier.problem.source import Parameterization
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding, inexpressible
+from falsifier.search.parameterization import searched_space
 from falsifier.search.result import Result, ResultStatus
 from falsifier.search.vacuity import Vacuity
 
@@ -47,7 +48,7 @@ class RequirementState:
         status: ResultStatus,
         reason: str,
         *,
-        searched: SearchSpace,
+        used: Parameterization,
         spent: Spent,
         directory: Path | None,
     ) -> Result:
@@ -58,7 +59,7 @@ class RequirementState:
         """
         found, findings = self.counterexample, list[Finding]()
         if self.best is not None and found is None:
-            limits = inexpressible(self.problem, searched)
+            limits = inexpressible(self.problem, used)
             findings = [*self.vacuity.findings(), *([limits] if limits else [])]
         return Result(
             problem=self.problem,
@@ -70,7 +71,7 @@ class RequirementState:
             refuted=tuple(c for c in self.doubtful if c.outcome == "refuted"),
             fragile=tuple(c for c in self.doubtful if c.outcome == "fragile"),
             spent=self.spent or spent,
-            searched=searched,
+            searched=searched_space(self.problem.space, used),
             findings=tuple(findings),
             directory=directory,
             remarks=self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else (),

@@ -179,11 +179,7 @@ class Program:
 
 
 def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
-    """Evaluate a program on a trajectory; return the buffer, shape (program.size,), with all values.
-
-    Raises:
-        MonitorError: if the trajectory cannot be evaluated.
-    """
+    """Return all values of a program on a trajectory, shape (program.size,); MonitorError if it has none."""
     n, end = program.samples, (program.samples - 1) * program.step
     last = float(trajectory.times[-1])
     if len(trajectory) != n or abs(last - end) > TIME_TOLERANCE * program.step:

@@ -4,11 +4,9 @@ from falsifier.campaigns import CampaignRequest, Method, cross, method_of, run_n
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
-from falsifier.search.request import LLMSettings
+from falsifier.search.request import LLMSettings, RunRequest
 
 AT1 = ProblemSource(target="AT1")
-
-
 NANO = LLMSettings(name="openai/gpt-5-nano", effort="low", variant="MP4")
 
 
@@ -23,12 +21,19 @@ def test_a_campaign_is_requirements_times_searchers_times_seeds() -> None:
     kinds = [r.problems[0].parameterization for r in runs[::3]]
     assert kinds == ["fixed", "fixed", "free", "fixed", "fixed", "fixed"]
     assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=7) == runs[:2]
+    with pytest.raises(SpecError, match="the same run twice"):
+        CampaignRequest(runs=runs[:1] * 2).named()
+    closed = ProblemSource(target="python:tests.problems:hard")
+    both = [closed, closed.model_copy(update={"parameterization": "fixed"})]
+    assert [r.problems for r in cross(both, ["surrogate"], seeds=[0], budget=Budget(7))] == [(both[1],)]
 
 
 def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     def name(searcher: str | LLMSettings = "surrogate", seed: int = 0, budget: int = 5, **source: str) -> str:
         problem = ProblemSource.model_validate({"target": "specs/AT.toml:AT1"} | source)
-        return run_name(cross([problem], [searcher], seeds=[seed], budget=Budget(budget))[0])
+        who = {"engine": searcher} if isinstance(searcher, str) else {"llm": searcher}
+        asked = {"problems": (problem,), "seed": seed, "budget": Budget(budget)}
+        return run_name(RunRequest.model_validate(asked | who))
 
     base = name()
     assert base.startswith("AT1-surrogate-free-0-")
@@ -42,7 +47,7 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     }
     assert len(others | {base}) == 7
     assert name() == base
-    unsafe = name(LLMSettings(name="ollama_chat/gpt-oss:20b", variant="MP4"))
+    unsafe = name(LLMSettings(name="ollama_chat/gpt-oss:20b", variant="MP4"), parameterization="fixed")
     assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
     assert name(target="specs/AT.toml:Öl druck").startswith("Öl-druck-surrogate-free-0-")
 
@@ -57,9 +62,3 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     named = LLMSettings(name="openai/gpt-5-mini", anonymous=True)
     (run,) = cross([AT1], [named], seeds=[0], budget=Budget(1))
     assert method_of(run).label == "gpt-5-mini, free, neutral names"
-
-
-def test_the_same_run_twice_is_refused() -> None:
-    run = cross([AT1], ["uniform"], seeds=[0], budget=Budget(5))
-    with pytest.raises(SpecError, match="the same run twice"):
-        CampaignRequest(runs=run + run).named()

@@ -76,6 +76,6 @@ def test_only_a_run_whose_process_dies_twice_has_failed(monkeypatch: pytest.Monk
     monkeypatch.setattr(Mortal, "died", [])
     done = run("abdoc", [LastingExecutor(Mortal) for _ in range(2)])
     assert {name for name, failure in done.items() if failure} == {"d"}
-    assert done["d"] == "its worker process died: killed"
+    assert done["d"] == "the worker process died: killed"
     assert set(done) == set("abdoc")
     assert sorted(Mortal.died) == ["d", "d", "o"]

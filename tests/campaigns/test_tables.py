@@ -37,6 +37,8 @@ def test_the_main_table_stands_beside_the_published_numbers(runs: list[Run]) -> 
     # uniform needs 2 and 1 simulations, corners too
     assert cells(table.rows, table.header, "mean S") == ["1.5", "1.5", "–", "–"]
     assert cells(table.rows, table.header, "rank") == ["2 (tie)", "2 (tie)", "–", "–"]
+    held = [replace(r, verdict=r.verdict and replace(r.verdict, robustness=1e-300)) for r in runs[-1:]]
+    assert cells(main_table(held, PUBLISHED).rows, table.header, "best robustness") == ["+0"]
     assert cells(table.rows, table.header, "best ARCH-COMP tool")[0] == "FReaK 10 / 1.5"
     assert cells(table.rows, table.header, "LLM-Falsifier")[2] == "0 / –"
     assert any("a report" in note for note in table.notes)
@@ -55,13 +57,20 @@ def test_free_parameterizations_and_other_profiles_stand_apart_and_without_publi
         assert row[table.header.index("rank")] in (("–",) if apart else ("2 (tie)", "–"))
 
 
-def test_unfinished_runs_are_counted_apart(runs: list[Run]) -> None:
+def test_unfinished_runs_are_counted_apart_but_not_those_that_spent_their_budget(runs: list[Run]) -> None:
     first, *others = [run for run in runs if run.requirement == "NEVER" and run.method.engine == "uniform"]
-    table = main_table([replace(first, status="failed"), *others], PUBLISHED)
+    table = main_table([replace(first, status="interrupted"), *others], PUBLISHED)
     assert table.rows[0][2] == "0/1 +1"
     assert any(note.startswith("+n") for note in table.notes)
-    alone = main_table([replace(first, status="failed")], PUBLISHED)
+    alone = main_table([replace(first, status="interrupted")], PUBLISHED)
     assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
+    mostly = replace(first, status="failed", spent=replace(first.spent, failures=15, kept=7))
+    table = main_table([mostly, *others], PUBLISHED)
+    assert table.rows[0][2] == "0/2"
+    assert "Simulations that failed: NEVER uniform 15 of 40." in table.notes
+    assert "Replies from the cache, whose tokens and cost are not counted: NEVER uniform 7." in table.notes
+    died = replace(mostly, spent=replace(mostly.spent, simulations=19))
+    assert main_table([died, *others], PUBLISHED).rows[0][2] == "0/1 +1"
 
 
 def asked(run: Run, variant: str) -> Run:

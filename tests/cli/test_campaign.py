@@ -18,13 +18,15 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("Falsification\n")
     assert "HARD" in result.stdout
-    assert "4 runs in c" in result.stderr
+    assert "4 runs in c\nuniform: fixed parameterization\n" in result.stderr
     assert "[4/4]" in result.stderr
     assert "| HARD | uniform | 2/2 |" in (tmp_path / "c" / "table-main.md").read_text()
     assert (tmp_path / "c" / "table-main.csv").read_text().startswith("requirement,method,FR")
     assert not (tmp_path / "c" / "table-ablation.md").exists()
     rows = json.loads((tmp_path / "c" / "table.json").read_text())
     assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
+    alone = json.loads(bench(command, "--json", "--quiet").stdout)
+    assert [row["label"] for row in alone] == ["uniform", "uniform"]
 
 
 @pytest.mark.parametrize("limit", [("--max-cost", "1"), ("--total", "cost=1")])
@@ -34,11 +36,6 @@ def test_a_cost_that_cannot_be_known_is_not_limited(limit: tuple[str, str], tmp_
     told = "limit the tokens, or state it where the run or campaign is started (--llm-option price="
     assert (done.code, told in done.err) == (2, True), done.err
     assert "limited to" not in done.err and not (tmp_path / "c").exists()
-
-
-def test_tables_of_language_models_need_one(command: Any) -> None:
-    refused = bench(command, "--table", "llms")
-    assert (refused.exit_code, "--table llms: shows language models" in refused.output) == (2, True)
 
 
 def test_a_table_that_is_too_wide_for_the_terminal_shows_the_columns_that_fit(
@@ -52,11 +49,6 @@ def test_a_table_that_is_too_wide_for_the_terminal_shows_the_columns_that_fit(
     assert max(map(len, lines[:5])) <= 60 < max(map(len, whole[:5]))
     assert whole[2].startswith(lines[2])
     assert "too wide for this terminal: " in cut.stderr and "; in c/table-main.md" in cut.stderr
-
-
-def test_json_is_alone_on_stdout(command: Any) -> None:
-    result = bench(command, "--json", "--quiet")
-    assert [row["label"] for row in json.loads(result.stdout)] == ["uniform", "uniform"]
 
 
 def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> None:
@@ -74,19 +66,19 @@ def test_bench_reads_and_records_context_files(command: Any, tmp_path: Path) -> 
     assert "--context: applies to language models and" in f"{useless.stderr} {useless.exception}"
 
 
-def test_a_limit_that_is_reached_by_a_complete_campaign_stops_nothing(command: Any) -> None:
-    assert bench(command, "--out", "c").exit_code == 0
-    again = command("resume", "c", "--total", "simulations=5", "--quiet")
-    assert (again.exit_code, "to continue" in again.stderr) == (0, False), again.output
-
-
-def test_a_stopped_campaign_says_how_to_go_on(command: Any, tmp_path: Path) -> None:
-    stopped = bench(command, "--out", "c", "--total", "simulations=5")
+def test_a_stopped_campaign_says_how_to_go_on_and_a_complete_one_is_not_stopped(
+    command: Any, tmp_path: Path
+) -> None:
+    stopped = bench(command, "--out", "c", "--total", "simulations=1")
     assert stopped.exit_code == 3
-    assert "the budget of 5 simulations is used up" in stopped.stderr
+    rates = [line.split("  ")[:3] for line in stopped.stdout.splitlines()[4:6]]
+    assert rates[1] == ["impossible", " uniform", "0/0 +2"], "no run of it has begun"
+    assert "the budget of 1 simulation is used up" in stopped.stderr
     assert "falsifier resume c" in stopped.stderr
     resumed = command("resume", "c", "--total", "simulations=1000", "--quiet")
     assert resumed.exit_code == 0, resumed.output
+    again = command("resume", "c", "--total", "simulations=5", "--quiet")
+    assert (again.exit_code, "to continue" in again.stderr) == (0, False), again.output
     rows = json.loads((tmp_path / "c" / "table.json").read_text())
     assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
@@ -106,16 +98,17 @@ def requested(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 def test_methods_are_all_combinations(command: Any, requested: list[Any]) -> None:
-    command(
-        *("bench", HARD, "--runs", "1", "--seed", "5", "--max-cost", "2", "--total", "cost=9"),
+    done = command(
+        *("bench", "AT1", HARD, "--runs", "1", "--seed", "5", "--max-cost", "2", "--total", "cost=9"),
         *("--llm", "openai/gpt-5-nano@low", "--llm", "x/y@2024@high", "--llm-option", "price=1:2"),
         *("--variant", "MP4", "--variant", "MP5", "--anonymous"),
         *("--parameterization", "fixed", "--parameterization", "free"),
     )
     (request,) = requested
     asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problems[0].parameterization) for r in request.runs}
-    # A prompt that does not offer control points to choose is searched once, with the fixed ones.
-    assert len(asked) == len(request.runs) == 6
+    # With a prompt or a problem that offers no control points to choose, the fixed ones are searched once.
+    assert (len(asked), len(request.runs)) == (6, 10)
+    assert "gpt-5-nano low MP5, neutral names: free parameterization of AT1\n" in done.stderr
     assert ("openai/gpt-5-nano", "low", "MP5", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}
@@ -163,6 +156,7 @@ def test_suites_and_instances(command: Any, requested: list[Any]) -> None:
         (["bench", HARD, "--suite", "arch-comp"], "expected either TARGETS (requirements or specs)"),
         (["bench", HARD, "--parameterization", "free:1"], "applies to single runs only"),
         (["bench", HARD, "--variant", "MP1"], "--variant: requires --llm"),
+        (["bench", HARD, "--engine", "uniform", "--table", "llms"], "--table llms: shows language models"),
     ],
 )
 def test_wrong_usage_is_said(command: Any, arguments: list[str], message: str) -> None:

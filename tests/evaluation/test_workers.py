@@ -1,8 +1,9 @@
 """Workers: threads and processes of this machine."""
 
 import logging
+import sys
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 
 from falsifier.errors import SimulationError, setting
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.evaluation.workers import LastingExecutor, local_executor, open_workers, start
+from falsifier.evaluation.workers import LastingExecutor, death, local_executor, open_workers, start
 from falsifier.testing import lag_problem
 from tests.fmu import support
 from tests.fmu.fixtures import isolated, ramp, run, runners
@@ -126,7 +127,9 @@ class Doomed(Executor):
         return future
 
 
-def test_only_what_ends_a_process_of_its_own_has_crashed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_what_ends_a_process_of_its_own_has_crashed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr("falsifier.evaluation.workers._process_pool", Doomed)
     problem = lag_problem()
     harmless = problem.space.decode([0.1, 0.2, 0.3, 0.4])
@@ -136,6 +139,9 @@ def test_only_what_ends_a_process_of_its_own_has_crashed(monkeypatch: pytest.Mon
     assert [each.status for each in evaluations] == ["ok", "crashed", "ok"]
     assert evaluations[0].verdict == evaluate(problem, harmless).verdict
     assert evaluations[1].reason == "the worker process died: a process was terminated abruptly"
+    (script := tmp_path / "mine.py").write_text("falsify(problem, jobs=2)\n")
+    monkeypatch.setattr(sys.modules["__main__"], "__file__", str(script), raising=False)
+    assert "import mine.py first, and it has no line if __name__" in death(BrokenExecutor("killed"))
 
 
 def test_workers_speak_to_the_reader_of_their_parent(at_the_command_line: None) -> None:

@@ -51,19 +51,14 @@ def test_the_fingerprint_is_of_everything_but_the_code() -> None:
 def test_problems_that_differ_in_their_requirement_share_a_search_and_what_they_record() -> None:
     one, other = lag_problem(name="A"), lag_problem("G[0,10] (x <= 0.5)", name="B")
     other = replace(other, experiment=replace(other.experiment, outputs=("u", "x")))
-    apart = lag_problem(points=5, name="C")
-    groups = alike([one, apart, other])
-    assert [[p.name for p in group] for group in groups] == [["A", "B"], ["C"]]
-    assert [p.experiment.outputs for p in groups[0]] == [("x", "u")] * 2
-
-
-def test_problems_that_are_simulated_otherwise_do_not_share_a_search() -> None:
-    problem = lag_problem(name="A")
-    others = [
-        replace(lag_problem(name="B"), parameters={"gain": 2.0}),
-        replace(lag_problem(name="C"), experiment=replace(problem.experiment, step_size=0.05)),
+    apart = [
+        lag_problem(points=5, name="C"),
+        replace(lag_problem(name="D"), parameters={"gain": 2.0}),
+        replace(lag_problem(name="E"), experiment=replace(one.experiment, step_size=0.05)),
     ]
-    assert len(alike([problem, *others])) == 3
+    groups = alike([one, *apart, other])
+    assert [[p.name for p in group] for group in groups] == [["A", "B"], ["C"], ["D"], ["E"]]
+    assert [p.experiment.outputs for p in groups[0]] == [("x", "u")] * 2
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from numpy import int64
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.store import changes_since
+from falsifier.counterexamples.store import changes_since, load_counterexample
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import JournalError, SpecError
@@ -64,12 +64,14 @@ def test_problems_of_one_call_have_different_names(other: Problem, tmp_path: Pat
 
 
 def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None:
-    formulas = {"low": "G[0,1] (speed <= 500)", "high": "G[0,1] (speed <= -1)"}
+    formulas = {"low": "G[0,1] (wheel <= 500)", "high": "G[0,1] (engine <= -1)"}
     fmu = bundled("fmus") / "AT.fmu"
     problems = [Problem.from_fmu(fmu, formula, name=name) for name, formula in formulas.items()]
     results = falsify(problems, "corners", budget=1, directory=tmp_path)
     assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
-    assert [r.problem.name for r in resume(tmp_path)] == ["low", "high"]
+    for again in ([], problems):  # both record what either of them names
+        assert [r.problem for r in resume(tmp_path, problems=again)] == [r.problem for r in results]
+        assert load_counterexample(tmp_path).problem is not None
     assert Problem.from_fmu(fmu, formulas["low"]).name == "stl"
 
 
@@ -128,13 +130,10 @@ def test_an_engine_made_in_python_searches_one_requirement() -> None:
         falsify((easy(), hard()), engine, budget=5)  # type: ignore[call-overload]
 
 
-def test_a_wrong_name_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_directory_is_used_once_and_not_for_a_wrong_name(tmp_path: Path) -> None:
     with pytest.raises(SpecError, match="'corners'"):
         falsify(easy(), "corner", directory=tmp_path / "run")
     assert not (tmp_path / "run").exists()
-
-
-def test_a_directory_is_used_once(tmp_path: Path) -> None:
     falsify(EASY, "corners", budget=5, directory=tmp_path)
     with pytest.raises(JournalError, match="resume"):
         falsify(EASY, "corners", budget=5, directory=tmp_path)

@@ -35,7 +35,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
 
 
 def told(problem: Problem, engine: str = "surrogate") -> str:
-    finding = inexpressible(problem, searched_space(problem.space, engine, None))
+    finding = inexpressible(problem, engine_parameterization(engine, None))
     return finding.text if finding else ""
 
 
@@ -49,15 +49,18 @@ def test_what_a_fixed_space_cannot_express_is_told_with_the_option_that_widens_i
     assert stated.source is not None
     asked = stated.source.model_copy(update={"parameterization": "fixed"})
     assert told(replace(stated, source=asked)).endswith("To try them: shortest_piece=0.05.")
+    assert told(stated, "cma").endswith("To try them: engine='surrogate' with shortest_piece=0.05.")
     assert told(replace(stated, source=None)).endswith(" InputRange(..., free=Freedom(200, 0.05)).")
 
 
 def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
     free = lag_problem(free=FREE)
     assert not told(free)
+    assert not told(lag_problem(points=100)), "as many control points as make sense leave nothing out"
     assert "engine='surrogate'" in told(free, "cma")
     fixed = load_problem("AT1", parameterization="fixed")
-    assert "parameterization='free'" in told(fixed)
+    assert told(fixed).endswith("To try them: parameterization='free'.")
+    assert told(fixed, "cma").endswith("To try them: engine='surrogate' with parameterization='free'.")
 
 
 def test_constant_and_held_inputs_are_described_as_such() -> None:
@@ -71,10 +74,6 @@ def test_constant_and_held_inputs_are_described_as_such() -> None:
     assert "u had 4 held pieces of 2.5 s" in text(replace(u, interpolation="constant"))
 
 
-def test_as_many_control_points_as_make_sense_leave_nothing_out() -> None:
-    assert not told(lag_problem(points=100))
-
-
 # Larger than what the lag can follow: only an input that falls or rises faster than the lag reaches it.
 FAST = "G[0,10] (u - x <= 1.5)"
 
@@ -85,18 +84,15 @@ def test_engines_on_the_box_are_known_to_be_fixed(name: str) -> None:
     assert (engine_parameterization(name, None) == "fixed") == isinstance(engine, BoxEngine)
 
 
-def test_a_language_model_chooses_control_points_if_its_prompt_offers_that() -> None:
+def test_a_search_is_called_free_if_its_engine_or_prompt_offers_control_points() -> None:
     assert engine_parameterization(None, LLMSettings(name="a/b")) == "free"
     assert engine_parameterization(None, LLMSettings(name="a/b", variant="MP2")) == "fixed"
     assert engine_parameterization("hybrid", LLMSettings(name="a/b", variant="MP2")) == "free"
     assert engine_parameterization("of my own", None) == "free"
-
-
-def test_a_search_is_not_called_free_if_its_engine_is_not() -> None:
     space = lag_problem(free=FREE).space
-    assert parameterization_of(searched_space(space, "surrogate", None)) == "free"
-    assert parameterization_of(searched_space(space, "cma", None)) == "fixed"
-    assert parameterization_note(searched_space(space, "cma", None)) == (
+    assert parameterization_of(searched_space(space, "free")) == "free"
+    assert parameterization_of(searched_space(space, "fixed")) == "fixed"
+    assert parameterization_note(searched_space(space, "fixed")) == (
         "fixed parameterization: u (4 control points, linear)"
     )
 

@@ -179,11 +179,7 @@ def windows_text() -> str:
 
 
 def windows_path(path: Path) -> str:
-    """Return the path by which Windows programs know a file of this machine.
-
-    Raises:
-        ModelError: if it contains characters by which they cannot know it.
-    """
+    """Return a file's path as Windows programs know it; ModelError if it has characters that they cannot."""
     known = str(path.absolute())
     if not _UNKNOWN.isdisjoint(known):
         raise ModelError(

@@ -97,11 +97,7 @@ def _lock_of(path: Path) -> Path:
 
 
 class Workplace(WorkFolder):
-    """The folder of this process's workers, and the FMUs that are unpacked to it.
-
-    Raises:
-        MachineError: if processes may not use enough memory.
-    """
+    """The folder of this process's workers and unpacked FMUs; MachineError if memory is too limited."""
 
     def __init__(self) -> None:
         posix.check_memory_limits()

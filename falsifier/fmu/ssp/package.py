@@ -199,11 +199,7 @@ class Given:
 
 
 def bound_values(element: Element, package: Package) -> dict[str, Given]:
-    """Return the values of an element's bindings by name, relative to the element; later ones win.
-
-    Raises:
-        SpecError: if a file is missing or wrong.
-    """
+    """Return an element's bindings, named from it; later ones win. SpecError if a file is absent or wrong."""
     found: dict[str, Given] = {}
     for binding in element.findall("{*}ParameterBindings/{*}ParameterBinding"):
         mapping = binding.find("{*}ParameterMapping")

@@ -126,11 +126,7 @@ class System(Isolated):
         return simulate(self.order, experiment, tables, numbers)
 
     def check_steps(self, experiment: Experiment) -> None:
-        """Check that each component's own step is an integer multiple of the communication step, and fits in.
-
-        Raises:
-            SpecError: naming the component and steps that fit.
-        """
+        """Check that own steps are multiples of the step; SpecError naming component and what fits."""
         stated_as = "step_size" if experiment.step_size else "output_interval"
         for member in self.network.members:
             own_steps(member, experiment.step, experiment.stop_time, stated_as=stated_as)

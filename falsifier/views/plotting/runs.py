@@ -100,7 +100,7 @@ def falsification_curve(runs: Iterable[Run]) -> Curve:
         Numbers of simulations, from 0 to the maximum of all runs, and the share at each, both of shape (k,);
         the share is constant between two numbers.
     """
-    finished = [run for run in runs if run.finished]
+    finished = [run for run in runs if run.counts]
     counts = sorted(run.simulations for run in finished if run.falsified)
     shares = np.arange(len(counts) + 1) / max(len(finished), 1)
     largest = max((run.simulations for run in finished), default=0)

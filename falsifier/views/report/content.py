@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from falsifier.analyses.coverage import labels_of
-from falsifier.campaigns.analysis import Run, Table, load, main_table, read_published
+from falsifier.campaigns.analysis import Run, Table, load, main_table, not_begun, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
@@ -122,7 +122,7 @@ def _side(directory: Path, title: str) -> Side:
     return Side(
         title,
         runs,
-        main_table(runs, read_published()) if counts else None,
+        main_table([*runs, *not_begun(directory, runs)], read_published()) if counts else None,
         [_section(name, by_method) for name, by_method in grouped.items()],
     )
 
