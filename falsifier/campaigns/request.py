@@ -80,11 +80,7 @@ class CampaignRequest(Strict):
     limits: Budget | None = None
 
     def named(self) -> dict[str, RunRequest]:
-        """Runs by the name of their directory, in order.
-
-        Raises:
-            SpecError: if the same run is requested twice.
-        """
+        """Runs by the name of their directory, in order; SpecError if the same run is requested twice."""
         runs = {run_name(request): request for request in self.runs}
         if len(runs) < len(self.runs):
             raise SpecError(
@@ -143,9 +139,11 @@ def cross(
     given, space = budget_of(budget), cache(lambda source: load_source(source).space)
     for problem, (engine, llm), seed in product(*lists):
         used = ProblemSource(target=problem) if isinstance(problem, str) else problem
-        is_open = used.parameterization == "free" and used.shortest_piece is None
-        if is_open and "fixed" in (engine_parameterization(engine, llm), parameterization_of(space(used))):
-            used = used.model_copy(update={"parameterization": "fixed"})
+        if used.parameterization == "free" and (
+            engine_parameterization(engine, llm) == "fixed"
+            or (used.shortest_piece is None and parameterization_of(space(used)) == "fixed")
+        ):
+            used = used.model_copy(update={"parameterization": "fixed", "shortest_piece": None})
         limits = given if llm else replace(given, tokens=None, cost=None)
         run = RunRequest(problems=(used,), engine=engine, llm=llm, seed=seed, budget=limits, keep="best")
         runs[run_name(run)] = run

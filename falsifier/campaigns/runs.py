@@ -74,9 +74,10 @@ class Run(RunProgress):
 
     @property
     def counts(self) -> bool:
-        """Whether tables count it: it ended with a result, or spent its budget, whatever failed."""
+        """Whether tables count it: it ended with a result, or spent its budget and not all of it failed."""
         budget, spent = self.manifest.request.budget, replace(self.spent, cost=self.spent.cost or 0.0)
-        return self.finished or (self.status == "failed" and budget.exceeded(spent) is not None)
+        is_spent = self.best is not None and budget.exceeded(spent) is not None
+        return self.finished or (self.status == "failed" and is_spent)
 
     def columns(self) -> Columns:
         """Read every evaluation; return one row each, as columns of equal length; see evaluation_columns.
@@ -117,12 +118,21 @@ def load(directory: str | Path) -> list[Run]:
     return runs
 
 
-def not_begun(directory: Path, begun: Sequence[Run]) -> list[RunProgress]:
+def not_begun(directory: str | Path, begun: Sequence[Run]) -> list[RunProgress]:
     """Return the runs of a campaign that have not begun, which tables count beside those that have."""
-    names = {run.manifest.request.problems[0].name: run.requirement for run in begun}
-    asked = requested_runs(directory) if is_campaign(directory) else []
-    left = [run for run in asked if run.name not in (other.directory.name for other in begun)]
-    return [replace(run, requirement=names.get(run.requirement, run.requirement)) for run in left]
+    place, known = Path(directory), {run.directory.name for run in begun}
+    names = {run.manifest.request.problems[0]: run.requirement for run in begun}
+    asked = read_campaign(place).request.named() if is_campaign(place) else {}
+    return [
+        RunProgress(
+            name=name,
+            requirement=names.get(r.problems[0], r.problems[0].name),
+            method=method_of(r),
+            seed=r.seed,
+        )
+        for name, r in asked.items()
+        if name not in known
+    ]
 
 
 def requested_runs(directory: Path) -> list[RunProgress]:

@@ -36,15 +36,16 @@ _KEY_SHAPES = (
 )
 # Passwords may contain an unescaped @ themselves.
 _CREDENTIALS_IN_ADDRESS = r"(?<!mailto://)(?<=://)[^\s/?#'\"]+(?=@)"
-_NAMED = r"(?:[\w.-]{0,40}?[_.-]|api|access|auth)?(?:key|token|secret|passw(?:or)?d|pwd|sig|signature|auth)"
+_OWNER = r"(?:[\w.-]{0,40}?[_.-]|access|account|api|auth|client|private|secret|shared)?"
+_NAMED = rf"(?:{_OWNER}(?:key|token|secret|passw(?:or)?d|pwd|sig|signature|auth|credentials?)|code)"
 _NAMED_IN_QUERY = rf"(?i:[?&]{_NAMED}=)"
-_KEY_IN_ADDRESS = rf"(?<=://)[^\s?'\"]{{1,200}}+(?=\?)[^\s'\"]{{0,200}}?{_NAMED_IN_QUERY}[^\s&#'\"]{{6}}"
-_VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS, _KEY_IN_ADDRESS)))
+_LONG_KEY_IN_QUERY = rf"(?P<name>{_NAMED_IN_QUERY})[^\s&#'\"]{{6,}}"
+_VALUE = re.compile("|".join((*_KEY_SHAPES, _CREDENTIALS_IN_ADDRESS, _LONG_KEY_IN_QUERY)))
 # The same for an address alone: without a scheme too, and a password may contain a slash; a port is none.
 _CREDENTIALS = re.compile(r"(?:.*?://)?(?:[^/?#]*@|[^/?#@:]*:(?!\d*(?:[/?#]|$))[^@]*@)")
 _KEY_IN_QUERY = re.compile(rf"(?P<name>{_NAMED_IN_QUERY})(?P<key>[^\s&#'\"]+)")
-# Folders of an address may look like short keys: hf-inference.
-_KEY_IN_PATH = re.compile("|".join(rf"(?=[^/]{{20}}){shape}" for shape in _KEY_SHAPES))
+# After the host; folders may begin like keys, such as hf-inference, but have no digits or are shorter.
+_KEY_IN_PATH = re.compile("|".join(rf"(?<=[^/]/)(?=[^/]{{20}})(?=[^/]*\d){shape}" for shape in _KEY_SHAPES))
 _IN_TEXT = re.compile(
     "|".join(
         (
@@ -136,7 +137,7 @@ def without_credentials(address: str) -> str:
 
 def redact(text: str, secrets: Iterable[str] = ()) -> str:
     """Return a message with secrets replaced: given ones, held ones and whatever looks like a known key."""
-    text = _KEY_IN_QUERY.sub(rf"\g<name>{_REDACTED}", redact_held(text, secrets))
+    text = re.sub(_LONG_KEY_IN_QUERY, rf"\g<name>{_REDACTED}", redact_held(text, secrets))
     return _IN_TEXT.sub(_REDACTED, text)
 
 
@@ -155,7 +156,8 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
 
 
 def _held() -> list[str]:
-    return [v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)]
+    held = {k: v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)}
+    return [v for k, v in held.items() if _KEY_VARIABLE.search(k) or "://" not in v or holds_credentials(v)]
 
 
 def _credentials_in(address: str) -> list[str]:

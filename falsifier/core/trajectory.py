@@ -63,6 +63,7 @@ class Trajectory:
         if not (len(self) and abs(self.times[0]) <= bound.sum()):
             raise MonitorError(f"times: expected 0 s as the first one, got {self.times[:1].tolist()}")
         object.__setattr__(self, "times", fixed(self.times))
+        object.__setattr__(self, "units", FixedDict(self.units))
         object.__setattr__(self, "columns", FixedDict((n, fixed(c)) for n, c in self.columns.items()))
 
     def __reduce__(self) -> tuple[type["Trajectory"], tuple[object, ...]]:

@@ -181,11 +181,7 @@ class Movement:
 def step_convergence(
     model: Model, experiment: Experiment, signals: Mapping[str, Signal]
 ) -> dict[str, Movement]:
-    """Simulate with the step and with half of it; return how much each output changes, by name.
-
-    Raises:
-        SimulationError: if one of the simulations fails.
-    """
+    """Return how much each output changes with half the step, by name; SimulationError if one fails."""
     coarse = model.simulate(signals, {}, experiment)
     try:
         fine = model.simulate(signals, {}, replace(experiment, step_size=experiment.step / 2))

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 
 from falsifier.core.arguments import instance
 from falsifier.core.files import write_whole
-from falsifier.core.secrets import redact, secrets_in, without_credentials, without_secrets
+from falsifier.core.secrets import redact_held, secrets_in, without_credentials, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
 from falsifier.llm import litellm_adapter
@@ -101,7 +101,7 @@ class LiteLLMChat:
     def address(self) -> str:
         """Where prompts are sent, without a password or a key; empty: to the provider, or a model file."""
         address = "" if self.content else server_address(self.llm, self.api_base) or ""
-        return redact(without_credentials(address))
+        return redact_held(without_credentials(address))
 
     @property
     def parameters(self) -> Mapping[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from falsifier.core.literals import printable
-from falsifier.core.secrets import redact, without_credentials
+from falsifier.core.secrets import redact, redact_held, without_credentials
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
@@ -136,7 +136,7 @@ def classify(
     The ``options`` are those that the user passes on, by name.
     """
     provider, address = known(llm), server_address(llm, api_base)
-    told = redact(without_credentials(address or ""), secrets)
+    told = redact_held(without_credentials(address or ""), secrets)
     where = f"{llm} at {told}: " if address else f"{llm}: "
     if address and _is_refused(error) and (urlsplit(address).hostname or "") in _THIS_MACHINE:
         start = f"the server with '{provider.start}'" if provider.start else "the LLM's server"

@@ -39,6 +39,7 @@ _OF_ACCOUNT = {
     "OPENAI_ORG_ID": "OpenAI-Organization",
     "OPENAI_PROJECT_ID": "OpenAI-Project",
 }
+_OF_ANY_REQUEST = {"accept", "content-type"}
 _ENVIRONMENT = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",
     "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",
@@ -92,7 +93,8 @@ def headers_of_openai() -> list[tuple[str, str]]:
     lines = [f"{name}: {os.environ.get(variable, '')}" for variable, name in _OF_ACCOUNT.items()]
     lines += os.environ.get("OPENAI_CUSTOM_HEADERS", "").split("\n")
     headers = [line.partition(":") for line in lines]
-    return [(name.strip(), value.strip()) for name, _, value in headers if value.strip()]
+    found = [(name.strip(), value.strip()) for name, _, value in headers]
+    return [(name, value) for name, value in found if value and name.lower() not in _OF_ANY_REQUEST]
 
 
 def without_trace(text: str) -> str:
@@ -106,11 +108,7 @@ def own_words(text: str) -> str:
 
 
 def check_name(llm: str) -> None:
-    """Reject a name with an unknown provider; for the listed providers this does not import litellm.
-
-    Raises:
-        ChatSetupError: stating the expected form.
-    """
+    """Reject a name with an unknown provider, without importing litellm for listed ones; ChatSetupError."""
     provider, _, name = llm.partition("/")
     if name.strip("/ ") and (provider in PROVIDERS or _knows(llm)):
         return

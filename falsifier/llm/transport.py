@@ -236,7 +236,7 @@ class _Guarded(httpx.BaseTransport):
             own = f"the address of your server: {setting('api_base', 'URL')}"
             call.refuse(f"nothing was sent: it would have gone to {request.url.host}; state {own}")
         for name, value in call.dropped:
-            if request.headers.get(name) == value:
+            if value in map(str.strip, request.headers.get_list(name)):
                 del request.headers[name]
         for value in request.headers.values():
             if value and (advice := call.withheld.get(value.removeprefix("Bearer ").strip())):

@@ -1,8 +1,8 @@
 """The sections of a spec file."""
 
 from collections.abc import Mapping
+from math import isfinite
 from numbers import Real
-from sys import float_info
 from typing import Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -34,8 +34,11 @@ def _number_or_word(value: Any) -> float | str:
     if isinstance(value, bool | str):
         return value if isinstance(value, str) else shown(value)
     is_number = isinstance(value, Real)
-    if is_number and abs(value) <= float_info.max:
-        return float(value)
+    try:
+        if is_number and isfinite(value):
+            return float(value)
+    except OverflowError:  # of an integer
+        pass
     kind = "a finite number" if is_number else "a number or text"
     raise ValueError(f"expected {kind}, got {shown(value)}")
 

@@ -75,7 +75,8 @@ class ProblemSource(BaseModel):
     parameterization: Parameterization = "free"
     shortest_piece: Number | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
-    record: tuple[str, ...] = ()
+    # Left out where it is empty, so that runs keep their names.
+    record: tuple[str, ...] = Field((), exclude_if=lambda names: not names)
     context: tuple[Recordable, ...] = ()
 
     @field_serializer("changes")

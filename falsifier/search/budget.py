@@ -124,11 +124,7 @@ class Budget:
             raise SpecError("budget: give at least one limit: simulations, seconds, tokens or cost")
 
     def exceeded(self, spent: Spent) -> str | None:
-        """Which limit is reached, in words, or None.
-
-        Raises:
-            SpecError: if the cost is limited but the price of a call is unknown.
-        """
+        """Which limit is reached, in words, or None; SpecError if the cost is limited, its price unknown."""
         if self.simulations is not None and spent.simulations >= self.simulations:
             return f"the budget of {counted(self.simulations, 'simulation')} is used up"
         if self.seconds is not None and spent.seconds >= self.seconds:

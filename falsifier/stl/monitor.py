@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance, positive, whole
+from falsifier.core.fixed import FixedDict
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl.breach import Breach, find_breach
@@ -36,6 +37,9 @@ class Verdict:
     predicate: str
     values: Mapping[str, float] = field(default_factory=dict)
     breach: Breach | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", FixedDict(self.values))
 
     @property
     def moment(self) -> float:

@@ -216,7 +216,9 @@ class _Parser:
     def _close(self, opening: lexer.Token) -> None:
         if not self._accept(")"):
             token, closes = self._next, f"it closes the '(' at position {opening.position + 1}"
-            hint = lexer.hint_for(token) or lexer.hint_for(self.tokens[self.index - 1])
+            before = self.tokens[self.index - 1]
+            is_operator = len(before.text) > 1 or token.text in ("[", "(")  # a capital may be a signal
+            hint = lexer.hint_for(token) or (lexer.hint_for(before) if is_operator else "")
             hint = hint or (closes if token.kind in ("end", "symbol") else lexer.JOIN)
             self._fail(f"expected ')' before {token.shown}", token.position, hint)
 

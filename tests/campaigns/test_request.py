@@ -21,6 +21,8 @@ def test_a_campaign_is_requirements_times_searchers_times_seeds() -> None:
     kinds = [r.problems[0].parameterization for r in runs[::3]]
     assert kinds == ["fixed", "fixed", "free", "fixed", "fixed", "fixed"]
     assert cross([AT1, AT1], ["uniform"], seeds=range(2), budget=7) == runs[:2]
+    # Names of directories are made of what a request states: what it leaves out must not change them.
+    assert '"record"' not in runs[0].model_dump_json()
     with pytest.raises(SpecError, match="the same run twice"):
         CampaignRequest(runs=runs[:1] * 2).named()
     closed = ProblemSource(target="python:tests.problems:hard")

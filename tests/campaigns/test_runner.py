@@ -149,9 +149,7 @@ def test_a_changed_model_is_refused(spec: Path, tmp_path: Path) -> None:
         resume_campaign(directory)
 
 
-def test_a_campaign_at_work_goes_on_with_the_spec_that_it_was_started_with(
-    spec: Path, tmp_path: Path
-) -> None:
+def test_a_campaign_at_work_goes_on_with_the_spec_it_was_started_with(spec: Path, tmp_path: Path) -> None:
     directory, text = tmp_path / "c", spec.read_text()
     end = run_campaign(of_spec(spec), directory, listeners=[lambda _: spec.unlink(missing_ok=True)])
     assert end.progress.counts == {"falsified": 1}

@@ -36,9 +36,6 @@ from tests.command import ROOT, commands, falsifier
         (["tools", "build", "AT", "--out", "/dev/null"], "/dev/null is not a file that can be replaced"),
         (["simulate", "AT1", "--out", "/dev/null"], "/dev/null: no folder can be made here (N"),
         (["bench", "AT1", "--out", "/dev/null"], "/dev/null: no folder can be made here (N"),
-        (["run", "AT1", "--out", "/usr"], "/usr has files, which are kept: choose another --out"),
-        (["run", "AT", "--out", "/usr"], "/usr has files, which are kept: choose another --out"),
-        (["bench", "AT1", "--out", "/usr"], "/usr has files, which are kept: choose another --out"),
         (["run", "AT1", "--allow", "foo"], "falsifier: --allow: unknown 'foo'; known: write:PATH"),
         (["init", "my.toml"], "is a spec, not an FMU"),
         (["explain", "."], "not a run directory; expected a counterexample file"),
@@ -94,6 +91,16 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert message in done.err
     assert "Traceback" not in done.err
     assert done.out == ""
+
+
+@pytest.mark.parametrize("command", [["run", "AT1"], ["run", "AT"], ["bench", "AT1"]])
+def test_a_folder_with_files_is_kept(command: list[str], tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine").write_text("kept")
+    assert (
+        "has files, which are kept: choose another --out"
+        in falsifier(*command, "--out", "out", cwd=tmp_path).err
+    )
 
 
 def test_files_whose_names_are_not_utf_8_are_told_before_anything_is_written(tmp_path: Path) -> None:

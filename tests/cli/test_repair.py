@@ -50,9 +50,7 @@ def test_lines_of_another_run_are_refused_and_dropped(command: Any, tmp_path: Pa
 
 
 @pytest.mark.parametrize("kept", [None, 0, 60])
-def test_a_journal_without_a_simulation_is_called_that(
-    command: Any, tmp_path: Path, kept: int | None
-) -> None:
+def test_a_journal_without_a_simulation_is_called_so(command: Any, tmp_path: Path, kept: int | None) -> None:
     Standing().run(tmp_path / "run")
     journal = tmp_path / "run" / "journal.jsonl"
     content = journal.read_bytes()

@@ -64,9 +64,7 @@ OTHER_KEYS = st.text().filter(lambda key: key != "sum")
 
 
 @given(st.dictionaries(OTHER_KEYS, st.integers() | st.text(), min_size=1), st.sampled_from([None, 2]))
-def test_a_sealed_object_is_the_object_and_its_checksum(
-    content: dict[str, object], indent: int | None
-) -> None:
+def test_a_sealed_object_is_the_object_and_a_checksum(content: dict[str, object], indent: int | None) -> None:
     sealed = seal(json.dumps(content, indent=indent))
     check_seal(sealed.encode())
     loaded = json.loads(sealed)

@@ -183,9 +183,7 @@ def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
         counterexample_case(path).problem()
 
 
-def test_databases_keep_requirements_of_one_name_apart(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_databases_keep_requirements_of_a_name_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     database = Database(Path("kept"))
     found = to_store(violation(lag_problem()))

@@ -33,7 +33,7 @@ def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> No
     for shared in (found, pickle.loads(pickle.dumps(found))):  # by engines, listeners and the result
         columns = shared.trajectory.columns
         assert not any(array.flags.writeable for array in (shared.trajectory.times, *columns.values()))
-        for change in (columns.clear, columns.popitem, shared.candidate.signals.clear):
+        for change in (columns.clear, shared.trajectory.units.clear, shared.verdict.values.popitem):
             with pytest.raises(TypeError, match=r"read-only; dict\(...\) makes a copy"):
                 change()
 

@@ -217,9 +217,7 @@ next(iter(REGISTRY._runners.values())).close()
         ("hang", r"timeout: .*hung for 2 s \(time_limit\) while it was loaded"),
     ],
 )
-def test_a_replacement_that_does_not_load_is_one_failed_simulation(
-    tmp_path: Path, how: str, says: str
-) -> None:
+def test_a_replacement_that_does_not_load_is_a_failed_simulation(tmp_path: Path, how: str, says: str) -> None:
     limit = 2.0 if how == "hang" else 60.0
     body = GONE + f"print(tried(0, {limit}), tried(), sep='\\n')"
     first, replacement, last = script(body, tmp_path, HOSTILE_FMU=f"{how}-2").stdout.splitlines()

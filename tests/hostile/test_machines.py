@@ -76,9 +76,7 @@ def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tm
 
 
 @pytest.mark.parametrize("shell", ["2>&-", "<&- >&- 2>&-"])
-def test_simulations_need_no_open_streams_and_no_folder_for_temporary_files(
-    shell: str, tmp_path: Path
-) -> None:
+def test_simulations_need_no_streams_and_no_folder_for_temporary_files(shell: str, tmp_path: Path) -> None:
     assert run(tmp_path, shell=shell, TMPDIR=str(tmp_path / "none"))[0] == 0
 
 

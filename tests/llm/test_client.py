@@ -238,9 +238,7 @@ _TEXTS = [message.content for message in REQUEST.messages]
     ],
     ids=str,
 )
-def test_counts_of_the_wrong_form_are_counted_here(
-    counts: Any, sent: int | None, received: int | None
-) -> None:
+def test_counts_of_a_wrong_form_are_counted_here(counts: Any, sent: int | None, received: int | None) -> None:
     with serving(Step("some words", usage=counts)) as server:
         reply = LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)
     own = [sum(count_tokens(text, "openai/mine") for text in texts) for texts in (_TEXTS, ["some words"])]

@@ -238,11 +238,21 @@ def test_an_address_of_the_environment_is_recorded_and_priced(monkeypatch: pytes
 
 
 @pytest.mark.parametrize(
+    "host", ["sk-prod-eu-west-2.example.org/v1", "h/hf-inference/v1", "h/sk-learn-gateway-in-use"]
+)
+def test_an_address_that_only_begins_like_a_key_is_used_and_told(
+    host: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENAI_BASE_URL", f"https://{host}")
+    assert open_chat(LLMSettings(name="openai/mine")).address == f"https://{host}"  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
     ("private", "plain"),
     [
         ("http://me:word@127.0.0.1:1/v1", "http://127.0.0.1:1/v1"),
         ("http://127.0.0.1:1/v1?x=1&apikey=word12", "http://127.0.0.1:1/v1"),
-        ("http://127.0.0.1:1/hf-ordinary/sk-abcdefghijklmnopq", "http://127.0.0.1:1/hf-ordinary/[redacted]"),
+        ("http://127.0.0.1:1/hf-ordinary/sk-abcdefghijklmnop1", "http://127.0.0.1:1/hf-ordinary/[redacted]"),
     ],
 )
 def test_an_address_is_recorded_without_its_password_and_used_with_it(

@@ -39,9 +39,7 @@ def test_inputs_are_held_in_a_step(build: Build) -> None:
 
 
 @pytest.mark.parametrize(("size", "stop"), [(0.003, 1.2), (0.04, 5.0), (1.0, 2.0)])
-def test_bouncing_ball_bounces_where_it_must_whatever_the_step(
-    build: Build, size: float, stop: float
-) -> None:
+def test_bouncing_ball_bounces_where_it_must_at_any_step(build: Build, size: float, stop: float) -> None:
     with opened(build("Ball")) as [fmu]:
         rows = fmu.start().run(["h", "bounces"], stop, size)
     for t, h, bounces in rows:

@@ -53,9 +53,7 @@ def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
         resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
 
 
-def test_time_stands_still_while_a_record_is_repeated(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_time_stands_still_while_a_run_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = count()
     monkeypatch.setattr("falsifier.search.loop.perf_counter", lambda: float(next(ticks)))
     problem = lag_problem("G[0,10] (x <= 99)")

@@ -147,6 +147,7 @@ MISTAKES = [
     ("x <= 3 y <= 3", 8, "join two formulas"),
     ("G[0,2] (x <= 3) (y <= 100)", 17, "join two formulas"),
     ("once[0,2] (x <= 3)", 11, "no operators on the past"),
+    ("G[0,1] (x <= P", 15, "it closes the '(' at position 8"),
     ("G (a -> b S c)", 11, "no operators on the past"),
     ("a W b", 3, "((a or b) U b) or G a"),
     ("a R b", 3, "(b U (a and b)) or G b"),

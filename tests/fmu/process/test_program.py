@@ -96,9 +96,7 @@ class TestElsewhere:
         shared.chmod(0o777)
         assert workplace.worker_program(tmp_path).parent == tmp_path and not list(shared.iterdir())
 
-    def test_without_a_compiler_one_line_says_so(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_without_compiler_one_line_says_so(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("PATH", str(tmp_path))
         monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
         with pytest.raises(ModelError, match=r"no program to run FMUs on riscv64-linux.*no C compiler found"):
