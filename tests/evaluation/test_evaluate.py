@@ -33,7 +33,8 @@ def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> No
     for shared in (found, pickle.loads(pickle.dumps(found))):  # by engines, listeners and the result
         columns = shared.trajectory.columns
         assert not any(array.flags.writeable for array in (shared.trajectory.times, *columns.values()))
-        for change in (columns.clear, shared.trajectory.units.clear, shared.verdict.values.popitem):
+        values, signals, units = shared.verdict.values, shared.candidate.signals, shared.trajectory.units
+        for change in (columns.clear, signals.clear, units.clear, values.popitem):
             with pytest.raises(TypeError, match=r"read-only; dict\(...\) makes a copy"):
                 change()
 
