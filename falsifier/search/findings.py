@@ -145,7 +145,7 @@ def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
         return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
     option = written(f"--parameterization free:{shortest:g}", f"shortest_piece={shortest:g}")
     if source.parameterization == "fixed":
-        with suppress(FalsifierError):  # its files may have changed since
+        with suppress(FalsifierError, OSError):  # its files may have changed since
             if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
                 return written("--parameterization free", "parameterization='free'")
     elif source.parts.kind == "spec":
