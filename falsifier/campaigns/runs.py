@@ -16,6 +16,7 @@ from falsifier.record import manifest as manifests
 from falsifier.record.journal import read_journal, recorded_evaluations
 from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunFollower, Summary
+from falsifier.search.request import RunRequest
 from falsifier.search.result import Columns, evaluation_columns, frame as as_frame
 
 if TYPE_CHECKING:
@@ -123,25 +124,18 @@ def not_begun(directory: str | Path, begun: Sequence[Run]) -> list[RunProgress]:
     place, known = Path(directory), {run.directory.name for run in begun}
     names = {run.manifest.request.problems[0]: run.requirement for run in begun}
     asked = read_campaign(place).request.named() if is_campaign(place) else {}
-    return [
-        RunProgress(
-            name=name,
-            requirement=names.get(r.problems[0], r.problems[0].name),
-            method=method_of(r),
-            seed=r.seed,
-        )
-        for name, r in asked.items()
-        if name not in known
-    ]
+    left = {name: request for name, request in asked.items() if name not in known}
+    return [_requested(name, r, names.get(r.problems[0])) for name, r in left.items()]
 
 
 def requested_runs(directory: Path) -> list[RunProgress]:
     """Return the runs of a campaign as they were asked for, before anything is read of them."""
-    named = read_campaign(directory).request.named().items()
-    return [
-        RunProgress(name=name, requirement=r.problems[0].name, method=method_of(r), seed=r.seed)
-        for name, r in named
-    ]
+    return [_requested(name, r) for name, r in read_campaign(directory).request.named().items()]
+
+
+def _requested(name: str, r: RunRequest, requirement: str | None = None) -> RunProgress:
+    called = requirement or r.problems[0].name
+    return RunProgress(name=name, requirement=called, method=method_of(r), seed=r.seed)
 
 
 def load_run(directory: str | Path, requirement: str | None = None) -> Run:

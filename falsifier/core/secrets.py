@@ -156,8 +156,10 @@ def redact_held(text: str, secrets: Iterable[str] = ()) -> str:
 
 
 def _held() -> list[str]:
-    held = {k: v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or _VALUE.search(v)}
-    return [v for k, v in held.items() if _KEY_VARIABLE.search(k) or "://" not in v or holds_credentials(v)]
+    def is_secret(value: str) -> bool:  # an address may begin like a key
+        return bool(_VALUE.search(value)) and ("://" not in value or holds_credentials(value))
+
+    return [v for k, v in os.environ.items() if _KEY_VARIABLE.search(k) or is_secret(v)]
 
 
 def _credentials_in(address: str) -> list[str]:
