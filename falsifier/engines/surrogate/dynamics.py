@@ -17,8 +17,8 @@ from falsifier.engines.surrogate.predicted_cost import Margins, PredictedCost
 
 # Number of cells that the dynamics look back; hidden states need several.
 _LAGS = 6
-# Ridge of a regression, relative to the mean eigenvalue; small because deviations are small.
-_RIDGE = 1e-7
+# Ridge of a regression, relative to the mean eigenvalue: a few simulations do not say what twenty inputs do.
+_RIDGE = 1e-2
 # Predicted outputs are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5
 # Largest predicted deviation, in units of the spread: an unstable fit must not overflow, and deviations this
