@@ -212,5 +212,4 @@ def _read(coding: Coding, values: Array, at: Array) -> Array:
         return values @ np.stack([np.interp(at, knots, row) for row in np.eye(len(knots))])
     from scipy.interpolate import PchipInterpolator
 
-    curves = PchipInterpolator(knots, values, axis=1)(at)
-    return np.asarray(np.clip(curves, 0.0, 1.0))
+    return np.asarray(np.clip(PchipInterpolator(knots, values, axis=1)(at), 0.0, 1.0))
