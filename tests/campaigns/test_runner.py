@@ -96,8 +96,7 @@ def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path:
     run_campaign(wanted, tmp_path / "whole")
     limited = wanted.model_copy(update={"limits": Budget(10)})
     assert run_campaign(limited, tmp_path / "c").reason
-    done = resume_campaign(tmp_path / "c", limits=Budget(100_000))
-    assert not done.reason
+    assert not resume_campaign(tmp_path / "c", limits=Budget(100_000)).reason
     assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
 
 

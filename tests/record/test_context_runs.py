@@ -35,8 +35,7 @@ def test_a_model_that_reads_the_thresholds_falsifies_at_once(file: Path) -> None
 
 def test_without_context_it_finds_nothing_to_aim_at() -> None:
     chat = ScriptedChat(limp_home.reads_thresholds)
-    result = falsify("HeaterLimpHome", llm=chat, budget=1)
-    assert result.status == "not falsified"
+    assert falsify("HeaterLimpHome", llm=chat, budget=1).status == "not falsified"
     assert "6.8" not in chat.requests[0].messages[0].content
 
 

@@ -43,8 +43,7 @@ def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() 
 
 
 def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
-    problem = box_problem()
-    engine = make_engine("cma", problem, seed=0)
+    engine = make_engine("cma", box_problem(), seed=0)
     generations = {int(c.rationale.split()[1]) for c in drive(engine, flat, rounds=100)}
     assert generations == {1}, "a plateau ends a start after its first generation"
 
