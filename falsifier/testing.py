@@ -141,8 +141,7 @@ class EngineContract:
         for problem in self.problems():
             engine = self.make(problem, seed=1)
             for candidate in drive(engine, partial(evaluate, problem), rounds=self.rounds):
-                admitted = problem.space.admit(candidate)
-                assert admitted.key == candidate.key
+                assert problem.space.admit(candidate).key == candidate.key
                 assert candidate.origin and candidate.rationale
 
     def test_deterministic_for_a_seed(self) -> None:

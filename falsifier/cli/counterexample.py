@@ -128,8 +128,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
         "robustness": replayed.evaluation and replayed.evaluation.robustness,
         "text": replayed.text,
     }
-    text = as_shown(replayed.text, content, as_json=as_json)
-    conclude(text, 1 if replayed.status == "violates" else 0)
+    conclude(as_shown(replayed.text, content, as_json=as_json), 1 if replayed.status == "violates" else 0)
 
 
 @command()

@@ -206,8 +206,7 @@ class _Call:
             raise
         except httpx.TransportError as error:
             text = self.refusal or _fault_of(error)
-            kind = UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError
-            self.fault = kind(text)
+            self.fault = (UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError)(text)
             raise
 
 
