@@ -190,8 +190,7 @@ def _shrink(
 
     def said(simpler: Evaluation, n: int) -> None:
         if not quiet:
-            robustness = signed(simpler.robustness)
-            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {robustness}")
+            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}")
 
     with _loaded(case, rights) as problem:
         original = case.simulated(problem)

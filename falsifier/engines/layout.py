@@ -44,8 +44,7 @@ class TimeGrid:
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
         count = max(1, min(cells, round(horizon / interval)))
         step = horizon / count
-        rest = int(stop_time / step + 1e-6)
-        return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
+        return cls(step, count, max(count, min(int(stop_time / step + 1e-6), _MAX_HORIZONS * count)))
 
     @property
     def middles(self) -> Array:

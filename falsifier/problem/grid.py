@@ -134,16 +134,14 @@ def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> in
     return min(candidates, key=lambda n: (min(digits(float(common / n)), _MANY_DIGITS), n))
 
 
-def _reason(
-    interval: Fraction, fits: str, stop_time: float, fmu_step: float | None, step_size: float | None
-) -> str:
+def _reason(interval: Fraction, fits: str, stop: float, fmu_step: float | None, step: float | None) -> str:
     if fmu_step and interval == exact(fmu_step):
         return "the FMU's step"
-    if step_size:
-        return f"a multiple of step_size = {step_size:g} s; this divides {fits}"
+    if step:
+        return f"a multiple of step_size = {step:g} s; this divides {fits}"
     if not fmu_step:
         return f"the FMU specifies no step; this divides {fits}"
-    if fmu_step > stop_time:
+    if fmu_step > stop:
         return f"the FMU's step {fmu_step:g} s is longer than the stop time; this divides {fits}"
     return f"the FMU's step {fmu_step:g} s does not divide {fits}; this does"
 

@@ -43,8 +43,7 @@ def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
     assert first.progress.finished == 4
     files = {p: p.read_bytes() for p in directory.rglob("journal.jsonl")}
     seen: list[Progress] = []
-    second = resume_campaign(directory, listeners=[seen.append])
-    assert second.progress == first.progress
+    assert resume_campaign(directory, listeners=[seen.append]).progress == first.progress
     assert {p: p.read_bytes() for p in directory.rglob("journal.jsonl")} == files
 
 

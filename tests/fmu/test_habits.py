@@ -183,8 +183,7 @@ def test_repeated_folder_entries_do_no_harm(tmp_path: Path) -> None:
 
 
 def test_without_outputs_states_and_locals_are_observed() -> None:
-    info = read_info(fixtures.path("NoOutputs_2dymola"))
-    assert [v.name for v in info.observables] == ["x"]
+    assert [v.name for v in read_info(fixtures.path("NoOutputs_2dymola")).observables] == ["x"]
     problem = Problem.from_fmu(fixtures.path("NoOutputs_2dymola"), "G[0,10] (y <= 5)")
     candidate = problem.space.decode([10.0] * len(problem.space.dimensions), origin="test")
     assert list(candidate.signals) == ["u"]

@@ -55,8 +55,7 @@ def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
     problem = transmission("AT51")[0]
     rng = np.random.default_rng(2)
     low, high = problem.space.bounds.T
-    points = low + rng.random((24, len(low))) * (high - low)
-    evaluations = sampled(problem, *points)
+    evaluations = sampled(problem, *(low + rng.random((24, len(low))) * (high - low)))
     questions = Questions(View.of(problem), VARIANTS["MP5"])
     kept, before = [], ""
     for evaluation in evaluations:
