@@ -128,8 +128,7 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
         "robustness": replayed.evaluation and replayed.evaluation.robustness,
         "text": replayed.text,
     }
-    text = as_shown(replayed.text, content, as_json=as_json)
-    conclude(text, 1 if replayed.status == "violates" else 0)
+    conclude(as_shown(replayed.text, content, as_json=as_json), 1 if replayed.status == "violates" else 0)
 
 
 @command()
@@ -191,8 +190,7 @@ def _shrink(
 
     def said(simpler: Evaluation, n: int) -> None:
         if not quiet:
-            robustness = signed(simpler.robustness)
-            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {robustness}")
+            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}")
 
     with _loaded(case, rights) as problem:
         original = case.simulated(problem)

@@ -23,6 +23,7 @@ from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, make_system, rights_of
+from falsifier.problem.sections import ModelSection
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
 from falsifier.views.model_text import info_text, model_json, simulink_text
@@ -43,7 +44,7 @@ _COUPLING_SHARE, _HALVINGS = 0.01, 6
     "--check",
     "checked",
     is_flag=True,
-    help="Simulate at the step and at half of it, and show the largest differences between the outputs.",
+    help="Simulate at the step, or a spec's, and at half of it; show the largest differences of the outputs.",
 )
 @policy_options
 @json_option
@@ -63,7 +64,8 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
         return
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
-    rights = rights_of(_spec_of(fmu), [changes])
+    spec = _spec_of(fmu)
+    rights = rights_of(spec, [changes])
     try:
         note = rights_text(*rights)
     except (MachineError, ModelError) as error:  # the description can be shown all the same
@@ -71,7 +73,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     found = replace(found, notes=(*found.notes, note))
     say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
     if checked and not as_json:
-        _print_convergence(source, found, *rights)
+        _print_convergence(source, found, read_spec(spec).model if spec else ModelSection(), *rights)
 
 
 @command()
@@ -123,20 +125,34 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
 
 
 def _print_convergence(
-    source: "Path | System", found: ModelInfo, allow: tuple[str, ...], deny: tuple[str, ...]
+    source: "Path | System",
+    found: ModelInfo,
+    stated: ModelSection,
+    allow: tuple[str, ...],
+    deny: tuple[str, ...],
 ) -> None:
-    """Print how much halving the step changes the outputs while each bounded input goes up and down once."""
+    """Print what halving the step, a spec's if it states one, changes while each input goes up and down."""
     from falsifier.evaluation.confirm import step_convergence
     from falsifier.fmu import FmuModel, System
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
-    interface = default_interface(found)
-    stop_time = found.stop_time or DEFAULT_STOP_TIME
-    outputs = tuple(v.name for v in found.observables if v.kind != "string")[:_CHECKED_VARIABLES]
+    interface = stated.interface or default_interface(found)
+    stop_time = stated.stop_time or found.stop_time or DEFAULT_STOP_TIME
+    outputs = tuple(v.name for v in found.observables if v.kind != "string" and v.name not in stated.omit)
     if not outputs:
         raise SpecError(f"{found.name}: no output, state or other computed variable to compare")
-    grid = choose_grid(stop_time, fmu_step=found.step_size)
-    experiment = Experiment(stop_time, grid.interval, outputs)
+    interval, reason = stated.output_interval, "as the spec states"
+    if interval is None:
+        grid = choose_grid(stop_time, fmu_step=found.step_size, step_size=stated.step_size)
+        interval, reason = grid.interval, grid.reason
+    experiment = Experiment(
+        stop_time,
+        interval,
+        outputs[:_CHECKED_VARIABLES],
+        stated.step_size,
+        stated.tolerance,
+        stated.time_limit,
+    )
     signals = {
         v.name: Signal.evenly([v.low, v.high, v.low], stop_time=stop_time, interpolation="linear")
         for v in found.inputs
@@ -151,8 +167,7 @@ def _print_convergence(
         movements = step_convergence(model, experiment, signals)
         advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
     say(
-        f"\n{interface}: step {experiment.output_interval:g} s compared with half of it over {stop_time:g} s "
-        f"({grid.reason}):"
+        f"\n{interface}: step {experiment.step:g} s compared with half of it over {stop_time:g} s ({reason}):"
     )
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
@@ -173,13 +188,13 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     share = f"{100 * _COUPLING_SHARE:g} % of its range"
     step = sufficient_step(system, experiment, signals, share=_COUPLING_SHARE, halvings=_HALVINGS)
     if step is None:
-        finest = experiment.output_interval / 2**_HALVINGS
+        finest = experiment.step / 2**_HALVINGS
         return (
             f"no step down to {finest:g} s keeps every output within {share} when it is halved: the coupling "
             "is too coarse, or outputs jump at events"
         )
     kept = f"keeps every output within {share} when it is halved"
-    if step == experiment.output_interval:
+    if step == experiment.step:
         return f"this step {kept}"
     return f"step_size = {step:g} {kept}; set it in [model]"
 
@@ -200,9 +215,7 @@ def _spec_of(given: Path) -> Path | None:
     if (target := Target.parse(str(given))).kind == "spec":
         return Path(target.file)
     is_file = given.parent != Path() or given.suffix or given.is_file() or _bundled_fmu(given).is_file()
-    if target.kind == "python" or not is_file:
-        return find_spec(str(given))[0]
-    return None
+    return find_spec(str(given))[0] if target.kind == "python" or not is_file else None
 
 
 def one_fmu(given: Path) -> Path:

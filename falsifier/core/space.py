@@ -123,8 +123,7 @@ class InputRange(Range):
         if self.hold is not None:
             positive(f"{self.label}: hold", self.hold)
         if self.free is not None:
-            expected = "Freedom(max_control_points, min_interval)"
-            instance(f"{self.label}: free", self.free, Freedom, expected)
+            instance(f"{self.label}: free", self.free, Freedom, "Freedom(max_control_points, min_interval)")
 
 
 @dataclass(frozen=True, slots=True)

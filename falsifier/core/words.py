@@ -15,6 +15,15 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
+def readable(value: float, digits: int = 6) -> str:
+    """Return a number with at most so many digits; a whole number, of which none can be left out, with ten.
+
+    >>> readable(2147483647.0), readable(1 / 3), readable(43215.0, 4)
+    ('2147483647', '0.333333', '43215')
+    """
+    return f"{value:.{10 if float(value).is_integer() else digits}g}"
+
+
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
@@ -44,8 +53,10 @@ def signal_text(signal: Signal) -> str:
     'constant 3'
     """
     if len(set(signal.values)) == 1:
-        return f"constant {signal.values[0]:g}"
-    points = [f"{v:g} at {t:.4g} s" for t, v in zip(signal.times, signal.values, strict=True)]
+        return f"constant {readable(signal.values[0])}"
+    points = [
+        f"{readable(v)} at {readable(t, 4)} s" for t, v in zip(signal.times, signal.values, strict=True)
+    ]
     if len(points) > _SHOWN_POINTS:
         half = _SHOWN_POINTS // 2
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]

@@ -145,8 +145,7 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
     if evaluation.trajectory is None:
         raise SpecError("no trajectory to explain: pass an evaluation that has one, such as a result's best")
     diagnosis = monitor_for(problem).diagnose(evaluation.trajectory)
-    effects = tuple(_effects(problem, evaluation.candidate))
-    return Explanation(problem, evaluation, diagnosis, effects)
+    return Explanation(problem, evaluation, diagnosis, tuple(_effects(problem, evaluation.candidate)))
 
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:

@@ -236,8 +236,7 @@ def _robustness(
         if c.stretch is None:
             changed = with_parameter(changed, c.name, value)
         else:
-            moved = with_stretch(changed.signals[c.name], *c.stretch, value)
-            changed = with_signal(changed, c.name, moved)
+            changed = with_signal(changed, c.name, with_stretch(changed.signals[c.name], *c.stretch, value))
     robustness = evaluate(problem, problem.space.admit(changed)).robustness
     return np.nan if robustness is None else robustness
 

@@ -146,8 +146,7 @@ def find_key(llm: str, *, api_base: str | None = None) -> str | None:
     if provider.openai_client and (stated_address(llm, api_base) or provider.local):
         return NO_KEY
     if provider.keys and api_base is None:
-        variables = " or ".join(provider.keys)
-        raise ChatSetupError(f"{llm}: no API key: set {variables} in the environment")
+        raise ChatSetupError(f"{llm}: no API key: set {' or '.join(provider.keys)} in the environment")
     return None
 
 

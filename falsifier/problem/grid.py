@@ -53,10 +53,11 @@ def choose_grid(
         stop_time: end of the simulation in s.
         times: times in s that formulas name; those after the stop time are ignored.
         fmu_step: the FMU's default step in s, if it specifies one.
-        step_size: communication step in s, if it is stated; the interval is a multiple of it, if possible.
+        step_size: communication step in s, if it is stated; the interval is a multiple of it.
 
     Raises:
-        SpecError: if only a very fine grid fits, or a step is far too short for the stop time.
+        SpecError: if only a very fine grid fits, or the communication step does not, or a step is far too
+            short for the stop time.
     """
     # Otherwise the search below for a round interval would take minutes.
     check_steps(stop_time, fmu_step or None, key="model.output_interval")
@@ -65,18 +66,19 @@ def choose_grid(
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
     wanted = exact(fmu_step) if fmu_step and fmu_step <= stop_time else stop / _DEFAULT_INTERVALS
-    count = _count(common, wanted, exact(step_size) if step_size else None)
-    interval = common / count
+    if step_size and common % exact(step_size):
+        fits = _fitting(stop, named)
+        raise SpecError(f"{step_size:g} s does not divide {fits}; change one of these", key="model.step_size")
+    interval = common / _count(common, wanted, exact(step_size) if step_size else None)
     finest = min(wanted, stop / _MAX_INTERVALS)
     if interval < finest:
         rounded = stop / _DEFAULT_INTERVALS
         raise SpecError(
-            f"no grid of at most {_MAX_INTERVALS} intervals fits the stop time {_text(stop)} s and the "
-            f"formula's times {_listed(named)}; round these times, for example to multiples of "
-            f"{_text(rounded)} s",
+            f"no grid of at most {_MAX_INTERVALS} intervals fits {_fitting(stop, named)}; round these times, "
+            f"for example to multiples of {_text(rounded)} s",
             key="model.output_interval",
         )
-    return Grid(float(interval), _reason(interval, stop, named, fmu_step))
+    return Grid(float(interval), _reason(interval, _fitting(stop, named), stop_time, fmu_step, step_size))
 
 
 def formula_times(formulas: Iterable[str]) -> list[float]:
@@ -122,25 +124,30 @@ def _common(*times: Fraction) -> Fraction:
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
     """Return the number of intervals in the common time: few that are no longer than wanted, and round."""
     count = max(1, ceil(common / wanted))
+    if step_size is not None:
+        steps = int(common / step_size)
+        return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
     if common == count * wanted:
         return count
-    if step_size is None or common % step_size:
-        # Thirds of a second have no end in decimals, however many digits are looked at.
-        candidates = range(count, min(2 * count, count + _MAX_INTERVALS) + 1)
-        return min(candidates, key=lambda n: (min(digits(float(common / n)), _MANY_DIGITS), n))
-    steps = int(common / step_size)
-    return next(n for n in range(min(count, steps), steps + 1) if not steps % n)
+    # Thirds of a second have no end in decimals, however many digits are looked at.
+    candidates = range(count, min(2 * count, count + _MAX_INTERVALS) + 1)
+    return min(candidates, key=lambda n: (min(digits(float(common / n)), _MANY_DIGITS), n))
 
 
-def _reason(interval: Fraction, stop: Fraction, named: list[Fraction], fmu_step: float | None) -> str:
-    fits = f"the stop time {_text(stop)} s" + (f" and the formula's times {_listed(named)}" if named else "")
+def _reason(interval: Fraction, fits: str, stop: float, fmu_step: float | None, step: float | None) -> str:
+    if fmu_step and interval == exact(fmu_step):
+        return "the FMU's step"
+    if step:
+        return f"a multiple of step_size = {step:g} s; this divides {fits}"
     if not fmu_step:
         return f"the FMU specifies no step; this divides {fits}"
-    if exact(fmu_step) > stop:
+    if fmu_step > stop:
         return f"the FMU's step {fmu_step:g} s is longer than the stop time; this divides {fits}"
-    if interval == exact(fmu_step):
-        return "the FMU's step"
     return f"the FMU's step {fmu_step:g} s does not divide {fits}; this does"
+
+
+def _fitting(stop: Fraction, named: list[Fraction]) -> str:
+    return f"the stop time {_text(stop)} s" + (f" and the formula's times {_listed(named)}" if named else "")
 
 
 def _listed(times: list[Fraction]) -> str:

@@ -211,8 +211,7 @@ def reloadable(problem: Problem) -> ProblemSource | None:
     source = problem.source
     if source is None:
         return None
-    known = _LOADED.get(source) or load_source(source).fingerprint
-    return source if known == problem.fingerprint else None
+    return source if (_LOADED.get(source) or load_source(source).fingerprint) == problem.fingerprint else None
 
 
 def _stating(fmu: str) -> str:

@@ -140,8 +140,7 @@ class InputSection(Strict):
     @property
     def is_open(self) -> bool:
         """Whether it is searched, and nobody stated its parameterization."""
-        stated = (self.value, self.control_points, self.interpolation, self.free)
-        return all(each is None for each in stated)
+        return all(each is None for each in (self.value, self.control_points, self.interpolation, self.free))
 
 
 class ParameterSection(Strict):

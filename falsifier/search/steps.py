@@ -32,8 +32,7 @@ class Steps:
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
         """Return an engine's admitted candidates, the number asked for, and the time that took in s."""
         started = perf_counter()
-        candidates = proposals(engine, problem.space, wanted)
-        return candidates, wanted, perf_counter() - started
+        return proposals(engine, problem.space, wanted), wanted, perf_counter() - started
 
     def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
         """Start to simulate and judge; return functions that wait for the evaluations, in order."""

@@ -178,8 +178,7 @@ def diagnose(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Diag
         steps.append(Step(formula, time, here.value, window, text))
     found = (_vacuity(part, buffer, times) for part in root.walk())
     vacuities = {v.implication: v for v in found if v is not None}
-    critical = float(times[path[-1].sample])
-    return Diagnosis(path[0].value, critical, tuple(steps), tuple(vacuities.values()))
+    return Diagnosis(path[0].value, float(times[path[-1].sample]), tuple(steps), tuple(vacuities.values()))
 
 
 def _vacuity(part: CompiledPart, buffer: Floats, times: Floats) -> VacuousImplication | None:

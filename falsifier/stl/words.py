@@ -93,8 +93,7 @@ def _predicate(predicate: stl.Predicate) -> str:
         case Call("abs", (Arithmetic("-", a, b),)), "<" | "<=":
             return f"{a} is within {right} of {b}"
         case Call("abs", (Arithmetic("-", a, b),)), ">" | ">=":
-            least = "more than" if operator == ">" else "at least"
-            return f"{a} differs from {b} by {least} {right}"
+            return f"{a} differs from {b} by {'more than' if operator == '>' else 'at least'} {right}"
     return f"{left} {_IS[operator]} {right}"
 
 

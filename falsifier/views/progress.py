@@ -234,8 +234,7 @@ def _choices(event: RunStarted) -> list[str]:
     chosen = dict.fromkeys(note for problem in event.problems for note in problem.notes)
     parameterization = parameterization_note(event.searched)
     held = held_text(event.problems[0].held_inputs)
-    unsearched = f"not searched: {held}" if held else ""
-    return [text for text in (parameterization, unsearched, *chosen) if text]
+    return [text for text in (parameterization, f"not searched: {held}" if held else "", *chosen) if text]
 
 
 def _duration(seconds: float) -> str:

@@ -10,7 +10,7 @@ from falsifier.analyses.assess import Assurance
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_facts, counted
+from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -168,12 +168,12 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
     values = []
     for name, value in verdict.values.items():
         label = labels[name].get(int(value)) if labels.get(name) else None
-        words = (f"{name} = {value:.6g}", units.get(name), label and f"({label})")
+        words = (f"{name} = {readable(value)}", units.get(name), label and f"({label})")
         values.append(" ".join(filter(None, words)))
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
         ("robustness", f"{signed(verdict.robustness)} ({meaning})"),
-        ("critical time", f"{verdict.critical_time:.6g} s, decided by {verdict.predicate}"),
+        ("critical time", f"{readable(verdict.critical_time)} s, decided by {verdict.predicate}"),
         ("values then", ", ".join(values)),
     ]
 

@@ -23,8 +23,7 @@ def system(limit: float):  # type: ignore[no-untyped-def]
 
 
 def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
-    problem = system(0.8)
-    found = assess(problem, budget=60, seed=3)
+    found = assess(system(0.8), budget=60, seed=3)
     same = falsify(system(5.0), "uniform", budget=60, seed=3).evaluations
     expected = sum(e.candidate.parameters["bias"] > 0.8 for e in same)
     assert (found.drawn, found.violations) == (60, expected) and expected > 0

@@ -94,8 +94,7 @@ def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formul
     found = [f for f in lint(path) if f.kind == "margin"]
     assert len(found) == bool(told)
     assert all(told in f.text and "temperature and power" in f.advice for f in found)
-    said = CliRunner().invoke(check, [path]).output
-    assert ("Boolean" in said) == bool(told)
+    assert ("Boolean" in CliRunner().invoke(check, [path]).output) == bool(told)
 
 
 def test_a_searched_parameter_does_not_change_over_time() -> None:

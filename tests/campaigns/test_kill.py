@@ -93,8 +93,7 @@ def children(pid: int) -> list[int]:
 
 
 def test_a_run_that_kills_its_worker_has_failed(tmp_path: Path) -> None:
-    outcome = run_campaign(request("worker_killer", seeds=1), tmp_path)
-    (run,) = outcome.progress.runs
+    (run,) = run_campaign(request("worker_killer", seeds=1), tmp_path).progress.runs
     assert run.status == "failed"
     assert "worker process died" in run.reason
 

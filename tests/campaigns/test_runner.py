@@ -43,8 +43,7 @@ def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
     assert first.progress.finished == 4
     files = {p: p.read_bytes() for p in directory.rglob("journal.jsonl")}
     seen: list[Progress] = []
-    second = resume_campaign(directory, listeners=[seen.append])
-    assert second.progress == first.progress
+    assert resume_campaign(directory, listeners=[seen.append]).progress == first.progress
     assert {p: p.read_bytes() for p in directory.rglob("journal.jsonl")} == files
 
 
@@ -96,8 +95,7 @@ def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path:
     run_campaign(wanted, tmp_path / "whole")
     limited = wanted.model_copy(update={"limits": Budget(10)})
     assert run_campaign(limited, tmp_path / "c").reason
-    done = resume_campaign(tmp_path / "c", limits=Budget(100_000))
-    assert not done.reason
+    assert not resume_campaign(tmp_path / "c", limits=Budget(100_000)).reason
     assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
 
 

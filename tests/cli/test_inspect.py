@@ -111,3 +111,13 @@ def test_info_of_a_simulink_file(tmp_path: Path) -> None:
     bad = falsifier("info", "bad.slx", cwd=tmp_path)
     assert bad.code == 2
     assert "bad.slx: not a readable Simulink file" in bad.err
+
+
+def test_a_spec_is_checked_at_its_own_step_without_what_it_omits(tmp_path: Path) -> None:
+    fmu, model = fixture("Echo_2"), 'stop_time = 2.0\nstep_size = 0.25\nomit = ["out_Integer"]\n'
+    (tmp_path / "s.toml").write_text(
+        f"[model]\nfmu = '{fmu}'\n{model}[requirements.R]\nformula = 'out_Real < 1'\n"
+    )
+    checked = falsifier("info", "s.toml", "--check", cwd=tmp_path)
+    assert "step 0.25 s compared with half of it over 2 s (a multiple of step_size = 0.25 s" in checked.out
+    assert "out_Real changes" in checked.out and "out_Integer changes" not in checked.out

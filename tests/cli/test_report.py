@@ -14,8 +14,7 @@ def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> N
     assert (tmp_path / "c" / "report.html").read_text().startswith("<!DOCTYPE html>")
     assert (tmp_path / "v.csv").read_text().count("yes") == 2
     assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
-    run = next((tmp_path / "c" / "runs").glob("hard-*"))
-    command("report", str(run), "-o", "one.html")
+    command("report", str(next((tmp_path / "c" / "runs").glob("hard-*"))), "-o", "one.html")
     assert "1 of 1 requirement violated, 1 run," in (tmp_path / "one.html").read_text()
 
 

@@ -92,8 +92,7 @@ def test_a_failed_simulation_cannot_be_explained() -> None:
 
 def test_of_a_near_miss_is_said_what_brings_it_near_and_what_keeps_it_away() -> None:
     problem = lag_problem("G[0,10] (x <= 2)", inputs=2)
-    candidate = problem.space.decode([1.0] * 4 + [-0.5] * 4)
-    found = explain(problem, evaluate(problem, candidate))
+    found = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4 + [-0.5] * 4)))
     assert not found.violated
     assert "It is not violated here: the robustness, the margin by which it holds, is +" in found.text
     assert "With u at rest (0 V) alone: +2, farther from a violation." in found.text

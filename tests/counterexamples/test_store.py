@@ -58,8 +58,7 @@ def test_a_file_finds_its_spec_from_anywhere_and_after_moving_house(
 ) -> None:
     monkeypatch.chdir(folder)
     problem = load_problem("my.toml:R", parameters={"finalDrive": 3.225})
-    database = Database(Path("counterexamples"))
-    path = database.save(problem, to_store(violation(problem)))
+    path = Database(Path("counterexamples")).save(problem, to_store(violation(problem)))
     assert json.loads(path.read_text())["problem"]["target"] == "../../../my.toml:R"
     monkeypatch.chdir(tmp_path)
     folder.rename(tmp_path / "moved")
@@ -177,8 +176,7 @@ def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
-    problem = lag_problem()
-    path = save(to_store(violation(problem)), tmp_path / "c.json")
+    path = save(to_store(violation(lag_problem())), tmp_path / "c.json")
     with pytest.raises(SpecError, match=r"c\.json: the problem was made in Python"):
         counterexample_case(path).problem()
 

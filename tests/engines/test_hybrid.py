@@ -144,8 +144,7 @@ def test_a_new_answer_on_trial_is_simulated_at_once_and_a_poor_one_after_it_is_d
     problem = wide_problem()
     engine, script = hybrid(problem, [[-1.0], [0.0], [-0.5]])
     judge = partial(evaluate, problem)
-    asked = drive(engine, judge, rounds=40)
-    assert course(asked) == "LSL" + 37 * "S"
+    assert course(drive(engine, judge, rounds=40)) == "LSL" + 37 * "S"
     assert len(script.notes) > 2, "it was asked again"
 
 

@@ -79,8 +79,7 @@ def test_a_random_change_is_small_repeatable_and_within_the_ranges() -> None:
 
 
 def test_an_llm_that_never_answers_validly_is_given_up() -> None:
-    problem = lag_problem()
-    engine = LLMEngine(problem, ScriptedChat(lambda _: "nothing"))
+    engine = LLMEngine(lag_problem(), ScriptedChat(lambda _: "nothing"))
     changed = [*engine.ask(), *engine.ask()]
     assert len({c.key for c in changed}) == 2
     assert changed[0].rationale.startswith("a random sample")

@@ -20,8 +20,7 @@ FULL = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
 
 
 def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> None:
-    problem = lag_problem()
-    found = evaluate(problem, FULL)
+    found = evaluate(lag_problem(), FULL)
     assert (found.status, found.reason, found.violated) == ("ok", "", True)
     # x(10) of x' = 1 - x by Euler with 0.1 s: 1 - 0.9**100
     assert found.robustness == pytest.approx(0.9 - (1 - 0.9**100))
@@ -113,8 +112,7 @@ class TestSimulate:
 
 def test_outputs_at_time_0_and_whether_they_depend_on_what_is_chosen() -> None:
     assert start_values(lag_problem()) == {"x": (0.0, 0.0)}
-    start = start_values(lag_problem(parameters=[START]))
-    assert start == {"x": (START.low, START.high)}
+    assert start_values(lag_problem(parameters=[START])) == {"x": (START.low, START.high)}
 
 
 def test_an_fmu_is_initialised_without_a_whole_simulation() -> None:

@@ -44,8 +44,7 @@ def test_every_type_goes_in_rounded_and_comes_out(name: str) -> None:
     model = isolated(name)
     model.close()
     inputs = {v.name: ramp(1.0, 3.0 if v.kind != "boolean" else 1.0) for v in model.info.inputs}
-    outputs = [v.name for v in model.info.outputs]
-    got = run(model, outputs, signals=inputs)
+    got = run(model, [v.name for v in model.info.outputs], signals=inputs)
     points = np.arange(10) * 0.1
     for variable in model.info.outputs:
         raw = 3.0 * points

@@ -150,8 +150,7 @@ def test_the_only_library_is_used_whatever_its_name_is() -> None:
         "its library is called plant_win_and_linux.so, not OtherLibrary.so; it is the only one, so it is "
         "used",
     )
-    model = isolated("OtherLibrary_2")
-    assert run(model, ("y",), signals=ONE)["y"][-1] > 0
+    assert run(isolated("OtherLibrary_2"), ("y",), signals=ONE)["y"][-1] > 0
 
 
 def test_of_several_libraries_none_is_guessed(tmp_path: Path) -> None:
@@ -180,13 +179,11 @@ def test_repeated_folder_entries_do_no_harm(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "a") as archive, pytest.warns(UserWarning, match="Duplicate name"):
         for _ in range(2):
             archive.writestr("resources/", b"")
-    model = FmuModel(path)
-    assert run(model, ("y",), signals=ONE)["y"][-1] > 0
+    assert run(FmuModel(path), ("y",), signals=ONE)["y"][-1] > 0
 
 
 def test_without_outputs_states_and_locals_are_observed() -> None:
-    info = read_info(fixtures.path("NoOutputs_2dymola"))
-    assert [v.name for v in info.observables] == ["x"]
+    assert [v.name for v in read_info(fixtures.path("NoOutputs_2dymola")).observables] == ["x"]
     problem = Problem.from_fmu(fixtures.path("NoOutputs_2dymola"), "G[0,10] (y <= 5)")
     candidate = problem.space.decode([10.0] * len(problem.space.dimensions), origin="test")
     assert list(candidate.signals) == ["u"]

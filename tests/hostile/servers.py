@@ -99,8 +99,7 @@ def completion(content: str, **usage: Any) -> bytes:
 def response(body: bytes, *, status: str = "200 OK", headers: str = "") -> bytes:
     """A whole HTTP response."""
     headers = f"content-type: application/json\r\ncontent-length: {len(body)}\r\n{headers}"
-    head = f"HTTP/1.1 {status}\r\n{headers}\r\n"
-    return head.encode() + body
+    return f"HTTP/1.1 {status}\r\n{headers}\r\n".encode() + body
 
 
 def sends(data: bytes) -> Behaviour:

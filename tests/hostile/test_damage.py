@@ -167,8 +167,7 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work_in_threads(monkeypatch)
-    wanted = request("hard", "impossible", seeds=2, budget=10)
-    run_campaign(wanted, tmp_path / "whole")
+    run_campaign(request("hard", "impossible", seeds=2, budget=10), tmp_path / "whole")
     random = Random(11)
     runs = sorted((tmp_path / "whole" / "runs").iterdir())
     for name in ("manifest.json", "journal.jsonl"):

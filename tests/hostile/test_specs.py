@@ -176,8 +176,7 @@ def without_attribute(content: bytes, random: Random) -> bytes:
 
 
 def larger(content: bytes, random: Random) -> bytes:
-    digits = [i for i, byte in enumerate(content) if 48 <= byte <= 57]
-    at = random.choice(digits)
+    at = random.choice([i for i, byte in enumerate(content) if 48 <= byte <= 57])
     return content[:at] + b"9" * random.choice((3, 12, 400)) + content[at:]
 
 

@@ -82,8 +82,7 @@ def test_plainer_ways_and_replies_that_are_too_long(server: str) -> None:
 
 
 def test_a_reply_that_the_server_cannot_parse_is_one_that_cannot_be_used(server: str) -> None:
-    not_utf8 = {str(FIRST_BYTE + 0xFF): 24.0}
-    ladder = chat(server, logit_bias=not_utf8)
+    ladder = chat(server, logit_bias={str(FIRST_BYTE + 0xFF): 24.0})
     replies = [ladder.complete(TEXT) for _ in range(2)]
     assert [reply.finish_reason for reply in replies] == [UNREADABLE, UNREADABLE]
     assert ladder.mode == "json_object"

@@ -178,8 +178,7 @@ WAIT, UP, DOWN = 1.0, 2.0, 3.0
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_items_are_described(build: Build, fmi: int) -> None:
-    info = read_info(build("Enumerated", fmi=fmi))
-    variables = {v.name: v for v in info.variables}
+    variables = {v.name: v for v in read_info(build("Enumerated", fmi=fmi)).variables}
     for name, start in (("command", WAIT), ("counted", UP), ("before", DOWN)):
         assert variables[name].kind == "enumeration"
         assert variables[name].literals == {"Wait": 1, "Up": 2, "Down": 3}

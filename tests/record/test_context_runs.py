@@ -35,8 +35,7 @@ def test_a_model_that_reads_the_thresholds_falsifies_at_once(file: Path) -> None
 
 def test_without_context_it_finds_nothing_to_aim_at() -> None:
     chat = ScriptedChat(limp_home.reads_thresholds)
-    result = falsify("HeaterLimpHome", llm=chat, budget=1)
-    assert result.status == "not falsified"
+    assert falsify("HeaterLimpHome", llm=chat, budget=1).status == "not falsified"
     assert "6.8" not in chat.requests[0].messages[0].content
 
 
@@ -52,8 +51,7 @@ def test_context_stands_in_the_part_that_does_not_change(file: Path) -> None:
 def test_a_resumed_run_needs_no_file(file: Path, tmp_path: Path) -> None:
     place = tmp_path / "run"
     falsify(with_file(file), llm=ScriptedChat([limp_home.answer([0.0], [0.0])]), budget=1, directory=place)
-    recorded = manifest.read(place).contexts["HeaterLimpHome"]
-    assert recorded.excerpts[0].path == str(file)
+    assert manifest.read(place).contexts["HeaterLimpHome"].excerpts[0].path == str(file)
     file.unlink()
     (result,) = resume(place, chat=ScriptedChat(limp_home.reads_thresholds), budget=2)
     assert (result.status, result.spent.simulations) == ("falsified", 2)

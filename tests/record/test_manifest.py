@@ -49,7 +49,6 @@ def test_one_requirement_of_several_is_a_manifest_of_its_own() -> None:
 
 
 def test_a_key_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    content = DESCRIBED.model_dump(mode="json") | {"stop_time": "late"}
-    write_manifest(tmp_path, content)
+    write_manifest(tmp_path, DESCRIBED.model_dump(mode="json") | {"stop_time": "late"})
     with pytest.raises(JournalError, match="stop_time"):
         manifest.read(tmp_path)

@@ -77,8 +77,7 @@ def test_the_time_of_a_run_that_was_killed_counts(tmp_path: Path, monkeypatch: p
     problem = lag_problem("G[0,10] (x <= 2)")
     run(problem, tmp_path, budget=5)
     journal = tmp_path / "journal.jsonl"
-    lines = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join(lines[:-1]))
+    journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
     last = read_journal(tmp_path)[-1]
     assert isinstance(last, EvaluatedRecord) and last.elapsed > 100.0
     (resumed,) = resume(tmp_path, problems=[problem], budget=Budget(8, seconds=100.0))

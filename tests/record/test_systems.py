@@ -48,8 +48,7 @@ def spec(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) -> None:
     problem = load_problem("loop.toml")
     assert "plant.u uses the values of the previous communication point" in problem.notes[0]
-    found = falsify(problem, engine="corners", budget=5, directory=tmp_path / "run")
-    assert found.falsified
+    assert falsify(problem, engine="corners", budget=5, directory=tmp_path / "run").falsified
     assert "half the communication step (0.05 s)" in load_counterexample(tmp_path / "run").reason
     hashes = json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]
     assert sorted(Path(p).name for p in hashes) == ["Gain_2.fmu", "Plant_2.fmu", "loop.toml"]
@@ -118,11 +117,9 @@ def test_a_package_is_a_model_wherever_an_fmu_is(tmp_path: Path, monkeypatch: py
     assert isinstance(coupled.model, System) and coupled.model.coupling.method == "jacobi"
     assert coupled.experiment.stop_time == 2.0
     problem = load_problem("loop.ssp", stl="G[0,2] (plant.y <= 1.0)", inputs={"pi.r": (0.0, 2.0, 3)})
-    result = falsify(problem, engine="corners", budget=2, directory=tmp_path / "run")
-    assert result.falsified
+    assert falsify(problem, engine="corners", budget=2, directory=tmp_path / "run").falsified
     assert list(json.loads((tmp_path / "run" / "manifest.json").read_text())["hashes"]) == ["loop.ssp"]
-    stored = load_counterexample(tmp_path / "run")
-    assert replay(stored, problem).status == "violates"
+    assert replay(load_counterexample(tmp_path / "run"), problem).status == "violates"
     write(tmp_path / "loop.ssp", ssd.replace('"root"', '"other"'), "Plant_2", "Gain_2")
     with pytest.raises(JournalError, match=r"loop\.ssp has changed since the start"):
         resume(tmp_path / "run")

@@ -100,8 +100,7 @@ def test_a_search_is_called_free_if_its_engine_or_prompt_offers_control_points()
 def test_an_input_that_only_a_free_parameterization_has_is_found_without_further_options() -> None:
     started: list[Event] = []
     problem = Problem.from_fmu(fmu_path("Lag_2"), FAST, inputs={"u": (-1, 1)}, stop_time=10.0)
-    result = falsify(problem, budget=20, listeners=[started.append])
-    assert result.falsified
+    assert falsify(problem, budget=20, listeners=[started.append]).falsified
     assert isinstance(started[0], RunStarted)
     assert parameterization_of(started[0].searched) == "free"
     five = Problem.from_fmu(fmu_path("Lag_2"), FAST, inputs={"u": (-1, 1, 5)}, stop_time=10.0)

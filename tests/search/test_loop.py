@@ -59,8 +59,7 @@ def test_uses_the_budget_up_and_says_so() -> None:
 
 
 def test_only_values_within_the_models_limits_are_searched() -> None:
-    problem = lag_problem()
-    wide = replace(problem, space=SearchSpace((InputRange("u", -50, 1),), (), 10.0))
+    wide = replace(lag_problem(), space=SearchSpace((InputRange("u", -50, 1),), (), 10.0))
     with pytest.raises(SpecError, match=r"LAG: .* exceeds the model's limits for 'u', .*; narrow the range"):
         run(wide, budget=1)
     with pytest.raises(SpecError, match="narrow the range"):

@@ -95,8 +95,7 @@ def test_a_condition_exactly_on_its_limit_is_true_if_its_comparison_says_so() ->
 
 
 def test_only_the_times_at_which_an_implication_is_asked_count() -> None:
-    found = diagnose("G[1,2] (x >= 3 -> y <= 4)", x=[9.0, 1.0, 1.0, 9.0], y=[9.0] * 4)
-    assert found.vacuous
+    assert diagnose("G[1,2] (x >= 3 -> y <= 4)", x=[9.0, 1.0, 1.0, 9.0], y=[9.0] * 4).vacuous
     single = diagnose("(G[0,1] (x <= 3)) -> y <= 4", x=[1.0, 4.0], y=[9.0, 9.0])
     assert single.vacuities[0].text == (
         "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its condition was not true; "

@@ -73,5 +73,4 @@ def test_idle_and_full_brake() -> None:
     idle = driven({"throttle": [0, 0], "brake": [0, 0]})
     assert idle["speed"][[100, 500, 1000, 5000]] == pytest.approx([1.7038, 4.7211, 5.2456, 5.2787], abs=1e-3)
     assert idle["rpm"][1000:] == pytest.approx(np.full(4001, 600.0), abs=1e-6)
-    stopped = driven({"throttle": [0, 0], "brake": [325, 325]})
-    assert np.abs(stopped["speed"]).max() < 0.16
+    assert np.abs(driven({"throttle": [0, 0], "brake": [325, 325]})["speed"]).max() < 0.16

@@ -46,8 +46,7 @@ def diagram_thresholds(diagram: Diagram, only: Collection[BlockPath] | None = No
             }
             if block.is_off or (only is not None and place not in only):
                 continue
-            shown = f"{diagram.name}/{'/'.join(place)}"
-            yield from thresholds(_compared(block, inputs), {}, shown)
+            yield from thresholds(_compared(block, inputs), {}, f"{diagram.name}/{'/'.join(place)}")
     for chart in diagram.charts:
         place = tuple(chart.name.split("/"))
         if only is None or place in only:

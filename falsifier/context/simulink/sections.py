@@ -166,8 +166,7 @@ class ModelPackage:
         beside = [name for name in (_DEFAULTS, _STATEFLOW) if name in self._parts]
         for name in (*beside, *sorted(name for name in self._parts if name.startswith(_SETTINGS))):
             root = self._root(name)
-            is_group = root.kind in ("BlockDiagramDefaults", "ModelInformation")
-            found += root.children if is_group else (root,)
+            found += root.children if root.kind in ("BlockDiagramDefaults", "ModelInformation") else (root,)
         reached = {node.get("id") for top in found for node in top.walk() if node.kind == "chart"}
         charts = (self._root(name) for name in sorted(self._parts) if name.startswith(f"{_CHARTS}chart"))
         return Node("file", {}, (*found, *(chart for chart in charts if chart.get("id") not in reached)))
@@ -176,8 +175,7 @@ class ModelPackage:
         """Return the root section of a part with all that it refers to."""
         if name not in self._parts:
             raise SpecError(f"{self._shown}: the part {name} is missing; save the model again")
-        element = read_xml(self._parts[name], f"{self._shown}: {name}", SpecError)
-        return self._node(element, (*within, name))
+        return self._node(read_xml(self._parts[name], f"{self._shown}: {name}", SpecError), (*within, name))
 
     def _node(self, element: Element, within: tuple[str, ...]) -> Node:
         self._sections += 1

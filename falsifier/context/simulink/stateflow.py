@@ -77,8 +77,7 @@ def _chart(node: Node, items: list[_Item]) -> Chart:
 def _full_name(key: str, states: Mapping[str, _Item]) -> str:
     names: list[str] = []
     while key in states and len(names) <= _MAX_NESTING:
-        first = states[key].node.get("labelString", "name").strip().split("\n")[0]
-        names.append(first.strip().rstrip("/"))
+        names.append(states[key].node.get("labelString", "name").strip().split("\n")[0].strip().rstrip("/"))
         key = states[key].parent
     return ".".join(reversed(names))
 

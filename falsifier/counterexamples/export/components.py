@@ -56,11 +56,14 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
     system, experiment = problem.model, problem.experiment
     assert isinstance(system, System), "only systems have components"
     network = system.network
+    # What is omitted may be NaN; what is connected is not.
+    kept = {*experiment.outputs, *(network.title(link.source) for link in network.links)}
     places = [
         Place(k, variable.name)
         for k, member in enumerate(network.members)
         for variable in (*member.description.info.inputs, *member.description.info.outputs)
         if variable.kind != "string"
+        and (variable.causality == "input" or network.title(Place(k, variable.name)) in kept)
     ]
     step = experiment.stop_time / round(experiment.stop_time / experiment.step)
     recorded = system.simulate(
@@ -96,7 +99,8 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
 def _seen(network: Network, position: int, recorded: Trajectory) -> tuple[InputTable, InputTable]:
     """Return the inputs that a component had over each of its steps, and its outputs at their ends.
 
-    ``recorded`` has all inputs and outputs of all components at all communication points.
+    ``recorded`` has all inputs of all components, and their outputs that are not omitted, at all
+    communication points.
     """
     member = network.members[position]
     every = 1 if member.step is None else round(member.step / recorded.step)
@@ -119,8 +123,8 @@ def _seen(network: Network, position: int, recorded: Trajectory) -> tuple[InputT
                 first = column[ends] - link.factor * _slope(network, link, recorded, starts, ends) * length
         inputs[variable.name] = np.stack((first, column[ends]), axis=1).ravel()
     for variable in member.description.info.outputs:
-        if variable.kind != "string":
-            outputs[variable.name] = recorded[network.title(Place(position, variable.name))][at]
+        if (title := network.title(Place(position, variable.name))) in recorded.names:
+            outputs[variable.name] = recorded[title][at]
     times = recorded.times
     grid = np.stack((times[starts], times[ends]), axis=1).ravel()
     return InputTable(grid, inputs), InputTable(times[at], outputs)
@@ -153,12 +157,14 @@ def _spec(member: Member, outputs: InputTable, start: Mapping[str, float | str],
         tomlkit.comment(f"The component {one_line(member.name)} alone, with what it saw in the system:")
     )
     document.add(tomlkit.comment(f"    falsifier simulate {file_name(member.name)}.toml --inputs input.csv"))
+    numbers = [v.name for v in member.description.info.outputs if v.kind != "string"]
     model = {
         "fmu": member.path.name,
         "interface": member.interface,
         "stop_time": float(outputs.times[-1]),
         "output_interval": float(outputs.times[1]),
         "tolerance": problem.experiment.tolerance,
+        "omit": [name for name in numbers if name not in outputs.columns] or None,
         "allow": list(getattr(problem.model, "allow", ())) or None,
         "deny": list(getattr(problem.model, "deny", ())) or None,
     }

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -79,7 +80,10 @@ def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.f
     constant = np.ones(table.times.shape)
     return {
         declared: [
-            table.columns[e] if e in table.columns else constant * (model.info[e].start_number or 0.0)
+            table.columns[e]
+            if e in table.columns  # of outputs, all but those that are omitted
+            else constant
+            * (nan if model.info[e].causality == "output" else model.info[e].start_number or 0.0)
             for e in elements
         ]
         for declared, elements in _by_declaration(model, table.columns).items()
@@ -91,9 +95,12 @@ def write_csv(table: InputTable, path: Path, model: Model) -> Path:
 
     Arrays of the FMU are one column each, with a space between two elements.
     """
-    columns = {"time": [table.times], **file_columns(table, model)}
-    lines = [",".join('"' + csv_cell(name).replace('"', '""') + '"' for name in columns)]
-    cells = [np.stack(column, axis=1).tolist() for column in columns.values()]
+    columns = [
+        ("time", [table.times]),
+        *file_columns(table, model).items(),
+    ]  # an input may be named time, too
+    lines = [",".join('"' + csv_cell(name).replace('"', '""') + '"' for name, _ in columns)]
+    cells = [np.stack(column, axis=1).tolist() for _, column in columns]
     lines += [",".join(" ".join(map(repr, cell)) for cell in row) for row in zip(*cells, strict=True)]
     return write_whole(path, "\n".join(lines) + "\n")
 

@@ -124,8 +124,7 @@ class Ladder:
 
 def _span(rng: np.random.Generator, time: float) -> float:
     """Draw how much in s of what was done before a time is done again."""
-    is_all = rng.random() < _FROM_START
-    return time if is_all else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
+    return time if rng.random() < _FROM_START else time * float(np.exp(rng.uniform(np.log(_SHORTEST), 0.0)))
 
 
 def _margin(predicate: Predicate, columns: Mapping[str, Any]) -> Array:

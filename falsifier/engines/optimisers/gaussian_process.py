@@ -37,8 +37,7 @@ class GaussianProcess:
         """Return mean and standard deviation, shape (m,) each, at points, shape (m, d)."""
         cross = _correlation(points / self.lengths, self.points / self.lengths)
         explained = solve_triangular(self.factor, cross.T, lower=True)
-        variance = 1.0 - (explained**2).sum(axis=0)
-        return cross @ self.weights, np.sqrt(np.maximum(variance, 1e-12))
+        return cross @ self.weights, np.sqrt(np.maximum(1.0 - (explained**2).sum(axis=0), 1e-12))
 
 
 def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProcess:

@@ -118,8 +118,7 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except UNREADABLE as error:
-            again = "; copy or export the FMU again"
-            raise _damaged(f"{path}: {name} is damaged", error, again) from error
+            raise _damaged(f"{path}: {name} is damaged", error, "; copy or export the FMU again") from error
 
 
 def extract(path: Path, folder: Path) -> None:

@@ -177,8 +177,7 @@ def read_told(data: bytes) -> Told:
                 advice = _advice(f"write:{Path(path).parent}")
                 refused.append(f"tried to change {path}, which was refused; {advice}")
             case b"x":
-                advice = _advice(_PROGRAMS_WORD)
-                refused.append(f"tried to execute {path}, which was refused; {advice}")
+                refused.append(f"tried to execute {path}, which was refused; {_advice(_PROGRAMS_WORD)}")
             case b"s":
                 refused.append("tried to signal another process, which was refused")
             case b"p":

@@ -170,8 +170,7 @@ def _clock(view: View, time: float) -> str:
 
 def _clock_decimals(formula: Formula) -> int:
     limits = (shortest(limit) for window in formula.windows for limit in (window.start, window.end))
-    found = max((len(limit.partition(".")[2]) for limit in limits), default=0)
-    return min(found, _MOST_CLOCK_DECIMALS) or 1
+    return min(max((len(limit.partition(".")[2]) for limit in limits), default=0), _MOST_CLOCK_DECIMALS) or 1
 
 
 def _output(value: float) -> str:

@@ -270,8 +270,7 @@ class Questions:
         reason = shortened(" ".join(why.split()), _LONGEST_WHY)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
-            failure = f"no verdict, the simulation {evaluation.outcome}".rstrip(": ")
-            text = _text(inputs, failure, *notes)
+            text = _text(inputs, f"no verdict, the simulation {evaluation.outcome}".rstrip(": "), *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()

@@ -105,8 +105,7 @@ def _heat(ax: "Axes", xs: NDArray[np.float64], ys: NDArray[np.float64], counts: 
 
     colours = colormaps["Blues"].with_extremes(under=_NEVER)
     # From below 0: a single simulation must be told from the white of the paper.
-    largest = max(1.0, float(counts.max(initial=0)))
-    shown = np.where(counts > 0, counts / largest + 0.3, -1.0)
+    shown = np.where(counts > 0, counts / max(1.0, float(counts.max(initial=0))) + 0.3, -1.0)
     ax.pcolormesh(xs, ys, shown, cmap=colours, vmin=0.0, vmax=1.3, edgecolors="white", linewidth=0.3)
 
 

@@ -93,9 +93,9 @@ def input_table(shown: Shown) -> Table:
     header, columns = ["time [s]"], []
     for name, signal in signals.items():
         header.append(f"{with_unit(name, shown.units.get(name, ''))}, {_course(signal)}")
-        columns.append({time: f"{v:.6g}" for time, v in zip(signal.times, signal.values, strict=True)})
+        columns.append({time: f"{v:.10g}" for time, v in zip(signal.times, signal.values, strict=True)})
     times = sorted({time for column in columns for time in column})
-    rows = [(f"{time:.6g}", *(column.get(time, "") for column in columns)) for time in times]
+    rows = [(f"{time:.10g}", *(column.get(time, "") for column in columns)) for time in times]
     return Table("Inputs", tuple(header), tuple(rows))
 
 

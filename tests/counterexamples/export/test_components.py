@@ -105,6 +105,21 @@ def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> N
     assert alone.requirement.formula.signals == (odd["y"],)
 
 
+def test_what_is_omitted_is_not_recorded_for_a_component_alone_either(tmp_path: Path) -> None:
+    whole = Problem.from_fmu(
+        System({"plant": path("Plant_2"), "echo": path("Echo_2")}, {"echo.in_Real": "plant.y"}),
+        "G (plant.y <= 10)",
+        inputs={"plant.u": (0.0, 2.0)},
+        stop_time=1.0,
+        output_interval=0.1,
+        omit=["echo.out_Real"],
+    )
+    write_components(whole, Candidate({"plant.u": Signal((0.0,), (1.0,))}), tmp_path)
+    assert "out_Real" not in recorded(tmp_path / FOLDER / "echo" / "outputs.csv")
+    spec = ProblemSource(target=str(tmp_path / FOLDER / "echo" / "echo.toml"))
+    assert "out_Real" not in load_source(spec, searches=False).experiment.outputs
+
+
 def again(model: System, tmp_path: Path, resources: dict[str, Path] | None = None) -> System:
     return read_package(write_package(model, 3.0, resources or {}, tmp_path / "again.ssp"))
 

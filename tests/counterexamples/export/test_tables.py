@@ -78,6 +78,12 @@ def test_the_csv_reads_back_exactly(tmp_path: Path) -> None:
     ]
 
 
+def test_an_input_named_time_does_not_replace_the_times(tmp_path: Path) -> None:
+    table = InputTable(np.array([0.0, 10.0]), {"time": np.array([0.5, 0.5])})
+    path = write_csv(table, tmp_path / "i.csv", lag_problem().model)
+    assert path.read_text() == '"time","time"\n0.0,0.5\n10.0,0.5\n'
+
+
 def test_steps_stand_where_the_simulation_set_them() -> None:
     problem = load_problem("AT1")
     candidate = problem.space.admit(

@@ -25,8 +25,7 @@ TENTH = 360
 def test_a_sequence_that_robustness_does_not_show_is_found_step_by_step(
     free: Freedom | None, seed: int
 ) -> None:
-    result = falsify(lock_problem(free=free), "coverage", seed=seed, budget=TENTH)
-    assert result.falsified
+    assert falsify(lock_problem(free=free), "coverage", seed=seed, budget=TENTH).falsified
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -85,8 +84,7 @@ def test_a_signal_that_chatters_does_not_hide_the_others() -> None:
 
 
 def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
-    problem = lag_problem("G[0,10] (x <= 0.9)")
-    marker = Marker(problem)
+    marker = Marker(lag_problem("G[0,10] (x <= 0.9)"))
     times = np.linspace(0.0, 10.0, 101)
 
     def found(scale: float) -> set[Mark]:
@@ -162,8 +160,7 @@ def test_the_way_to_a_step_returns_after_each_try() -> None:
 
 
 def test_discrete_inputs_take_their_values_only() -> None:
-    layout = planning_layout(lock_problem(free=Freedom(100, 0.1)).space, GRID)
-    programs = Programs(layout)
+    programs = Programs(planning_layout(lock_problem(free=Freedom(100, 0.1)).space, GRID))
     point = programs.fresh(drawn(1))
     for seed in range(50):
         point = programs.another_end(drawn(seed), point, 2.0)

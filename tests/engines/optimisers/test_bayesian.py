@@ -76,7 +76,6 @@ def test_two_conditions_of_different_size_are_met_at_once() -> None:
 
 
 def test_the_trust_region_starts_again_where_nothing_improves() -> None:
-    problem = parameters_problem("real", 2)
-    asked = drive(Bayesian(problem, seed=0), flat, rounds=60)
+    asked = drive(Bayesian(parameters_problem("real", 2), seed=0), flat, rounds=60)
     starts = [i for i, c in enumerate(asked) if c.rationale.startswith("a new start")]
     assert max(starts) > 20 and len(starts) < 30

@@ -24,8 +24,7 @@ def test_in_a_known_valley_optuna_does_not_ask_for_the_same_place_several_times_
     for _ in range(20):
         engine.tell([bowl(problem, *engine.ask())])
     batch = np.array([problem.space.encode(c) for c in engine.ask(4)])
-    distances = np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)]
-    assert distances.min() > 5e-3
+    assert np.linalg.norm(batch[:, None] - batch, axis=2)[np.triu_indices(4, 1)].min() > 5e-3
 
 
 def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() -> None:
@@ -43,8 +42,7 @@ def test_a_generation_is_complete_before_the_next_one_and_the_wait_is_bridged() 
 
 
 def test_the_evolution_strategy_restarts_on_a_plateau() -> None:
-    problem = box_problem()
-    engine = make_engine("cma", problem, seed=0)
+    engine = make_engine("cma", box_problem(), seed=0)
     generations = {int(c.rationale.split()[1]) for c in drive(engine, flat, rounds=100)}
     assert generations == {1}, "a plateau ends a start after its first generation"
 

@@ -26,8 +26,7 @@ def test_the_best_are_changed_before_the_time_that_decided() -> None:
         point, why = propose_change(layout, points, costs, decided, rng, risk=no_risk, draws=1)
         if why.startswith("random"):
             continue
-        same = (np.abs(points - point) < 1e-9).mean(axis=1)
-        parents.append(int(np.argmax(same)))
+        parents.append(int(np.argmax((np.abs(points - point) < 1e-9).mean(axis=1))))
         changes = np.abs(point - points[parents[-1]]) > 1e-9
         assert changes[layout.starts <= 3.0].any(), "a later change alone cannot lower it"
     assert parents.count(0) > 0.5 * len(parents)
@@ -64,5 +63,4 @@ def test_switching_inputs_stay_at_a_bound_for_the_dwell() -> None:
     for _ in range(10):
         point = switching(layout_of(), rng, 2.0)
         assert set(point[:-1].tolist()) <= {0.0, 1.0}
-        changes = np.flatnonzero(np.diff(point[:-1]))
-        assert (np.diff(changes) >= 19).all(), "20 cells are 2 s"
+        assert (np.diff(np.flatnonzero(np.diff(point[:-1]))) >= 19).all(), "20 cells are 2 s"

@@ -36,8 +36,7 @@ def test_agrees_with_fmpy(name: str) -> None:
         if variable.name not in scalars:
             continue
         twin = scalars[variable.name]
-        slot = description.slots[variable.name]
-        assert slot.reference == twin.valueReference
+        assert description.slots[variable.name].reference == twin.valueReference
         assert variable.unit == ("" if twin.unit == "1" else twin.unit or "")
         assert variable.description == (twin.description or "")
         assert variable.display_unit == (twin.displayUnit or "")

@@ -68,8 +68,7 @@ def test_misdeeds_are_failed_simulations(misdeeds: FmuModel, misdeed: int, statu
 @pytest.mark.parametrize("name", ["Misdeeds_1cs", "Misdeeds_3"])
 @pytest.mark.parametrize(("misdeed", "status"), [(CRASH, "crashed"), (DISCARD, "failed"), (END, "failed")])
 def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
-    model = isolated(name)
-    assert commit(model, misdeed).status == status
+    assert commit(isolated(name), misdeed).status == status
 
 
 @pytest.mark.parametrize("name", ["Misdeeds_2", "Misdeeds_3"])

@@ -158,7 +158,6 @@ def test_a_library_that_is_none_is_refused(tmp_path: Path) -> None:
     broken = tmp_path / "broken.fmu"
     with zipfile.ZipFile(FOLDER / "Lag_2.fmu") as good, zipfile.ZipFile(broken, "w") as archive:
         for name in good.namelist():
-            data = good.read(name)
-            archive.writestr(name, b"nothing" if name.endswith(".dll") else data)
+            archive.writestr(name, b"nothing" if name.endswith(".dll") else good.read(name))
     with pytest.raises(ModelError, match="the library cannot be loaded: it is not a 64-bit library"):
         run(FmuModel(broken), ("y",))

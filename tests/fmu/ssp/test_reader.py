@@ -106,8 +106,7 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     model = read_package(
         write(tmp_path / "fan.ssp", structure(system(PI + second, wires, before=port)), "Gain_2")
     )
-    ramp = Signal((0.0, 1.0), (0.0, 1.0), "linear")
-    found = run(model, "pi.y", "pj.y", signals={"r": ramp})
+    found = run(model, "pi.y", "pj.y", signals={"r": Signal((0.0, 1.0), (0.0, 1.0), "linear")})
     np.testing.assert_array_equal(found["pi.y"], found["pj.y"])
     np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
 

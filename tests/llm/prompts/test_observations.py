@@ -70,8 +70,7 @@ def test_of_a_predicate_it_is_told_when_it_was_false(limit: str, told: str) -> N
 
 def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     lines = facts(*seen("G[0,10] (x <= 11) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy()))
-    conjuncts = line(lines, "conjuncts at t = 0 s: ")
-    assert "G[0,10] (x <= 11) robustness +1 m" in conjuncts
+    assert "G[0,10] (x <= 11) robustness +1 m" in line(lines, "conjuncts at t = 0 s: ")
     assert not [each for each in lines if each.startswith("alternatives")], "the way led to the other side"
     lines = facts(*seen("G[0,10] (x <= 99) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy()))
     assert "robustness -1 V" in line(lines, "alternatives at t = 0 s: ")

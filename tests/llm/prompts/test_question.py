@@ -55,8 +55,7 @@ def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
     problem = transmission("AT51")[0]
     rng = np.random.default_rng(2)
     low, high = problem.space.bounds.T
-    points = low + rng.random((24, len(low))) * (high - low)
-    evaluations = sampled(problem, *points)
+    evaluations = sampled(problem, *(low + rng.random((24, len(low))) * (high - low)))
     questions = Questions(View.of(problem), VARIANTS["MP5"])
     kept, before = [], ""
     for evaluation in evaluations:
@@ -83,8 +82,7 @@ def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPat
 
 def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 2600)
-    points = np.random.default_rng(3).uniform(-1, 1, (40, 5))
-    evaluations = sampled(PROBLEM, *points)
+    evaluations = sampled(PROBLEM, *np.random.default_rng(3).uniform(-1, 1, (40, 5)))
     evaluations.sort(key=lambda e: e.robustness or 0.0)
     order = [*range(10, 25), 2, 0, 1, *range(25, 40), *range(3, 10)]  # the best in the middle
     last = asked_each(PROBLEM, [evaluations[n] for n in order])[-1].content

@@ -27,8 +27,7 @@ def standing(problem: Any, variant: str = "MP5", **more: Any) -> str:
 
 
 def test_variants_only_add_parts_up_to_mp4() -> None:
-    parts = [VARIANTS[f"MP{i}"].parts for i in range(1, 5)]
-    assert all(a < b for a, b in pairwise(parts))
+    assert all(a < b for a, b in pairwise([VARIANTS[f"MP{i}"].parts for i in range(1, 5)]))
     assert variant_named("mp3").name == "MP3"
     assert variant_named(None).name == DEFAULT_VARIANT
     assert variant_named(None, has_context=True).name == "MP6"

@@ -5,6 +5,7 @@ from base64 import b64decode
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -12,9 +13,12 @@ import pytest
 
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.core.candidate import Candidate
+from falsifier.core.signals import Signal
+from falsifier.core.words import signal_text
 from falsifier.record.run import falsify
 from falsifier.testing import START, lag_problem
 from falsifier.views.report import html_report
+from falsifier.views.report.wording import input_table
 from tests.pages import content, every, parse
 from tests.problems import easy, hard
 from tests.searches import Wrapped
@@ -104,6 +108,13 @@ def test_inputs_are_a_table_of_their_control_points(tmp_path: Path) -> None:
     assert "x0" in [content(e) for e in every(card, "dt")]
     assert "values then" in [content(e) for e in every(card, "dt")]
     assert re.search(r"x = [\d.]+ m, u = [-\d.]+ V", content(card)), "values have units"
+
+
+def test_numbers_to_enter_are_not_rounded_to_six_digits() -> None:
+    u = Signal((0.0, 43215.25), (2147483647.0, 1 / 3), "constant")
+    shown = SimpleNamespace(candidate=Candidate({"u": u}), units={})
+    assert input_table(shown).rows == (("0", "2147483647"), ("43215.25", "0.3333333333"))  # type: ignore[arg-type]
+    assert signal_text(Signal((0.0,), (2147483647.0,))) == "constant 2147483647"
 
 
 def test_what_was_tried_and_what_was_not_tested_is_told_where_nothing_was_found(page: Element) -> None:
