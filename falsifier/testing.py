@@ -141,8 +141,7 @@ class EngineContract:
         for problem in self.problems():
             engine = self.make(problem, seed=1)
             for candidate in drive(engine, partial(evaluate, problem), rounds=self.rounds):
-                admitted = problem.space.admit(candidate)
-                assert admitted.key == candidate.key
+                assert problem.space.admit(candidate).key == candidate.key
                 assert candidate.origin and candidate.rationale
 
     def test_deterministic_for_a_seed(self) -> None:
@@ -192,8 +191,7 @@ class EngineContract:
             return judge(candidate) if count % 2 else Evaluation(candidate, "failed", reason="diverged")
 
         for failing in (half_failing, lambda c: Evaluation(c, "timeout", reason="too slow")):
-            engine = self.make(problem, seed=7)
-            assert len(drive(engine, failing, rounds=self.rounds)) == self.rounds
+            assert len(drive(self.make(problem, seed=7), failing, rounds=self.rounds)) == self.rounds
 
     def test_survives_a_plateau(self) -> None:
         """If every candidate has the same robustness, the engine does not repeat one candidate."""

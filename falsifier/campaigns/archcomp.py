@@ -239,8 +239,7 @@ def _sampled(signals: Mapping[str, Signal], stop_time: float) -> Matrix:
     times = np.unique([t for signal in signals.values() for t in signal.times])
     coarse = all(s.interpolation == "constant" and s.hold is None for s in signals.values())
     if not coarse or (len(times) > 1 and np.diff(times).min() < _COARSE):
-        holds = [s.hold for s in signals.values() if s.hold is not None]
-        step = min([_DENSE_STEP, *holds])
+        step = min([_DENSE_STEP, *(s.hold for s in signals.values() if s.hold is not None)])
         times = np.linspace(0.0, stop_time, round(stop_time / step) + 1)
     return np.column_stack([times, *(signal.sample(times) for signal in signals.values())])
 

@@ -105,8 +105,7 @@ def _is_running(pid: int) -> bool:
 
 def cache_directory() -> Path:
     """Return this tool's directory in the user's cache directory."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "falsifier"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "falsifier"
 
 
 def private_folder(folder: Path) -> Path | None:

@@ -44,8 +44,7 @@ class TimeGrid:
         horizon = min(horizon, stop_time) if horizon > 0 else stop_time
         count = max(1, min(cells, round(horizon / interval)))
         step = horizon / count
-        rest = int(stop_time / step + 1e-6)
-        return cls(step, count, max(count, min(rest, _MAX_HORIZONS * count)))
+        return cls(step, count, max(count, min(int(stop_time / step + 1e-6), _MAX_HORIZONS * count)))
 
     @property
     def middles(self) -> Array:
@@ -212,5 +211,4 @@ def _read(coding: Coding, values: Array, at: Array) -> Array:
         return values @ np.stack([np.interp(at, knots, row) for row in np.eye(len(knots))])
     from scipy.interpolate import PchipInterpolator
 
-    curves = PchipInterpolator(knots, values, axis=1)(at)
-    return np.asarray(np.clip(curves, 0.0, 1.0))
+    return np.asarray(np.clip(PchipInterpolator(knots, values, axis=1)(at), 0.0, 1.0))

@@ -144,8 +144,7 @@ def simulate(
             raise CandidateError(f"the model has no input {name!r}; {did_you_mean(str(name), known)}")
     for name in values:
         if name not in settable:
-            others = [other for other in (*known, *settable) if other != name]
-            near = did_you_mean(str(name), others)
+            near = did_you_mean(str(name), [other for other in (*known, *settable) if other != name])
             raise CandidateError(f"the model has no parameter {name!r} to set; {near}")
     signals = {name: _signal(info[name], given) for name, given in driven.items()}
     fixed = {name: value for name, value in problem.parameters.items() if name not in signals}

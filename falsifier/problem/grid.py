@@ -65,8 +65,7 @@ def choose_grid(
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
     common = _common(stop, *named)
     wanted = exact(fmu_step) if fmu_step and fmu_step <= stop_time else stop / _DEFAULT_INTERVALS
-    count = _count(common, wanted, exact(step_size) if step_size else None)
-    interval = common / count
+    interval = common / _count(common, wanted, exact(step_size) if step_size else None)
     finest = min(wanted, stop / _MAX_INTERVALS)
     if interval < finest:
         rounded = stop / _DEFAULT_INTERVALS

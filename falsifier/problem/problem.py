@@ -143,8 +143,7 @@ class Problem:
         context = texts("context", context)
         expected = "the path of an FMU or SSP package, or a System"
         model = fmu if isinstance(fmu, System) else path_of("fmu", fmu, expected)
-        joined = join_formula(model, requirement_of(stl), changes=changes, name=name)
-        problem = Problem.of(joined)
+        problem = Problem.of(join_formula(model, requirement_of(stl), changes=changes, name=name))
         source = None
         if not isinstance(fmu, System):
             source = ProblemSource(target=str(fmu), stl=stl, stl_name=name, changes=changes, context=context)

@@ -254,8 +254,7 @@ class _Loop:
                 spent=self.clock(),
             )
         )
-        waits = self.steps.start(state.problem, candidates)
-        self.waiting.extend((state, wait) for wait in waits)
+        self.waiting.extend((state, wait) for wait in self.steps.start(state.problem, candidates))
 
     def settle(
         self, asked: RequirementState, wait: Callable[[], Evaluation], standing: Sequence[RequirementState]

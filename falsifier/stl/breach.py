@@ -89,8 +89,7 @@ class Breach:
 
 def find_breach(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Breach:
     """Return what broke on a trajectory on which a formula has a negative value at time 0."""
-    whole = _Demand.of(root, wanted=True)
-    return Breach(tuple(_Search(buffer, trajectory).at(whole, _Spot(0))))
+    return Breach(tuple(_Search(buffer, trajectory).at(_Demand.of(root, wanted=True), _Spot(0))))
 
 
 class _Demand(NamedTuple):

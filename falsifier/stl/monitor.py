@@ -167,8 +167,7 @@ class Monitor:
         part = self.formula if part is None else part
         last = self.samples - 1 - round(part.horizon(self.step) / self.step)
         program = compile_formula(part, step=self.step, samples=self.samples, last=last)
-        buffer = fill(program, trajectory, np.empty(program.size))
-        return program.root.over(buffer, 0, last).copy()
+        return program.root.over(fill(program, trajectory, np.empty(program.size)), 0, last).copy()
 
     def courses(self, trajectory: Trajectory) -> dict[Formula, NDArray[np.float64]]:
         """Return the robustness over time of every distinct sub-formula, where it matters to that at time 0.

@@ -219,8 +219,7 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
         buffer[i * n : (i + 1) * n] = column.T
     if _run(program, buffer, n * len(used)):
         for which in range(count):  # the first one with a problem is named
-            alone = np.array(buffer[:, which])
-            problem = _run(program, alone, n * len(used))
+            problem = _run(program, np.array(buffer[:, which]), n * len(used))
             if problem:
                 raise MonitorError(f"trajectory {which}: {problem}")
     return np.array(buffer[program.root.location.at(0)])

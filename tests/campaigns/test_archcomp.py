@@ -43,8 +43,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
     assert [f.holds for f in findings] == [True] * 4
     for finding in findings:
         assert finding.robustness == pytest.approx(finding.row.robustness, abs=1e-6)
-        steps = np.diff(finding.row.input[:, 0])
-        assert steps == pytest.approx(0.05)
+        assert np.diff(finding.row.input[:, 0]) == pytest.approx(0.05)
 
 
 @pytest.mark.usefixtures("small")

@@ -85,8 +85,7 @@ def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
-    problem = lag_problem()
-    stored = to_store(violation(problem))
+    stored = to_store(violation(lag_problem()))
     replayed = replay(stored, lag_problem(points=5))
     assert (replayed.status, replayed.evaluation) == ("does not fit", None)
     assert "expected 5 evenly spaced control points" in replayed.text
@@ -177,8 +176,7 @@ def test_of_several_counterexamples_one_must_be_named(tmp_path: Path) -> None:
 
 
 def test_problems_made_in_python_cannot_be_loaded(tmp_path: Path) -> None:
-    problem = lag_problem()
-    path = save(to_store(violation(problem)), tmp_path / "c.json")
+    path = save(to_store(violation(lag_problem())), tmp_path / "c.json")
     with pytest.raises(SpecError, match=r"c\.json: the problem was made in Python"):
         counterexample_case(path).problem()
 

@@ -149,8 +149,7 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] |
             found.add(place)
             queue += sources.get(place, ())
     found = {place for place in found if place[0]}
-    around = {place[:depth] for place in found for depth in range(1, len(place))}
-    return frozenset(found | around)
+    return frozenset(found | {place[:depth] for place in found for depth in range(1, len(place))})
 
 
 def _sources(diagram: Diagram) -> Mapping[BlockPath, list[BlockPath]]:

@@ -146,8 +146,7 @@ class CoverageEngine:
         for evaluation in evaluations:
             self._known.add(hash(evaluation.candidate.key))
             if evaluation.trajectory is not None:
-                point = self.layout.point(evaluation.candidate)
-                self._explorer.learn(point, evaluation.trajectory)
+                self._explorer.learn(self.layout.point(evaluation.candidate), evaluation.trajectory)
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])

@@ -53,5 +53,4 @@ def _changes(layout: Layout, points: Array, costs: Array, decided: Array, rng: n
     held = rng.random(_TRIES) < _HELD
     children[held] = held_from(layout, rng, parents[held], decided[held])
     early = layout.starts[None] <= decided[:, None]
-    matters = ((np.abs(children - parents) > _TOLERANCE) & early).any(axis=1)
-    return np.asarray(children[matters])
+    return np.asarray(children[((np.abs(children - parents) > _TOLERANCE) & early).any(axis=1)])

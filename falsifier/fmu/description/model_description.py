@@ -90,8 +90,7 @@ def read_description(path: str | Path) -> Description:
 def describe(path: Path, sha256: str) -> Description:
     """Return the description, cached, of an FMU with this hash; ModelError as of ``read_info``."""
     text = archive.read_entry(path, "modelDescription.xml")
-    root = read_xml(text, f"{path}: modelDescription.xml", ModelFileError)
-    described = parse(root, name=str(path))
+    described = parse(read_xml(text, f"{path}: modelDescription.xml", ModelFileError), name=str(path))
     libraries = find_libraries(path, described.info.fmi_version, described.identifiers)
     notes, supported = (*described.info.notes, *libraries.notes), platforms(archive.entry_names(path))
     info = replace(described.info, notes=notes, platforms=supported)

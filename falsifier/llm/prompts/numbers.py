@@ -47,8 +47,7 @@ def column_decimals(column: NDArray[np.float64], *, margin: float | None = None)
     usual = decimals_for(float(np.abs(column).max()))
     if margin is None or is_on_limit(margin):
         return usual
-    limit = decimals_for(float(np.abs(column).max()), 9)
-    return min(max(usual, decimals_for(margin, 3)), limit)
+    return min(max(usual, decimals_for(margin, 3)), decimals_for(float(np.abs(column).max()), 9))
 
 
 def coarse_clock(stop_time: float) -> int:

@@ -115,8 +115,7 @@ def thinned(robustness: NDArray[np.float64], limit: int) -> Curve:
     """
     valid = np.flatnonzero(~np.isnan(robustness))
     if len(valid) > limit:
-        parts = np.array_split(valid, limit)
-        valid = np.array([part[np.argmin(robustness[part])] for part in parts])
+        valid = np.array([part[np.argmin(robustness[part])] for part in np.array_split(valid, limit)])
     return (valid + 1).astype(np.float64), robustness[valid]
 
 

@@ -214,8 +214,7 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
     critical = _decided_colour(verdict)
     marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
-    is_input = panel.limits is not None
-    color = INPUT if is_input else OUTPUT
+    color = INPUT if panel.limits is not None else OUTPUT
     style = "steps-post" if panel.steps else "default"
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:

@@ -138,8 +138,7 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     if not found:
         judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
         found = [judged[min(judged)]] if judged else []
-    shown = [_shrunk(run) or shown_of(run, _recorded(run)) for run in found]
-    return section_of(name, by_method, shown)
+    return section_of(name, by_method, [_shrunk(run) or shown_of(run, _recorded(run)) for run in found])
 
 
 def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
