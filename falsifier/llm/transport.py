@@ -206,8 +206,7 @@ class _Call:
             raise
         except httpx.TransportError as error:
             text = self.refusal or _fault_of(error)
-            kind = UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError
-            self.fault = kind(text)
+            self.fault = (UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError)(text)
             raise
 
 
@@ -317,8 +316,7 @@ def _fault_of(error: Exception) -> str:
 
 def _unreadable(body: bytes) -> BrokenReplyError:
     """What is wrong with the body of a reply; said only if the client library cannot read it either."""
-    text = body.decode(errors="replace")
-    begins = text[:_LONGEST_BEGINNING].strip()
+    begins = body.decode(errors="replace")[:_LONGEST_BEGINNING].strip()
     found = f"it begins with {begins!r}" if begins else "it is empty"
     try:
         sent = json.loads(body.decode())

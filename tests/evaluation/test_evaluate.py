@@ -113,8 +113,7 @@ class TestSimulate:
 
 def test_outputs_at_time_0_and_whether_they_depend_on_what_is_chosen() -> None:
     assert start_values(lag_problem()) == {"x": (0.0, 0.0)}
-    start = start_values(lag_problem(parameters=[START]))
-    assert start == {"x": (START.low, START.high)}
+    assert start_values(lag_problem(parameters=[START])) == {"x": (START.low, START.high)}
 
 
 def test_an_fmu_is_initialised_without_a_whole_simulation() -> None:

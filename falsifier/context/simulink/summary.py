@@ -8,8 +8,7 @@ from falsifier.core.words import counted
 
 def names_text(diagram: Diagram) -> str:
     """Return the names of a diagram: inports, outports, blocks by system, signals, states."""
-    kind = "Library" if diagram.is_library else "Model"
-    lines = [f"{kind} {diagram.name}"]
+    lines = [f"{'Library' if diagram.is_library else 'Model'} {diagram.name}"]
     for path, system in diagram.root.walk():
         lines += _names(path, system)
     for chart in diagram.charts:

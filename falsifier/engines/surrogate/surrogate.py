@@ -311,8 +311,7 @@ class Surrogate:
         self._suggested = []
         point = self._planned(predict, np.array(points), np.array(critical), rng)
         predicted = self._margins(dynamics, point[None])
-        lowest = float(cost.cost(predicted)[0])
-        why = f"the learnt dynamics predict a scaled robustness of {lowest:.3g}"
+        why = f"the learnt dynamics predict a scaled robustness of {float(cost.cost(predicted)[0]):.3g}"
         return replace(self._made("dynamics", point, why), predicted=predicted)
 
     def _push(self, rng: np.random.Generator) -> Pending:

@@ -68,16 +68,14 @@ def test_misdeeds_are_failed_simulations(misdeeds: FmuModel, misdeed: int, statu
 @pytest.mark.parametrize("name", ["Misdeeds_1cs", "Misdeeds_3"])
 @pytest.mark.parametrize(("misdeed", "status"), [(CRASH, "crashed"), (DISCARD, "failed"), (END, "failed")])
 def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
-    model = isolated(name)
-    assert commit(model, misdeed).status == status
+    assert commit(isolated(name), misdeed).status == status
 
 
 @pytest.mark.parametrize("name", ["Misdeeds_2", "Misdeeds_3"])
 def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time(name: str) -> None:
     model = isolated(name)
     assert "terminated the simulation at t = 0.6 s" in str(commit(model, END))
-    got = run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})
-    assert got["y"].tolist() == list(range(11))
+    assert run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})["y"].tolist() == list(range(11))
 
 
 def test_an_endless_loop_is_stopped_at_the_time_limit(misdeeds: FmuModel) -> None:

@@ -87,5 +87,4 @@ def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
     ssd = structure(system(table + echo, before=bound))
     file = write(tmp_path / "p.ssp", ssd, "Table_2", "Echo_2")
     assert starts(file) == {"t.fileName": "other.txt", "e.in_Enumeration": 3.0, "e.in_Boolean": 1.0}
-    model = read_package(file)
-    assert model.info["e.in_Enumeration"].start == 3.0
+    assert read_package(file).info["e.in_Enumeration"].start == 3.0
