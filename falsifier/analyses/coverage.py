@@ -328,8 +328,7 @@ def edges_of(r: Range) -> list[tuple[float, float]]:
 def cells_of(r: Range, values: Array) -> Cells:
     """Return the part of the range in which each value is, in the shape of the values."""
     edges = np.array(edges_of(r))
-    between = (edges[1:, 0] + edges[:-1, 1]) / 2
-    return np.searchsorted(between, values, side="right").astype(np.uint16)
+    return np.searchsorted((edges[1:, 0] + edges[:-1, 1]) / 2, values, side="right").astype(np.uint16)
 
 
 def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:

@@ -105,19 +105,19 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
 
 
 def ranges_of(problem: Problem) -> dict[str, Interval]:
-    """Return the range of each signal: what is searched or fixed, else what the model declares."""
+    """Return the range of each signal: what is searched or fixed throughout, else what the model declares."""
     found = {}
     for v in problem.info.variables:
         low, high = v.limits
         found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
-    return found | {r.name: Interval(r.low, r.high) for r in problem.space.ranges}
+    kept = (r for r in problem.space.ranges if not problem.info.is_start(r.name))
+    return found | {r.name: Interval(r.low, r.high) for r in kept}
 
 
 def _constants(problem: Problem) -> dict[str, float]:
     """Return the values that stay the same: inputs and parameters that are fixed."""
-    causality = {v.name: v.causality for v in problem.info.variables}
-    return {n: v for n, v in problem.parameters.items() if causality.get(n) in ("input", "parameter")}
+    return {n: v for n, v in problem.parameters.items() if not problem.info.is_start(n)}
 
 
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
@@ -138,7 +138,8 @@ def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
 
 
 def _windows(problem: Problem) -> Iterator[LintFinding]:
-    still = {*_constants(problem), *(p.name for p in problem.space.parameters)}
+    searched = {p.name for p in problem.space.parameters if not problem.info.is_start(p.name)}
+    still = searched | _constants(problem).keys()
     for part in dict.fromkeys(problem.requirement.formula.walk()):
         if not isinstance(part, Always | Eventually | Until):
             continue

@@ -206,6 +206,10 @@ class ModelInfo:
         """Return the type of a variable's values; real if there is no such variable."""
         return next((v.kind for v in self.variables if v.name == name), "real")
 
+    def is_start(self, name: str) -> bool:
+        """Return whether what can be given of a variable is only where it starts; the model computes it."""
+        return any(v.name == name and v.causality not in ("input", "parameter") for v in self.variables)
+
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
         """Return the variables with this causality, in the model's order, except those of ignored clocks."""
         return tuple(v for v in self.variables if v.causality == causality and not v.is_clocked)

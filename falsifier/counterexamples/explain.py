@@ -160,8 +160,7 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
     for r in problem.space.inputs:
         to = of_inputs[r.name]
         if set(candidate.signals[r.name].values) != {to.instead}:
-            constant = constant_signal(problem, r, to.instead)
-            yield from effect(with_signal(candidate, r.name, constant), to)
+            yield from effect(with_signal(candidate, r.name, constant_signal(problem, r, to.instead)), to)
     for p in problem.space.parameters:
         to = _reset(problem, p, (candidate.parameters[p.name],))
         yield from effect(with_parameter(candidate, p.name, to.instead), to)

@@ -135,6 +135,9 @@ class LiteLLMChat:
                 except TransientChatError as error:
                     lost += [error.lost] if error.lost else []
                     failures.append(error)
+                    used = sum(lost, Usage(cost=0.0))
+                    if used.tokens >= request.spare[0] or (used.cost or 0.0) >= request.spare[1]:
+                        raise ChatError(f"a limit is reached. {error}") from None
                     self._wait(failures, request)
         except BaseException as error:  # Ctrl-C, too
             if lost:

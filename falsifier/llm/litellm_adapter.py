@@ -92,7 +92,7 @@ def headers_of_openai() -> list[tuple[str, str]]:
     """Headers of the environment that are for OpenAI's server: who pays, and what else the user states."""
     lines = [f"{name}: {os.environ.get(variable, '')}" for variable, name in _OF_ACCOUNT.items()]
     lines += os.environ.get("OPENAI_CUSTOM_HEADERS", "").split("\n")
-    found = [(name.strip(), value.strip()) for name, _, value in [line.partition(":") for line in lines]]
+    found = [(name.strip(), value.strip()) for name, _, value in (line.partition(":") for line in lines)]
     return [(name, value) for name, value in found if value and name.lower() not in _OF_ANY_REQUEST]
 
 

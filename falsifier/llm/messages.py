@@ -1,6 +1,7 @@
 """What is sent to and received from a language model: frozen values, written to the journal unchanged."""
 
 from collections.abc import Iterable
+from math import inf
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
@@ -100,6 +101,11 @@ class ChatRequest(_Value):
         default=None,
         exclude=True,
         description="Value of time.monotonic() at which to give up; it does not influence the reply.",
+    )
+    spare: tuple[float, float] = Field(
+        default=(inf, inf),
+        exclude=True,
+        description="Tokens and US dollars that are left; once failures have used them, none is sent again.",
     )
 
     @property

@@ -168,8 +168,7 @@ def _serve(model: str, context: int) -> None:
     settings.n_parallel = 1
     settings.port = 0
     # One core is left for simulations; threads that outnumber the cores wait for each other.
-    threads = max(1, (os.cpu_count() or 2) - 1)
-    settings.cpuparams.n_threads = settings.cpuparams_batch.n_threads = threads
+    settings.cpuparams.n_threads = settings.cpuparams_batch.n_threads = max(1, (os.cpu_count() or 2) - 1)
     settings.use_jinja = True  # the model's own template
     settings.sampling.seed = 1  # the same questions get the same answers
     server = xllamacpp.Server(settings)

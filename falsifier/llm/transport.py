@@ -282,8 +282,7 @@ class _Limited(httpx.SyncByteStream):
             self._call.fault = _unreadable(body)
             if self._call.fault.status_code is None:
                 self._call.fault.patience = _MOST_MALFORMED
-        is_answer = isinstance(self._call.fault, UnusableReplyError)
-        yield _mended(body) if is_answer else body
+        yield _mended(body) if isinstance(self._call.fault, UnusableReplyError) else body
 
     def close(self) -> None:
         self._inner.close()

@@ -62,6 +62,8 @@ def _input(name: str, info: ModelInfo) -> Variable:
     if name in info and info[name].alias_of:
         raise SpecError(f"the {info.noun} has one input with two names: use {info[name].alias_of!r} instead")
     _check_unconnected(name, info)
+    if any(v.name == name for v in info.parameters):
+        raise SpecError(f"{name} is a parameter; write [parameters.{name}]")
     variable = _variable(name, info.inputs, f"the {info.noun} has no such input")
     if variable.kind == "string":
         raise SpecError("this input is a string; it keeps its start value and cannot be set or searched")

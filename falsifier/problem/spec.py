@@ -7,6 +7,7 @@ these sections that sets a key wins::
     file < requirement < profile < the profile's section on that requirement
 """
 
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import reduce
@@ -32,6 +33,14 @@ _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
 # How files begin that Windows programs, such as PowerShell's >, write in UTF-16.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+# What a line that is no TOML contains, and what to write instead; the first that is found is told.
+_CURES = {
+    r"[\u2018-\u201e]": "write straight quotes",
+    r"\\": "write backslashes, as of a path, in single quotes",
+    r"=\s*[^\W\d]": "write texts in quotes, true and false in small letters",
+    r"=\s*-?\d+,\d": "write decimals with a point",
+}
+_LONGEST_LINE = 80  # characters of it that are shown
 # Parts of pydantic's locations that are no keys.
 _STEPS = ("tuple", "function-before")
 # What to write if a section of a name is no table.
@@ -117,9 +126,10 @@ def read_spec(path: Path) -> Spec:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
             said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
-            is_path = any(what in said for what in ("hex value", "Unescaped '\\'"))
-            hint = "; write backslashes, as of a path, in single quotes" if is_path else ""
-            raise SpecError(f"not valid TOML: {said}{hint}") from None
+            at = re.search(r"at line (\d+)", said)
+            line = ": " + one_line(text.split("\n")[int(at[1]) - 1])[:_LONGEST_LINE] if at else ""
+            hint = next((f"; {hint}" for mistake, hint in _CURES.items() if re.search(mistake, line)), "")
+            raise SpecError(f"not valid TOML: {said}{line}{hint}") from None
         if not data:
             raise SpecError(
                 "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "

@@ -1,7 +1,8 @@
 """What a run may spend, what it has spent, and a chat that keeps to it and pays for nothing twice."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
+from math import inf
 from time import monotonic
 
 from falsifier.core.arguments import positive, whole
@@ -168,7 +169,7 @@ class RunChat:
         return self.inner.llm
 
     def complete(self, request: ChatRequest) -> ChatReply:
-        """Return the next recorded reply, or ask, with the seconds that are left as a deadline.
+        """Return the next recorded reply, or ask, with what is left of the limits.
 
         Raises:
             LimitReached: if a limit is reached, before the request or while waiting for the reply.
@@ -179,20 +180,25 @@ class RunChat:
                 raise ChatError(played.problem or "there was no reply")
             return played.reply.model_copy(update={"source": "recording"})
         self._check()
-        left = self.budget.seconds_left(self.spent())
-        if left is not None:
-            request = request.model_copy(update={"deadline": monotonic() + left})
+        tokens, cost, spent = self.budget.tokens, self.budget.cost, self.spent()
+        left = self.budget.seconds_left(spent)
+        limits = {
+            "deadline": None if left is None else monotonic() + left,
+            "spare": (inf if tokens is None else tokens - spent.tokens, (cost or inf) - (spent.cost or 0.0)),
+        }
         try:
-            return self.inner.complete(request)
+            return self.inner.complete(request.model_copy(update=limits))
         except ChatError as error:
-            self._check(ahead=_CLOCK_TOLERANCE, cause=error)
+            self._check(error)
             raise
 
     def accepted(self, request: ChatRequest, reply: ChatReply) -> None:
         """Tell the inner chat."""
         self.inner.accepted(request, reply)
 
-    def _check(self, *, ahead: float = 0.0, cause: ChatError | None = None) -> None:
+    def _check(self, failure: ChatError | None = None) -> None:
         spent = self.spent()
-        if limit := self.budget.exceeded(replace(spent, seconds=spent.seconds + ahead)):
-            raise LimitReached(limit) from cause
+        if failure is not None:
+            spent += Spent(seconds=_CLOCK_TOLERANCE) + Spent.on_requests(0, failure.lost or Usage(cost=0.0))
+        if limit := self.budget.exceeded(spent):
+            raise LimitReached(limit) from failure

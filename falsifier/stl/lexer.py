@@ -39,6 +39,7 @@ _HINTS = {
     '"': "a double quote opens a name and needs a second one",
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
     "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
+    **dict.fromkeys("−–", "write -"), **dict.fromkeys("‘’“”„", "write straight quotes"),
 }  # fmt: skip
 # Units of the bounds of windows, in s.
 UNITS = {
@@ -112,12 +113,13 @@ def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaEr
     return FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
 
 
-def hint_for(token: Token) -> str:
-    """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
+def hint_for(token: Token, previous: Token | None = None) -> str:
+    """Return what to write instead of a decimal comma, or of a name that was meant as an operator."""
     written = token.text.partition("[")[0].rstrip("_")  # as Breach writes alw_[0,20]
     word = written.lower()
     if token.kind != "name":
-        return ""
+        is_decimal = token.text == "," and previous and previous.kind == "number"
+        return "write decimals with a point" if is_decimal else ""
     return (
         _INSTEAD.get(written)
         or _INSTEAD.get(word)
@@ -146,7 +148,7 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
 
 def hint_after(token: Token, previous: Token) -> str:
     """Return what to do if a token stands behind a complete formula."""
-    if known := hint_for(token) or hint_for(previous):
+    if known := hint_for(token, previous) or hint_for(previous):
         return known
     if token.text in UNITS and previous.kind == "number":
         return "only the bounds of windows have units; convert the number to the signal's own unit"

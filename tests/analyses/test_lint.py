@@ -53,7 +53,7 @@ FOUND = [
     ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
     ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake = 0"),
     ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
-    ("F[0,3] (throttle <= 3*speed)", "", "", ""),
+    *((right, "", "", "") for right in ("F[0,3] (throttle <= 3*speed)", "G[0,20] (wheel <= 200)")),
     ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
     ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
     ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
@@ -69,8 +69,8 @@ FOUND = [
 def test_what_says_nothing_is_found_with_its_place(
     tmp_path: Path, formula: str, kind: str, place: str, words: str
 ) -> None:
-    text = f"{SPEC}[requirements.R]\nformula = '{formula}'\n"
-    found = lint(spec(tmp_path, text))
+    wheel = "[parameters.wheel]\nrange = [0, 100]  # where it starts\n"
+    found = lint(spec(tmp_path, f"{SPEC}{wheel}[requirements.R]\nformula = '{formula}'\n"))
     assert [(f.requirement, f.kind, f.place) for f in found] == ([("R", kind, place)] if kind else [])
     assert all(words in f"{f.text} {f.advice}" for f in found)
 

@@ -93,8 +93,7 @@ def test_ctrl_c_while_a_journal_is_read_stops_the_campaign_all_the_same(
 def test_more_budget_finishes_a_stopped_campaign_like_an_unlimited_one(tmp_path: Path) -> None:
     wanted = request("impossible", seeds=2, budget=300)
     run_campaign(wanted, tmp_path / "whole")
-    limited = wanted.model_copy(update={"limits": Budget(10)})
-    assert run_campaign(limited, tmp_path / "c").reason
+    assert run_campaign(wanted.model_copy(update={"limits": Budget(10)}), tmp_path / "c").reason
     assert not resume_campaign(tmp_path / "c", limits=Budget(100_000)).reason
     assert outcomes(tmp_path / "c") == outcomes(tmp_path / "whole")
 

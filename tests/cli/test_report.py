@@ -23,8 +23,7 @@ def test_files_of_the_competition_have_one_method_and_what_is_left_out_is_told(
 ) -> None:
     bench(command, "--engine", "corners", "--out", "c", "--quiet")
     journal = next((tmp_path / "c" / "runs").glob("impossible-corners-*")) / "journal.jsonl"
-    lines = journal.read_text().splitlines(keepends=True)
-    journal.write_text("".join(lines[:-1]))
+    journal.write_text("".join(journal.read_text().splitlines(keepends=True)[:-1]))
     for _ in range(2):  # what it wrote is replaced
         written = command("report", "c", "--arch-comp", "v.csv")
         assert "v.csv: 1 run not finished and left out" in written.output

@@ -181,8 +181,7 @@ def test_a_near_miss_may_become_a_violation() -> None:
     problem = lag_problem("G[0,10] (x <= 0.99)")
     start = evaluate(problem, problem.space.decode([0.95, 0.95, 0.95, 0.97]))
     assert not start.violated
-    found = shrink(problem, start)
-    assert found.evaluation.violated
+    assert shrink(problem, start).evaluation.violated
     with pytest.raises(SpecError, match="more than -1"):
         shrink(problem, start, at_most=-1.0)
 

@@ -84,8 +84,7 @@ def test_replay_says_what_has_changed(folder: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_a_counterexample_of_another_parameterization_does_not_fit() -> None:
-    problem = lag_problem()
-    stored = to_store(violation(problem))
+    stored = to_store(violation(lag_problem()))
     replayed = replay(stored, lag_problem(points=5))
     assert (replayed.status, replayed.evaluation) == ("does not fit", None)
     assert "expected 5 evenly spaced control points" in replayed.text

@@ -38,8 +38,7 @@ def test_sobol_points_are_more_even_than_random_ones_as_far_as_there_are_directi
 
 def test_corners_come_first_and_each_once() -> None:
     problem = lag_problem(inputs=2, parameters=[START])
-    engine = make_engine("corners", problem, seed=1)
-    asked = drive(engine, partial(evaluate, problem), rounds=9)
+    asked = drive(make_engine("corners", problem, seed=1), partial(evaluate, problem), rounds=9)
     corners = {(*(s.values for s in c.signals.values()), *c.parameters.values()) for c in asked[:8]}
     assert len(corners) == 8
     assert all(abs(v) == 1.0 for c in asked[:8] for s in c.signals.values() for v in s.values)

@@ -166,8 +166,7 @@ def test_the_step_that_a_coupling_needs_is_found() -> None:
     model = replace(loop(), frame=Frame(values=(("pi.k", 30.0),)))
     found = sufficient_step(model, experiment, {}, share=0.01, halvings=6)
     assert found is not None and found <= 0.025
-    moved = step_convergence(model, replace(experiment, step_size=found), {})
-    assert moved["plant.y"].relative <= 0.01
+    assert step_convergence(model, replace(experiment, step_size=found), {})["plant.y"].relative <= 0.01
     assert sufficient_step(model, experiment, {}, share=0.01, halvings=0) is None
 
 

@@ -9,6 +9,7 @@ from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
 from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
 from tests.llm.server import Step, serving
 from tests.llm.support import Served
 
@@ -89,6 +90,10 @@ def test_requests_that_timed_out_are_counted_as_paid() -> None:
     with pytest.raises(ChatError) as caught:
         asked(ScriptedChat([late, late]), attempts=2)
     assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, without_reply=2)
+    chat = RunChat(Served(server=(server := ScriptedChat([late] * 3))), Budget(tokens=80), Spent, iter(()))
+    with pytest.raises(LimitReached, match="80 tokens is used up"):
+        chat.complete(QUESTION)
+    assert len(server.requests) == 2
 
 
 @pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model")], ids=repr)

@@ -52,8 +52,7 @@ class Conditions:
         Returns:
             Robustness, shape (m,); it has the sign of the formula's whatever each condition is divided by.
         """
-        bounds = (dict(zip(self.parts, rows, strict=True)) for rows in (low, high))
-        return _lowest(self.formula, *bounds)
+        return _lowest(self.formula, *(dict(zip(self.parts, rows, strict=True)) for rows in (low, high)))
 
 
 def _conditions(formula: Formula) -> list[Formula]:

@@ -70,6 +70,5 @@ def fit_lengths(points: Array, targets: Array, *, noise: float) -> GaussianProce
     )
     lengths = np.exp(found.x)
     scaled = points / lengths
-    covariance = _correlation(scaled, scaled) + noise * np.eye(count)
-    factor = np.tril(cho_factor(covariance, lower=True)[0])
+    factor = np.tril(cho_factor(_correlation(scaled, scaled) + noise * np.eye(count), lower=True)[0])
     return GaussianProcess(points, lengths, factor, cho_solve((factor, True), targets))

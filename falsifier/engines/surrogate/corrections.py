@@ -59,6 +59,5 @@ class Corrections:
 def _by_block(inputs: Array) -> Array:
     """Return the mean inputs of blocks of cells, shape (blocks, m, inputs); those of cells as in ``at``."""
     firsts = np.arange(0, inputs.shape[1], _BLOCK)
-    sizes = np.diff(firsts, append=inputs.shape[1])
-    means = np.add.reduceat(inputs, firsts, axis=1) / sizes[:, None]
+    means = np.add.reduceat(inputs, firsts, axis=1) / np.diff(firsts, append=inputs.shape[1])[:, None]
     return means.swapaxes(0, 1).astype(np.float32)

@@ -55,8 +55,7 @@ class Feasibility:
         """Return the features of points, from -1 to 1, with a constant, shape (m, 5 groups + 1)."""
         inputs = 2.0 * self.layout.inputs(points, self.grid) - 1.0
         low, mean, high = inputs.min(axis=1), inputs.mean(axis=1), inputs.max(axis=1)
-        parts = [low, mean, high, low**2, high**2, np.ones((len(points), 1))]
-        return np.concatenate(parts, axis=1)
+        return np.concatenate([low, mean, high, low**2, high**2, np.ones((len(points), 1))], axis=1)
 
 
 def _fitted(features: Array, failed: Array) -> Array:

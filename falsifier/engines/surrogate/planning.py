@@ -96,8 +96,7 @@ def _towards_bounds(predict: Callable[[Array], Array], base: Array, blocks: NDAr
     The gradient is taken by blocks of coordinates, as neighbouring cells of an input do nearly the same.
     """
     count = int(blocks[-1]) + 1
-    level = np.bincount(blocks, base) / np.bincount(blocks)
-    step = np.where(level > 0.5, -0.05, 0.05)
+    step = np.where(np.bincount(blocks, base) / np.bincount(blocks) > 0.5, -0.05, 0.05)
     changed = np.where(blocks == np.arange(count)[:, None], base + step[:, None], base)
     costs = predict(np.concatenate([base[None], np.clip(changed, 0.0, 1.0)]))
     gradient = ((costs[1:] - costs[0]) / step)[blocks]

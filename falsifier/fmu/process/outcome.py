@@ -134,8 +134,7 @@ def _changes(network: Network, words: Sequence[str]) -> str:
 def _titles(network: Network, positions: Sequence[str]) -> list[str]:
     """Return the names of the connected outputs at these positions."""
     titles = [network.title(place) for place in network.connected_outputs()]
-    known = [int(text) for text in positions if _is_position(text)]
-    return [titles[k] for k in known if k < len(titles)]
+    return [titles[k] for k in map(int, filter(_is_position, positions)) if k < len(titles)]
 
 
 def _string(network: Network, plan: Plan, reply: Reply) -> str:

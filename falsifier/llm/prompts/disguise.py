@@ -52,7 +52,7 @@ class Disguise:
     def view(self) -> View:
         """The view that prompts are built from."""
         real, names, space = self.real, self.names, self.real.space
-        others = [name for name in names if name not in space.names]
+        others = [name for name in names if name not in space.names or real.info.is_start(name)]
         return View(
             info=ModelInfo(
                 name="not named",
@@ -83,8 +83,7 @@ class Disguise:
 
     def hidden_verdict(self, verdict: Verdict) -> Verdict:
         """Return a verdict without its trajectory; what broke is left out."""
-        predicates = self.real.requirement.formula.predicates
-        told = {str(p): str(replaced(p, self._signals)) for p in predicates}
+        told = {str(p): str(replaced(p, self._signals)) for p in self.real.requirement.formula.predicates}
         predicate, values = told.get(verdict.predicate, ""), self.hidden_values(verdict.values)
         return Verdict(verdict.robustness, verdict.critical_time, predicate, values)
 

@@ -72,8 +72,9 @@ class View:
 
     @property
     def formula_outputs(self) -> tuple[str, ...]:
-        """Signals of the formula that are not searched inputs, in order of appearance."""
-        return tuple(n for n in self.requirement.formula.signals if n not in self.space.names)
+        """Signals of the formula that are not searched themselves, in order of appearance."""
+        chosen = [name for name in self.space.names if not self.info.is_start(name)]
+        return tuple(n for n in self.requirement.formula.signals if n not in chosen)
 
     @property
     def recorded(self) -> tuple[str, ...]:

@@ -77,8 +77,7 @@ def limit_facts(shown: Shown) -> list[Fact]:
 
 def margin_beside(shown: Shown) -> list[Fact]:
     """Return the margin of what broke, also if it was not confirmed; ``limit_facts`` has it of the rest."""
-    facts = margin_facts(shown.verdict, shown.units, shown.labels)
-    return facts if broken_facts(shown.verdict) else []
+    return margin_facts(shown.verdict, shown.units, shown.labels) if broken_facts(shown.verdict) else []
 
 
 def input_table(shown: Shown) -> Table:

@@ -160,5 +160,4 @@ def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
     file = write_package(
         built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
     )
-    found = read_ssd(str(file), validate=True)
-    assert [e.name for e in found.system.elements] == ["plant", "pi"]
+    assert [e.name for e in read_ssd(str(file), validate=True).system.elements] == ["plant", "pi"]

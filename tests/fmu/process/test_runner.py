@@ -75,8 +75,7 @@ def test_in_other_versions_too(name: str, misdeed: int, status: str) -> None:
 def test_an_fmu_that_ends_the_simulation_early_is_told_with_its_time(name: str) -> None:
     model = isolated(name)
     assert "terminated the simulation at t = 0.6 s" in str(commit(model, END))
-    got = run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})
-    assert got["y"].tolist() == list(range(11))
+    assert run(model, ("y",), parameters={"misdeed": END, "moment": 0.9})["y"].tolist() == list(range(11))
 
 
 def test_an_endless_loop_is_stopped_at_the_time_limit(misdeeds: FmuModel) -> None:

@@ -101,6 +101,9 @@ def test_parameters_are_plain_numbers() -> None:
     alone = standing(replace(problem, space=SearchSpace((), (START,), 10.0)))
     assert '"signals"' not in alone and "control points" not in alone and "switch" not in alone
     assert '"parameters": [{"name": "x0", "value": number}]' in alone
+    moving = lag_problem(parameters=(ParameterRange("x", -0.5, 0.5),))
+    assert "- start value x; from -0.5 to 0.5; one value at t = 0\n" in standing(moving)
+    assert "Output signals: x\n" in standing(moving, "MP4")
 
 
 def kind_of_input(variant: str, **changes: Any) -> str:
@@ -112,8 +115,7 @@ def kind_of_input(variant: str, **changes: Any) -> str:
 
 def test_whole_numbers_are_asked_for() -> None:
     assert "; integers from -1 to 1; " in kind_of_input("MP5", low=-1.0, high=1.0, kind="integer")
-    boolean = {"kind": "boolean", "low": 0.0, "high": 1.0}
-    assert "; Boolean, 0 (false) or 1 (true); " in kind_of_input("MP5", **boolean)
+    assert "; Boolean, 0 (false) or 1 (true); " in kind_of_input("MP5", kind="boolean", low=0.0, high=1.0)
     items = (("low", 1), ("top", 2), ("rear", 3))
     gears = kind_of_input("MP5", kind="enumeration", low=1.0, high=2.0, items=items)
     assert "; one of the numbers 1 = low, 2 = top; " in gears
