@@ -23,7 +23,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from falsifier.engines.surrogate import local_search, policy, surrogate
+from falsifier.engines.surrogate import policy, surrogate, variation
 from falsifier.engines.surrogate.settings import Settings
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
@@ -65,7 +65,7 @@ def _without(arm: str) -> Part:
 PARTS = {
     "the whole engine": Part(),
     **{f"no {arm}": _without(arm) for arm in surrogate._PRIORS},
-    "no constant ends of changes": Part(patches=[(local_search, "_HELD", 0.0)]),
+    "no constant ends of changes": Part(patches=[(variation, "_HELD", 0.0)]),
     "no steps towards bounds": Part({"bound_steps": 0}),
     "no switching inputs at all": Part({"bangs": 0}, [(surrogate, "_MOST_SWITCHING", 0)]),
     "no constants at first": Part({"constants": 0, "pauses": 0}),

@@ -29,18 +29,8 @@ from statistics import mean
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier import (
-    Experiment,
-    FunctionModel,
-    ModelInfo,
-    ParameterRange,
-    Problem,
-    Requirement,
-    SearchSpace,
-    Variable,
-    assess,
-    parse,
-)
+from bench.example_systems import function_problem
+from falsifier import ParameterRange, Problem, assess
 
 Cost = Callable[[NDArray[np.float64]], float]
 
@@ -116,14 +106,7 @@ def problem_of(cost: Cost) -> Problem:
         return {"y": np.full(times.shape, cost(np.array([values[name] for name in _NAMES])))}
 
     parameters = tuple(ParameterRange(name, 0.0, 1.0) for name in _NAMES)
-    variables = [Variable(p.name, causality="parameter", start=0.5, settable=True) for p in parameters]
-    info = ModelInfo("bench", variables=(Variable("y", causality="output"), *variables))
-    return Problem(
-        FunctionModel(respond, info),
-        Requirement("KNOWN", parse("y >= 0")),
-        SearchSpace((), parameters, 1.0),
-        Experiment(1.0, 1.0, ("y",)),
-    )
+    return function_problem(respond, "y >= 0", (), parameters, {"y": "real"}, 1.0, 1.0)
 
 
 def exact(name: str, probability: float, seed: int) -> tuple[bool, bool]:

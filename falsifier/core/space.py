@@ -239,6 +239,12 @@ class SearchSpace:
         """Return the times in s of the control points that the spec defines for an input."""
         return even_times(r.control_points, stop_time=self.stop_time, interpolation=r.interpolation)
 
+    def fixed_values(self, r: InputRange, signal: Signal) -> tuple[float, ...]:
+        """Return the values of a signal at the times of the control points that the spec defines."""
+        times = self.fixed_times(r)
+        sampled = signal.times != times
+        return tuple(signal.held(None).sample(np.asarray(times)).tolist()) if sampled else signal.values
+
     def is_fixed(self, r: InputRange, signal: Signal) -> bool:
         """Whether a signal has the control points of the spec, not some that an engine chose."""
         return signal.interpolation == r.interpolation and signal.times == self.fixed_times(r)
@@ -258,28 +264,17 @@ class SearchSpace:
         signals = {}
         start = 0
         for r in self.inputs:
-            signals[r.name] = Signal.evenly(
-                values[start : start + r.control_points],
-                stop_time=self.stop_time,
-                interpolation=r.interpolation,
-                hold=r.hold,
-            )
-            start += r.control_points
+            end = start + r.control_points
+            signals[r.name] = Signal(self.fixed_times(r), tuple(values[start:end]), r.interpolation, r.hold)
+            start = end
         parameters = {p.name: v for p, v in zip(self.parameters, values[start:], strict=True)}
         return self.admit(Candidate(signals, parameters, origin, rationale))
 
     def encode(self, candidate: Candidate) -> NDArray[np.float64]:
         """Return the vector form of a candidate, shape (d,); free signals are sampled at the fixed times."""
-        parts: list[float] = []
-        for r in self.inputs:
-            signal = candidate.signals[r.name]
-            times = self.fixed_times(r)
-            if signal.times == times:
-                parts.extend(signal.values)
-            else:
-                parts.extend(float(v) for v in signal.held(None).sample(np.asarray(times)))
-        parts.extend(float(candidate.parameters[p.name]) for p in self.parameters)
-        return np.array(parts, dtype=np.float64)
+        points = [v for r in self.inputs for v in self.fixed_values(r, candidate.signals[r.name])]
+        parameters = [candidate.parameters[p.name] for p in self.parameters]
+        return np.array([*points, *parameters], dtype=np.float64)
 
     def check(self, candidate: Candidate) -> None:
         """Check that a candidate has a value for all that is searched, and none outside its range.

@@ -285,14 +285,8 @@ PASSES: tuple[Pass, ...] = (
 
 def constant_signal(problem: Problem, r: InputRange, value: float) -> Signal:
     """Return the simplest constant signal that the input's parameterization allows."""
-    if r.free is not None:
-        return Signal((0.0,), (value,), "constant", r.hold)
-    return Signal.evenly(
-        (value,) * r.control_points,
-        stop_time=problem.space.stop_time,
-        interpolation=r.interpolation,
-        hold=r.hold,
-    )
+    times = (0.0,) if r.free else problem.space.fixed_times(r)
+    return Signal(times, (value,) * len(times), "constant" if r.free else r.interpolation, r.hold)
 
 
 def stretches(values: tuple[float, ...]) -> list[tuple[int, int]]:

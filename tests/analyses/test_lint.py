@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import ProblemSource
 from falsifier.stl import parse
 from falsifier.testing import Array, lag_problem
+from tests.fmu.fixtures import altered
 from tests.problem.support import AT, spec
 
 SPEC = f"""
@@ -136,14 +136,11 @@ def test_what_no_input_moves_is_measured_and_says_so() -> None:
 
 
 def test_what_the_fmu_declares_counts_unless_a_simulation_contradicts_it(tmp_path: Path) -> None:
-    fmu = tmp_path / "car.fmu"
-    with ZipFile(AT) as old, ZipFile(fmu, "w") as new:
-        for item in old.infolist():
-            content = old.read(item)
-            if item.filename == "modelDescription.xml":
-                outputs, rest = content.split(b"</Outputs>")
-                content = outputs.replace(b'" />', b'" dependencies="" />') + b"</Outputs>" + rest
-            new.writestr(item, content)
+    def declared_independent(content: bytes) -> bytes:
+        outputs, rest = content.split(b"</Outputs>")
+        return outputs.replace(b'" />', b'" dependencies="" />') + b"</Outputs>" + rest
+
+    fmu = altered(AT, tmp_path / "car.fmu", declared_independent, ending="modelDescription.xml")
     text = (
         SPEC.replace(AT.as_posix(), fmu.as_posix()) + "[requirements.R]\nformula = 'G[0,20] (rpm <= 4750)'\n"
     )

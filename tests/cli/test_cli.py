@@ -51,10 +51,6 @@ from tests.command import ROOT, commands, falsifier
         (["run", "AT1", "--max-tokens", "0"], "--max-tokens 0: expected a whole number from 1 on"),
         (["run", "AT1", "--stop-time", "inf"], "--stop-time inf: expected a positive number"),
         (["bench", "AT1", "--total", "seconds=0"], "cost=N (N > 0), for example cost=5"),
-        (
-            ["margin", "AT1", "--stl", "G (speed <= {limit})", "--between", "160:100"],
-            "--between 160:100: expected LOW:HIGH with LOW < HIGH",
-        ),
         (["run", "AT1", "--search", "throttle=100:0"], "falsifier: --search throttle: expected [low, high]"),
         (["run", "AT1", "--search", "throttle=0:nan"], "falsifier: --search throttle: expected a finite"),
         (["run", "AT1", "--search", "throttle=0:500"], "falsifier: --search throttle: [0, 500] exceeds"),
@@ -68,7 +64,6 @@ from tests.command import ROOT, commands, falsifier
         (["lint", "AT1"], "use falsifier check"),
         (["shrink", "r"], "use falsifier explain RUN --shrink"),
         (["schema"], "use falsifier tools schema"),
-        (["run", "AT1", "--budget", "many"], "many"),
         (["run", "AT1", "--variant", "MP4"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
         (["report", "gone"], "gone: no such directory; expected that of a run or campaign"),

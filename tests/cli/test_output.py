@@ -7,8 +7,12 @@ import time
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
+from falsifier.cli.files import checked_picture
 from falsifier.cli.output import as_shown, conclude, say
+from falsifier.errors import SpecError
+from falsifier.views.plotting.axes import save_figure
 from falsifier.views.text import fact_lines
 from tests.command import ROOT, listen_to_interrupts
 
@@ -45,6 +49,16 @@ def test_long_facts_are_wrapped_on_a_terminal_only(monkeypatch: pytest.MonkeyPat
     assert len(facts) > 2 and max(map(len, facts)) <= 60
     assert all(line.startswith(" " * 17 + "a well-known") or line[17] != " " for line in facts)
     assert json.loads(as_shown(text, {"a": "b " * 90}, as_json=True)) == {"a": "b " * 90}
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_only_pictures_that_commands_have_written_are_replaced(ending: str, tmp_path: Path) -> None:
+    picture = tmp_path / f"picture.{ending}"
+    save_figure(Figure(), picture)
+    assert checked_picture(picture) == picture
+    Figure().savefig(picture)
+    with pytest.raises(SpecError, match="exists and is kept"):
+        checked_picture(picture)
 
 
 # A minute; a signal that arrives just before a sleep is handled after it, so that each is short.

@@ -50,7 +50,6 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         (("nosuch.fmu",), "nosuch.fmu: no such file"),
         (("folder.ssp", "--stl", "G (x <= 1)"), "folder.ssp is a folder; give"),
         (("folder.toml",), "folder.toml: cannot be read (Is a directory); expected"),
-        ((*SPEED[:2], "rise signal=speed"), "--stl: reference: this key is missing"),
         (
             (*SPEED, "--search", "throttle=0-100"),
             "expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search throttle=0:100:7",

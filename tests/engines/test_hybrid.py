@@ -1,5 +1,5 @@
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -16,11 +16,9 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.llm.conversation import OnExchange
-from falsifier.llm.messages import Chat
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
-from falsifier.testing import BIAS, FREE, START, EngineContract, drive, lag_problem
+from falsifier.testing import FREE, START, EngineContract, drive, lag_problem
 from tests.engines.support import HASTY, level, wide_problem
 
 # Nor does it depend on how many of the first simulations are the surrogate's own.
@@ -46,9 +44,6 @@ class Script(LLMEngine):
         if isinstance(answer, Exception):
             raise answer
         return [self._constant(level + 1e-3 * len(self.notes)) for level in answer[:count]]
-
-    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        self.on_exchange = on_exchange
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         self.heard += evaluations
@@ -90,8 +85,6 @@ def hybrid(problem: Problem, answers: list[list[float] | Exception], seed: int =
 
 class TestContract(EngineContract):
     def make(self, problem: Problem, seed: int) -> Engine:
-        if not all(r.free for r in problem.space.inputs):
-            problem = lag_problem(inputs=0, parameters=[START, BIAS])
         rng = np.random.default_rng(seed)
         levels: list[list[float] | Exception] = [list(rng.uniform(-0.9, 0.9, 5)) for _ in range(9)]
         return make_engine(

@@ -1,8 +1,9 @@
 """The project's own small FMUs (tests/fixtures/fmus) and what is done with them again and again."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
+from zipfile import ZipFile
 
 from falsifier.core.model import Experiment, Interface
 from falsifier.core.signals import Signal
@@ -21,6 +22,15 @@ FOLDER = Path(__file__).parents[1] / "fixtures" / "fmus"
 def path(name: str) -> Path:
     """Path of a test FMU, e.g. ``Lag_2``."""
     return FOLDER / f"{name}.fmu"
+
+
+def altered(fmu: Path, target: Path, change: Callable[[bytes], bytes], *, ending: str = "") -> Path:
+    """A copy of an FMU in which the files whose names end so have other contents."""
+    with ZipFile(fmu) as known, ZipFile(target, "w") as copy:
+        for name in known.namelist():
+            content = known.read(name)
+            copy.writestr(name, change(content) if name.endswith(ending) else content)
+    return target
 
 
 def isolated(name: str, interface: Interface = "co-simulation") -> FmuModel:

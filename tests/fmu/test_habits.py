@@ -165,10 +165,8 @@ def test_of_several_libraries_none_is_guessed(tmp_path: Path) -> None:
 
 
 def test_a_library_that_is_not_installed_is_named_when_it_is_needed(tmp_path: Path) -> None:
-    path = tmp_path / "needy.fmu"
-    with zipfile.ZipFile(fixtures.path("Lag_2")) as good, zipfile.ZipFile(path, "w") as archive:
-        for name in good.namelist():
-            archive.writestr(name, good.read(name).replace(b"libc.so.6", b"libq.so.6"))
+    good, path = fixtures.path("Lag_2"), tmp_path / "needy.fmu"
+    fixtures.altered(good, path, lambda content: content.replace(b"libc.so.6", b"libq.so.6"))
     with pytest.raises(ModelError, match=r"the library cannot be loaded: libq\.so\.6: cannot open"):
         run(FmuModel(path), ("y",))
 

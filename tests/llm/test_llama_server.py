@@ -20,20 +20,12 @@ from falsifier.testing import START, lag_problem
 from tests import patience
 from tests.command import falsifier
 from tests.llm.support import QUESTION
+from tests.llm.test_client import SCHEMA
 from tests.llm.tiny_model import FIRST_BYTE, write_tiny_model
 
 # It ends most replies by itself.
 SHORT = {"max_tokens": 600}
-TEXT = QUESTION.model_copy(
-    update={
-        "reply_schema": {
-            "type": "object",
-            "properties": {"why": {"type": "string"}},
-            "required": ["why"],
-            "additionalProperties": False,
-        }
-    }
-)
+TEXT = QUESTION.model_copy(update={"reply_schema": SCHEMA})
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ import copy
 import re
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
 
 import pytest
 
@@ -19,7 +18,7 @@ from falsifier.problem.requirement import parse_requirement
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.shorthand import changes_from_options
 from falsifier.problem.spec import parse_spec
-from tests.fmu.fixtures import path as fixture
+from tests.fmu.fixtures import altered, path as fixture
 
 SPEC: dict[str, Any] = {
     "model": {"fmu": "AT.fmu", "interface": "co-simulation", "stop_time": 40.0},
@@ -194,11 +193,8 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
         ("in_Real", 0.0, why),
         ("in_Integer", 0.0, why),
     ]
-    fmu = tmp_path / "Protocol.fmu"
-    with ZipFile(fixture("Echo_2")) as old, ZipFile(fmu, "w") as new:
-        for item in old.infolist():
-            limits = b'<Integer start="0" min="0" max="5"/>'
-            new.writestr(item, old.read(item).replace(b'<Integer start="0"/>', limits, 1))
+    old, new = b'<Integer start="0"/>', b'<Integer start="0" min="0" max="5"/>'
+    fmu = altered(fixture("Echo_2"), tmp_path / "Protocol.fmu", lambda content: content.replace(old, new, 1))
     problem = Problem.from_fmu(fmu, "G[0,1] (out_Real <= 1)")
     found = {r.name: (r.low, r.high, r.kind, r.interpolation) for r in problem.space.inputs}
     assert found["in_Integer"] == (0, 5, "integer", "constant")

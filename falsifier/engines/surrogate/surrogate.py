@@ -16,12 +16,11 @@ from falsifier.engines.simple import Corners, Uniform
 from falsifier.engines.surrogate.dynamics import Forecasts, LinearDynamics
 from falsifier.engines.surrogate.feasibility import Feasibility
 from falsifier.engines.surrogate.history import History
-from falsifier.engines.surrogate.local_search import propose_change
 from falsifier.engines.surrogate.planning import Push, Pushes, is_seen, plan
 from falsifier.engines.surrogate.policy import Policy, worth
 from falsifier.engines.surrogate.predicted_cost import Margins, inner_windows, needs_several
 from falsifier.engines.surrogate.settings import Settings
-from falsifier.engines.surrogate.variation import random_points, stepping, switching
+from falsifier.engines.surrogate.variation import propose_change, random_points, stepping, switching
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Levels
 from falsifier.problem.problem import Problem

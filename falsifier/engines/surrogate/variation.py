@@ -1,4 +1,6 @@
-"""Random points in a layout, and random changes of good ones, many at a time."""
+"""Random points in a layout, and random changes of good ones, many at a time or chosen without dynamics."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,16 @@ _REACH = 0.05
 # Of what is tried without a plan, the maximum number of pieces of a random point, and the probability that a
 # level of it, or of a constant end, is a bound.
 _PIECES, _AT_BOUND = 6, 0.8
+# Changes that are drawn for one proposal; the first that matters is taken.
+_TRIES = 100
+# Mean rank, from 0, of the point that is changed.
+_MEAN_RANK = 0.5
+# Number of simulations before their changes are tried; share of random points later.
+_FEWEST, _FRESH = 8, 0.05
+# Share of changes that keep all inputs constant from some time on: an excited system that is left alone may
+# do by itself what constant disturbance hides.
+_HELD = 0.2
+_TOLERANCE = 1e-9
 
 Bools = NDArray[np.bool_]
 
@@ -52,9 +64,28 @@ def mutations(
     return _changed(layout, rng, children, None if critical is None else critical[chosen])
 
 
-def changed(layout: Layout, rng: np.random.Generator, points: Array) -> Array:
-    """Return a copy of the points, shape (m, d), each with one to three random changes."""
-    return _changed(layout, rng, points.copy(), None)
+def propose_change(
+    layout: Layout,
+    points: Array,
+    costs: Array,
+    decided: Array,
+    rng: np.random.Generator,
+    *,
+    risk: Callable[[Array], Array],
+    draws: int,
+) -> tuple[Array, str]:
+    """Return a change of one of the best points, or a random point, and what it is.
+
+    What comes after the time in s by which the inputs had ``decided`` a cost, shape (n,), cannot lower it, so
+    such changes are not proposed. ``points`` were simulated, shape (n, d). Of ``draws`` random points, the
+    one with the least ``risk`` is chosen: from 0 to 1, how likely the simulations of points fail, shape (m,).
+    """
+    if len(costs) >= _FEWEST and rng.random() >= _FRESH:
+        children = _changes(layout, points, costs, decided, rng)
+        if len(children):
+            return children[np.argmin(risk(children))], "a change of one of the best candidates"
+    fresh = np.array([_paced(layout, rng) for _ in range(draws)])
+    return fresh[np.argmin(risk(fresh))], "random: a new start of the search by changes"
 
 
 def switching(layout: Layout, rng: np.random.Generator, dwell: float) -> Array:
@@ -76,7 +107,7 @@ def stepping(layout: Layout, rng: np.random.Generator, pieces: int) -> Array:
     return layout.settled(point)
 
 
-def paced(layout: Layout, rng: np.random.Generator) -> Array:
+def _paced(layout: Layout, rng: np.random.Generator) -> Array:
     """Return one point: all inputs change together and keep their last levels; shape (d,).
 
     Together means at the same share of the control points of each, which is the same time if these cover the
@@ -95,7 +126,7 @@ def paced(layout: Layout, rng: np.random.Generator) -> Array:
     return layout.settled(point)
 
 
-def held_from(layout: Layout, rng: np.random.Generator, points: Array, until: Array) -> Array:
+def _held_from(layout: Layout, rng: np.random.Generator, points: Array, until: Array) -> Array:
     """Return a copy of the points, shape (m, d), in which all inputs are constant from a random time on.
 
     That time is at most ``until``, in s, shape (m,).
@@ -107,6 +138,20 @@ def held_from(layout: Layout, rng: np.random.Generator, points: Array, until: Ar
         is_end = layout.starts[group] >= starts[:, None]
         result[:, group] = np.where(is_end, levels[:, None], points[:, group])
     return layout.settled(result)
+
+
+def _changes(layout: Layout, points: Array, costs: Array, decided: Array, rng: np.random.Generator) -> Array:
+    """Return changes of good points that can matter, shape (m, d); m may be 0."""
+    # Among equal costs, any order: the first one would else be changed for ever.
+    order = np.lexsort((rng.random(len(costs)), costs))
+    chosen = order[np.minimum(rng.exponential(_MEAN_RANK, _TRIES).astype(np.intp), len(order) - 1)]
+    parents, decided = points[chosen], decided[chosen]
+    children = _changed(layout, rng, parents.copy(), None)
+    held = rng.random(_TRIES) < _HELD
+    children[held] = _held_from(layout, rng, parents[held], decided[held])
+    early = layout.starts[None] <= decided[:, None]
+    matters = ((np.abs(children - parents) > _TOLERANCE) & early).any(axis=1)
+    return np.asarray(children[matters])
 
 
 def _levels(rng: np.random.Generator, shape: int | tuple[int, ...], *, at_bounds: Bools) -> Array:

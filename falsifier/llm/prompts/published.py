@@ -5,8 +5,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import shortest
 from falsifier.core.signals import Signal
@@ -101,11 +99,8 @@ def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Return values of each input at the fixed control points, by name, and parameters, a line each."""
     lines = []
     for r in view.space.inputs:
-        signal, times = candidate.signals[r.name], view.space.fixed_times(r)
-        values = signal.values
-        if signal.times != times:
-            values = tuple(float(v) for v in signal.held(None).sample(np.asarray(times)))
-        listed = ", ".join(_rounded(v, r.low, r.high) for v in values)
+        signal = candidate.signals[r.name]
+        listed = ", ".join(_rounded(v, r.low, r.high) for v in view.space.fixed_values(r, signal))
         lines.append(f"{r.name} = [{listed}]{'' if _is_exact(view, r, signal) else _READ}")
     return (
         *lines,

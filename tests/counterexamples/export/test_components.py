@@ -18,7 +18,7 @@ from falsifier.fmu import Component, Connection, Coupling, System, read_package
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
-from tests.fmu.fixtures import path
+from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import LOOP, component, run, solved, system as built
 
@@ -81,15 +81,13 @@ def test_each_component_alone_does_what_it_did_in_the_system(
 
 def test_names_of_any_characters_can_be_written_to_the_spec(tmp_path: Path) -> None:
     odd = {"u": 'wheel "1" \U0001f600', "y": "height.always", "T": "time constant"}
-    renamed = tmp_path / "Plant.fmu"
-    with zipfile.ZipFile(path("Plant_2")) as source, zipfile.ZipFile(renamed, "w") as target:
-        for entry in source.infolist():
-            data = source.read(entry)
-            if entry.filename == "modelDescription.xml":
-                for old, new in odd.items():
-                    written = f"name={quoteattr(new)} value"
-                    data = data.replace(f'name="{old}" value'.encode(), written.encode())
-            target.writestr(entry.filename, data)
+
+    def in_odd_names(content: bytes) -> bytes:
+        for old, new in odd.items():
+            content = content.replace(f'name="{old}" value'.encode(), f"name={quoteattr(new)} value".encode())
+        return content
+
+    renamed = altered(path("Plant_2"), tmp_path / "Plant.fmu", in_odd_names, ending="modelDescription.xml")
     links = {f"plant.{odd['u']}": "pi.y", "pi.measured": f"plant.{odd['y']}"}
     whole = Problem.from_fmu(
         System({"plant": renamed, "pi": path("Gain_2")}, links),

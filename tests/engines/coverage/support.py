@@ -3,16 +3,13 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.core.space import Freedom, InputRange, SearchSpace
+from bench.example_systems import Array, function_problem
+from falsifier.core.model import Kind
+from falsifier.core.space import Freedom, InputRange
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement
-from falsifier.stl import parse
 
-Array = NDArray[np.float64]
-STOP_TIME, INTERVAL = 10.0, 0.1
+INTERVAL = 0.1
 CODE = (3, 1, 4, 2, 5, 1, 3)
 # A key or a turn counts if the previous one was at most this long ago, in s.
 PATIENCE = 1.2
@@ -55,30 +52,12 @@ def safe(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -
 def safe_problem() -> Problem:
     """The safe must never open; each band is a thirtieth of the dial's range."""
     dial = InputRange("dial", 0.0, 3.0, interpolation="constant", free=Freedom(100, 0.1))
-    variables = (
-        Variable("dial", causality="input", low=0.0, high=3.0, start=0.0),
-        Variable("turns", causality="output", kind="integer", type="Int32"),
-        Variable("open", causality="output", kind="boolean", type="Boolean"),
-    )
-    return Problem(
-        FunctionModel(safe, ModelInfo("safe", "A safe.", variables=variables)),
-        Requirement("SAFE", parse("G[0,10] (open < 0.5)")),
-        SearchSpace((dial,), (), STOP_TIME),
-        Experiment(STOP_TIME, INTERVAL, ("turns", "open")),
-    )
+    outputs: dict[str, Kind] = {"turns": "integer", "open": "boolean"}
+    return function_problem(safe, "G[0,10] (open < 0.5)", (dial,), (), outputs, 10.0, INTERVAL)
 
 
 def lock_problem(*, points: int = 20, free: Freedom | None = None) -> Problem:
     """The lock must never open; of a million uniform inputs with twenty control points some 280 open it."""
     key = InputRange("key", 0, 5, control_points=points, interpolation="constant", free=free, kind="integer")
-    variables = (
-        Variable("key", causality="input", kind="integer", type="Int32", low=0, high=5, start=0.0),
-        Variable("stage", causality="output", kind="integer", type="Int32"),
-        Variable("open", causality="output", kind="boolean", type="Boolean"),
-    )
-    return Problem(
-        FunctionModel(lock, ModelInfo("lock", "A lock.", variables=variables)),
-        Requirement("LOCK", parse("G[0,10] (open < 0.5)")),
-        SearchSpace((key,), (), STOP_TIME),
-        Experiment(STOP_TIME, INTERVAL, ("stage", "open")),
-    )
+    outputs: dict[str, Kind] = {"stage": "integer", "open": "boolean"}
+    return function_problem(lock, "G[0,10] (open < 0.5)", (key,), (), outputs, 10.0, INTERVAL)

@@ -4,20 +4,17 @@ from functools import partial
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from bench.example_systems import Array, function_problem
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.core.space import ParameterRange, SearchSpace
+from falsifier.core.model import Kind
+from falsifier.core.space import ParameterRange
 from falsifier.engines.optimisers.bayesian import Bayesian
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.problem.requirement import Requirement
-from falsifier.stl import Verdict, parse
+from falsifier.stl import Verdict
 from falsifier.testing import drive, lag
 from tests.engines.support import flat
-
-Values = NDArray[np.float64]
 
 
 def parameters_problem(kind: str, count: int) -> Problem:
@@ -27,16 +24,7 @@ def parameters_problem(kind: str, count: int) -> Problem:
         )
         for i in range(count)
     )
-    variables = (
-        *(Variable(r.name, kind=r.kind, causality="parameter", start=1.0, settable=True) for r in ranges),
-        Variable("x", causality="output"),
-    )
-    return Problem(
-        FunctionModel(lag, ModelInfo("bowl", variables=variables)),
-        Requirement("BOWL", parse("G (x <= 1)")),
-        SearchSpace((), ranges, 1.0),
-        Experiment(1.0, 0.1, ("x",)),
-    )
+    return function_problem(lag, "G (x <= 1)", (), ranges, {"x": "real"}, 1.0, 0.1)
 
 
 @pytest.mark.parametrize("kind", ["real", "integer", "mixed"])
@@ -54,21 +42,15 @@ def test_the_trust_region_finds_the_bottom_of_a_bowl_in_few_simulations(kind: st
 
 def test_two_conditions_of_different_size_are_met_at_once() -> None:
     ranges = tuple(ParameterRange(f"p{i}", 0, 1) for i in range(8))
-    outputs = (Variable("near", causality="output"), Variable("far", causality="output"))
-    rest = tuple(Variable(r.name, causality="parameter", start=0.0, settable=True) for r in ranges)
 
-    def model(times: Values, inputs: dict[str, Values], parameters: dict[str, float]) -> dict[str, Values]:
+    def model(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
         p = np.array([parameters[r.name] for r in ranges])
         near, far = 1e-4 * float(np.sum((p - 0.3) ** 2)), 1e4 * float(np.sum((p[:4] - 0.6) ** 2))
         return {"near": np.full(len(times), near), "far": np.full(len(times), far)}
 
-    problem = Problem(
-        FunctionModel(model, ModelInfo("two", variables=(*rest, *outputs))),
-        # Of 250,000 uniform points, one violates it.
-        Requirement("TWO", parse("G (near >= 0.12e-4) or G (far >= 0.12e4)")),
-        SearchSpace((), ranges, 1.0),
-        Experiment(1.0, 0.1, ("near", "far")),
-    )
+    # Of 250,000 uniform points, one violates it.
+    formula, outputs = "G (near >= 0.12e-4) or G (far >= 0.12e4)", dict[str, Kind](near="real", far="real")
+    problem = function_problem(model, formula, (), ranges, outputs, 1.0, 0.1)
     judged = partial(evaluate, problem)
     for seed in range(3):
         asked = drive(Bayesian(problem, seed=seed), judged, rounds=50)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.example_systems import function_problem
 from falsifier.context.values import Context, Crossing
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.model import Kind
+from falsifier.core.space import Freedom, InputRange, ParameterRange
 from falsifier.engines import make_engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import evaluate
@@ -34,12 +35,8 @@ def simulations_until_violation(problem: Problem, *, seed: int, budget: int) -> 
 
 def oscillator_problem(formula: str) -> Problem:
     """A weakly damped oscillator of period 2 s, driven by one input in [-1, 1]."""
-    info = ModelInfo(
-        "oscillator", variables=(Variable("u", causality="input"), Variable("x", causality="output"))
-    )
-    space = SearchSpace((InputRange("u", -1.0, 1.0, control_points=5, free=Freedom(200, 0.05)),), (), 20.0)
-    experiment = Experiment(20.0, 0.02, ("x",))
-    return Problem(FunctionModel(_oscillator, info), Requirement("R", parse(formula)), space, experiment)
+    u = InputRange("u", -1.0, 1.0, control_points=5, free=Freedom(200, 0.05))
+    return function_problem(_oscillator, formula, (u,), (), {"x": "real"}, 20.0, 0.02)
 
 
 def _oscillator(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
@@ -124,17 +121,8 @@ def boiler(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
 
 def test_an_output_is_driven_further_where_the_robustness_is_the_same_for_all() -> None:
     burner = InputRange("burner", 0.0, 0.9, control_points=12, interpolation="linear")
-    variables = (
-        Variable("burner", causality="input"),
-        Variable("heat", causality="output"),
-        Variable("cuts", causality="output", kind="integer", type="Int32"),
-    )
-    problem = Problem(
-        FunctionModel(boiler, ModelInfo("boiler", variables=variables)),
-        Requirement("LIMIT", parse("G[0,60] (cuts < 0.5)")),
-        SearchSpace((burner,), (), 60.0),
-        Experiment(60.0, 0.2, ("cuts", "heat")),
-    )
+    outputs: dict[str, Kind] = {"cuts": "integer", "heat": "real"}
+    problem = function_problem(boiler, "G[0,60] (cuts < 0.5)", (burner,), (), outputs, 60.0, 0.2)
     highest = defaultdict(list)
     for candidate in drive(Surrogate(problem, seed=1, settings=HASTY), partial(evaluate, problem), rounds=40):
         trajectory = evaluate(problem, candidate).trajectory
@@ -195,18 +183,8 @@ def test_switching_inputs_say_how_often_they_do(points: int, free: Freedom | Non
 
 def narrow_problem(levels: tuple[Crossing, ...] = ()) -> Problem:
     """A counter of how often an input entered a band of 0.2 % of its range; three times violate."""
-    info = ModelInfo(
-        "narrow",
-        variables=(
-            Variable("u", causality="input"),
-            Variable("n", kind="integer", causality="output", variability="discrete"),
-        ),
-    )
-    space = SearchSpace((InputRange("u", 0.0, 1.0, control_points=5, free=Freedom(50, 0.2)),), (), 10.0)
-    formula = parse("G[0,10] (n < 2.5)")
-    problem = Problem(
-        FunctionModel(_entered, info), Requirement("R", formula), space, Experiment(10.0, 0.1, ("n",))
-    )
+    u = InputRange("u", 0.0, 1.0, control_points=5, free=Freedom(50, 0.2))
+    problem = function_problem(_entered, "G[0,10] (n < 2.5)", (u,), (), {"n": "integer"}, 10.0, 0.1)
     return replace(problem, context=Context(crossings=levels))
 
 

@@ -1,6 +1,5 @@
 """Windows libraries through Wine give what the libraries for Linux give, errors included."""
 
-import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -155,9 +154,7 @@ def test_the_windows_library_of_an_fmu_without_one_is_refused() -> None:
 
 @needs_wine
 def test_a_library_that_is_none_is_refused(tmp_path: Path) -> None:
-    broken = tmp_path / "broken.fmu"
-    with zipfile.ZipFile(FOLDER / "Lag_2.fmu") as good, zipfile.ZipFile(broken, "w") as archive:
-        for name in good.namelist():
-            archive.writestr(name, b"nothing" if name.endswith(".dll") else good.read(name))
+    good, broken = FOLDER / "Lag_2.fmu", tmp_path / "broken.fmu"
+    fixtures.altered(good, broken, lambda _: b"nothing", ending=".dll")
     with pytest.raises(ModelError, match="the library cannot be loaded: it is not a 64-bit library"):
         run(FmuModel(broken), ("y",))

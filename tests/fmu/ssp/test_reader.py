@@ -10,7 +10,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package
 from falsifier.fmu.ssp import reader as ssp
-from tests.fmu.fixtures import path
+from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import run, sampled_loop
 
@@ -241,10 +241,8 @@ def test_a_wrong_package_is_one_clear_line(message: str, tmp_path: Path) -> None
 
 
 def test_an_fmu_with_wrong_units_is_a_wrong_package(tmp_path: Path) -> None:
-    odd = tmp_path / "Odd.fmu"
-    with zipfile.ZipFile(path("Plant_2")) as known, zipfile.ZipFile(odd, "w") as copy:
-        for name in known.namelist():
-            copy.writestr(name, known.read(name).replace(b'<BaseUnit m="1"/>', b'<BaseUnit m="one"/>'))
+    known, wrong = b'<BaseUnit m="1"/>', b'<BaseUnit m="one"/>'
+    odd = altered(path("Plant_2"), tmp_path / "Odd.fmu", lambda content: content.replace(known, wrong))
     more: dict[str, str | bytes] = {"resources/Odd.fmu": odd.read_bytes()}
     file = write(tmp_path / "odd.ssp", plant("Plant_2", "Odd"), more=more)
     with pytest.raises(

@@ -3,8 +3,7 @@
 import numpy as np
 
 from falsifier.engines.layout import Array, Layout, TimeGrid, planning_layout
-from falsifier.engines.surrogate.local_search import propose_change
-from falsifier.engines.surrogate.variation import mutations, switching
+from falsifier.engines.surrogate.variation import mutations, propose_change, switching
 from falsifier.testing import FREE, START, lag_problem
 
 
