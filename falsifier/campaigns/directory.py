@@ -49,10 +49,10 @@ def is_campaign(directory: Path) -> bool:
 def check_new(directory: Path) -> None:
     """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has."""
     if is_campaign(directory) or holds_run(directory):
-        what = "campaign" if is_campaign(directory) else "run"
+        what, resume = ("campaign", "resume_campaign") if is_campaign(directory) else ("run", "resume")
         raise JournalError(
             f"{directory} already contains a {what}: choose another directory, or to continue it: "
-            + written(f"falsifier resume {directory}", f"resume_campaign({str(directory)!r})")
+            + written(f"falsifier resume {directory}", f"{resume}({str(directory)!r})")
         )
     check_unused(directory)
 
