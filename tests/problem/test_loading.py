@@ -49,7 +49,7 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         ("G[0,20]", "G[0,60]", r"requirements\.R\.formula: .*60 s"),
         ("G[0,20]", "G[0,20", r"requirements\.R\.formula: "),
         ("control_points", "range = [0, 120]\ncontrol_points", r"inputs\.throttle\.range: .* exceeds"),
-        ("[inputs.throttle]", "[inputs.airLoad]", r"inputs\.airLoad: .*; write \[parameters\.airLoad\]"),
+        ("[inputs.throttle]", "[inputs.airLoad]", r"inputs\.airLoad: .*; write parameters in p"),
         ('"AT.fmu"', "“AT.fmu”", r"not valid TOML: .*: fmu = “AT.fmu”; write straight quotes"),
         ('"AT.fmu"', "AT.fmu", r"not valid TOML: .*: fmu = AT.fmu; write texts in quotes"),
         ('"AT.fmu"', '"AT.fmu"\nstop_time = 5,5', r"not valid .*: stop_time = 5,5; write decimals with a p"),
