@@ -111,13 +111,14 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
         low, high = v.limits
         found[v.name] = Interval(-np.inf if low is None else low, np.inf if high is None else high)
     found |= {name: Interval(value, value) for name, value in _constants(problem).items()}
-    kept = (r for r in problem.space.ranges if not problem.info.is_start(r.name))
-    return found | {r.name: Interval(r.low, r.high) for r in kept}
+    starts = problem.info.starts
+    return found | {r.name: Interval(r.low, r.high) for r in problem.space.ranges if r.name not in starts}
 
 
 def _constants(problem: Problem) -> dict[str, float]:
     """Return the values that stay the same: inputs and parameters that are fixed."""
-    return {n: v for n, v in problem.parameters.items() if not problem.info.is_start(n)}
+    starts = problem.info.starts
+    return {name: value for name, value in problem.parameters.items() if name not in starts}
 
 
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
@@ -138,8 +139,7 @@ def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
 
 
 def _windows(problem: Problem) -> Iterator[LintFinding]:
-    searched = {p.name for p in problem.space.parameters if not problem.info.is_start(p.name)}
-    still = searched | _constants(problem).keys()
+    still = {*_constants(problem), *(p.name for p in problem.space.parameters)} - problem.info.starts
     for part in dict.fromkeys(problem.requirement.formula.walk()):
         if not isinstance(part, Always | Eventually | Until):
             continue

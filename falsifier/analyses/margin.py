@@ -66,7 +66,8 @@ class Margin:
             ends = [f"falsified in the whole range, even at {self.falsified:.12g}"]
         elif self.falsified is None:
             ends = [f"not falsified in the whole range, not even at {self.unfalsified:.12g}"]
-        return f"{', '.join(ends)} {effort}{'' if self.complete else '; a larger budget narrows it'}"
+        more = "" if self.complete else "; a larger budget narrows it"
+        return f"{', '.join(ends)} {effort}{more}"
 
 
 def margin(

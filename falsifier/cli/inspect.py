@@ -138,21 +138,16 @@ def _print_convergence(
 
     interface = stated.interface or default_interface(found)
     stop_time = stated.stop_time or found.stop_time or DEFAULT_STOP_TIME
-    outputs = tuple(v.name for v in found.observables if v.kind != "string" and v.name not in stated.omit)
+    named = (v.name for v in found.observables if v.kind != "string" and v.name not in stated.omit)
+    outputs = tuple(named)[:_CHECKED_VARIABLES]
     if not outputs:
         raise SpecError(f"{found.name}: no output, state or other computed variable to compare")
     interval, reason = stated.output_interval, "as the spec states"
     if interval is None:
         grid = choose_grid(stop_time, fmu_step=found.step_size, step_size=stated.step_size)
         interval, reason = grid.interval, grid.reason
-    experiment = Experiment(
-        stop_time,
-        interval,
-        outputs[:_CHECKED_VARIABLES],
-        stated.step_size,
-        stated.tolerance,
-        stated.time_limit,
-    )
+    settings = (stated.step_size, stated.tolerance, stated.time_limit)
+    experiment = Experiment(stop_time, interval, outputs, *settings)
     signals = {
         v.name: Signal.evenly([v.low, v.high, v.low], stop_time=stop_time, interpolation="linear")
         for v in found.inputs

@@ -206,9 +206,10 @@ class ModelInfo:
         """Return the type of a variable's values; real if there is no such variable."""
         return next((v.kind for v in self.variables if v.name == name), "real")
 
-    def is_start(self, name: str) -> bool:
-        """Return whether what can be given of a variable is only where it starts; the model computes it."""
-        return any(v.name == name and v.causality not in ("input", "parameter") for v in self.variables)
+    @property
+    def starts(self) -> frozenset[str]:
+        """Names of the variables of which only where they start can be given; the model computes them."""
+        return frozenset(v.name for v in self.variables if v.causality not in ("input", "parameter"))
 
     def with_causality(self, causality: Causality) -> tuple[Variable, ...]:
         """Return the variables with this causality, in the model's order, except those of ignored clocks."""

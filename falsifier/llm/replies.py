@@ -61,7 +61,8 @@ class ReplyForm:
             candidate["point"] = schema_of_list({"type": "number"}, size, size)
         if self.count > 1:
             candidate = {"candidates": schema_of_list(schema_of_object(**candidate), 1, self.count)}
-        return schema_of_object(**({"lessons": _TEXT} if self.lessons else {}), **candidate)
+        before = {"lessons": _TEXT} if self.lessons else {}
+        return schema_of_object(**before, **candidate)
 
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}

@@ -206,7 +206,8 @@ class _Call:
             raise
         except httpx.TransportError as error:
             text = self.refusal or _fault_of(error)
-            self.fault = (UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError)(text)
+            kind = UnusableReplyError if text.startswith(_WITHIN) else BrokenReplyError
+            self.fault = kind(text)
             raise
 
 

@@ -63,7 +63,7 @@ def _input(name: str, info: ModelInfo) -> Variable:
         raise SpecError(f"the {info.noun} has one input with two names: use {info[name].alias_of!r} instead")
     _check_unconnected(name, info)
     if any(v.name == name for v in info.parameters):
-        raise SpecError(f"{name} is a parameter; write [parameters.{name}]")
+        raise SpecError(f"{name} is a parameter; write parameters in place of inputs")
     variable = _variable(name, info.inputs, f"the {info.noun} has no such input")
     if variable.kind == "string":
         raise SpecError("this input is a string; it keeps its start value and cannot be set or searched")
@@ -73,7 +73,7 @@ def _input(name: str, info: ModelInfo) -> Variable:
 def _parameter(name: str, info: ModelInfo) -> Variable:
     """Return a parameter or start value that can be set."""
     if name in info and info[name].causality == "input":
-        raise SpecError(f"{name} is an input; write [inputs.{name}]")
+        raise SpecError(f"{name} is an input; write inputs in place of parameters")
     _check_unconnected(name, info)
     if name in info and not info[name].settable:
         v = info[name]

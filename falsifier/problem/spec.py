@@ -33,12 +33,13 @@ _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
 # How files begin that Windows programs, such as PowerShell's >, write in UTF-16.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-# What a line that is no TOML contains, and what to write instead; the first that is found is told.
+# What an error of TOML, with what stands at its place and the whole line below, contains, and what to write
+# instead; the first that is found is told.
 _CURES = {
-    r"[\u2018-\u201e]": "write straight quotes",
-    r"\\": "write backslashes, as of a path, in single quotes",
-    r"=\s*[^\W\d]": "write texts in quotes, true and false in small letters",
-    r"=\s*-?\d+,\d": "write decimals with a point",
+    r"\): [\u2018-\u201e]": "write straight quotes",
+    r"Unescaped|hex value|Invalid value.*\\": "write backslashes, as of a path, in single quotes",
+    r"Invalid value.*\): [^\W\d]": "write texts in quotes, true and false in small letters",
+    r"=\s*[-+]?\d+,\d": "write decimals with a point",
 }
 _LONGEST_LINE = 80  # characters of it that are shown
 # Parts of pydantic's locations that are no keys.
@@ -126,10 +127,12 @@ def read_spec(path: Path) -> Spec:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
             said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
-            at = re.search(r"at line (\d+)", said)
-            line = ": " + one_line(text.split("\n")[int(at[1]) - 1])[:_LONGEST_LINE] if at else ""
-            hint = next((f"; {hint}" for mistake, hint in _CURES.items() if re.search(mistake, line)), "")
-            raise SpecError(f"not valid TOML: {said}{line}{hint}") from None
+            at = re.search(r"\(at line (\d+), column (\d+)\)$", said)
+            line = text.split("\n")[int(at[1]) - 1] if at else ""
+            there = f"{said}: {line[int(at[2]) - 1 :]}\n{line}" if at else said
+            hint = next((f"; {hint}" for mistake, hint in _CURES.items() if re.search(mistake, there)), "")
+            shown = f": {one_line(line)[:_LONGEST_LINE]}" if line else ""
+            raise SpecError(f"not valid TOML: {said}{shown}{hint}") from None
         if not data:
             raise SpecError(
                 "the file contains nothing; write [model], [inputs.NAME] and [requirements.NAME], or let "

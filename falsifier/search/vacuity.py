@@ -219,8 +219,8 @@ class Effects:
     def __init__(self, problem: Problem) -> None:
         self._names = problem.space.names
         # An input that the formula names has an effect on it, whatever the system does.
-        searched = [name for name in self._names if not problem.info.is_start(name)]
-        self._signals = [s for s in problem.requirement.formula.signals if s not in searched]
+        signals = problem.requirement.formula.signals
+        self._signals = [s for s in signals if s not in self._names or s in problem.info.starts]
         self._judged = [name for name in self._names if name not in problem.requirement.formula.signals]
         # By name and the hash of everything else: what was simulated, and what came of it.
         self._seen: dict[tuple[str, int], tuple[set[int], set[int]]] = {}

@@ -27,6 +27,8 @@ _DERIVATIVE_END = re.compile(r"\s*(,\s*\d+)?\s*\)")
 _QUOTED_PATTERN = re.compile(r'"((?:[^"\\]|\\.)+)"', re.DOTALL)
 
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+# The whole part of a number that is written with a decimal comma.
+_DECIMAL_COMMA = re.compile(r"(?<![\w.])\d+(?=,\d)")
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
 _SPELLINGS = {
     "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
@@ -102,6 +104,8 @@ def tokenize(text: str) -> list[Token]:
 
 def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
     """Return an error that shows the line, a caret under the position (counted from 0) and a hint."""
+    if any(number.end() == position for number in _DECIMAL_COMMA.finditer(text)):
+        hint = "write decimals with a point"
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
     line = text[start : len(text) if end < 0 else end].rstrip()
@@ -113,13 +117,12 @@ def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaEr
     return FormulaError(f"{problem} (position {position + 1})\n  {line}\n  {caret}\nhint: {hint}")
 
 
-def hint_for(token: Token, previous: Token | None = None) -> str:
-    """Return what to write instead of a decimal comma, or of a name that was meant as an operator."""
+def hint_for(token: Token) -> str:
+    """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
     written = token.text.partition("[")[0].rstrip("_")  # as Breach writes alw_[0,20]
     word = written.lower()
     if token.kind != "name":
-        is_decimal = token.text == "," and previous and previous.kind == "number"
-        return "write decimals with a point" if is_decimal else ""
+        return ""
     return (
         _INSTEAD.get(written)
         or _INSTEAD.get(word)
@@ -148,7 +151,7 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
 
 def hint_after(token: Token, previous: Token) -> str:
     """Return what to do if a token stands behind a complete formula."""
-    if known := hint_for(token, previous) or hint_for(previous):
+    if known := hint_for(token) or hint_for(previous):
         return known
     if token.text in UNITS and previous.kind == "number":
         return "only the bounds of windows have units; convert the number to the signal's own unit"

@@ -218,7 +218,7 @@ class _Parser:
             token, closes = self._next, f"it closes the '(' at position {opening.position + 1}"
             before = self.tokens[self.index - 1]
             is_operator = len(before.text) > 1 or token.text in ("[", "(")  # a capital may be a signal
-            hint = lexer.hint_for(token, before) or (lexer.hint_for(before) if is_operator else "")
+            hint = lexer.hint_for(token) or (lexer.hint_for(before) if is_operator else "")
             hint = hint or (closes if token.kind in ("end", "symbol") else lexer.JOIN)
             self._fail(f"expected ')' before {token.shown}", token.position, hint)
 
@@ -236,8 +236,7 @@ class _Parser:
         end_token = self._next
         end_text, end_unit = self._bound()
         if not self._accept("]"):
-            hint = lexer.hint_for(self._next, self.tokens[self.index - 1]) or _CLOSED
-            self._fail(f"expected ']' before {self._next.shown}", self._next.position, hint)
+            self._fail(f"expected ']' before {self._next.shown}", self._next.position, _CLOSED)
         if float(start_text) > 0 and bool(start_unit) != bool(end_unit):
             self._fail(
                 "one bound has a unit, the other does not",

@@ -90,10 +90,11 @@ def test_requests_that_timed_out_are_counted_as_paid() -> None:
     with pytest.raises(ChatError) as caught:
         asked(ScriptedChat([late, late]), attempts=2)
     assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, without_reply=2)
-    chat = RunChat(Served(server=(server := ScriptedChat([late] * 3))), Budget(tokens=80), Spent, iter(()))
-    with pytest.raises(LimitReached, match="80 tokens is used up"):
-        chat.complete(QUESTION)
-    assert len(server.requests) == 2
+    for limit, told in ((Budget(tokens=80), "80 tokens"), (Budget(cost=0.8), "0.8 US dollars")):
+        server = ScriptedChat([late] * 3)
+        with pytest.raises(LimitReached, match=f"{told} is used up"):
+            RunChat(Served(server=server), limit, Spent, iter(())).complete(QUESTION)
+        assert len(server.requests) == 2
 
 
 @pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model")], ids=repr)

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier import Candidate, Signal, evaluate
+from falsifier import Candidate, ParameterRange, Signal, evaluate
 from falsifier.campaigns.analysis import load_run
 from falsifier.core.files import bundled
 from falsifier.evaluation.evaluate import Evaluation
@@ -158,7 +158,9 @@ def test_inputs_that_differ_together_or_have_any_effect_are_no_finding() -> None
     assert not seen(named, (0.5, 0.0), (0.5, 1.0)), "the formula names v"
 
 
-def test_the_result_of_a_search_tells_it() -> None:
-    result = falsify(lag_problem("G[0,10] (x <= 2)", inputs=2, response=deaf), "corners", budget=6)
+@pytest.mark.parametrize("starts", [(), (ParameterRange("x", 0.0, 0.0),)])
+def test_the_result_of_a_search_tells_it(starts: tuple[ParameterRange, ...]) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2, parameters=starts, response=deaf)
+    result = falsify(problem, "corners", budget=6)
     (found,) = [f for f in result.findings if f.kind == "effect"]
     assert found.part == "v" and not found.vacuous

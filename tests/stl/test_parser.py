@@ -174,6 +174,8 @@ MISTAKES = [
     ("x > −3", 5, "write -"),
     ("(x > 1,5)", 7, "a point"),
     ("G[0,2,5] b", 6, "a point"),
+    ("x <= 5, y >= 3", 7, "join two"),
+    ("G[0,5, 9] b", 6, "[a,b]"),
     ("1 + 2", 1, "compare it"),
     ("x - 1", 1, "x - 1 >= 0"),
     ("a and x - 1", 7, "compare it"),

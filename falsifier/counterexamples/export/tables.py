@@ -77,17 +77,15 @@ def _values(
 
 def file_columns(table: InputTable, model: Model) -> dict[str, list[NDArray[np.float64]]]:
     """Return the columns of input.csv after the time: of each input its elements, shape (rows,) each."""
-    constant = np.ones(table.times.shape)
-    return {
-        declared: [
-            table.columns[e]
-            if e in table.columns  # of outputs, all but those that are omitted
-            else constant
-            * (nan if model.info[e].causality == "output" else model.info[e].start_number or 0.0)
-            for e in elements
-        ]
-        for declared, elements in _by_declaration(model, table.columns).items()
-    }
+
+    def column(name: str) -> NDArray[np.float64]:
+        if name in table.columns:
+            return table.columns[name]
+        is_omitted = model.info[name].causality == "output"  # all other outputs are in the table
+        return np.full(table.times.shape, nan if is_omitted else model.info[name].start_number or 0.0)
+
+    declarations = _by_declaration(model, table.columns).items()
+    return {declared: [column(e) for e in elements] for declared, elements in declarations}
 
 
 def write_csv(table: InputTable, path: Path, model: Model) -> Path:
@@ -95,10 +93,8 @@ def write_csv(table: InputTable, path: Path, model: Model) -> Path:
 
     Arrays of the FMU are one column each, with a space between two elements.
     """
-    columns = [
-        ("time", [table.times]),
-        *file_columns(table, model).items(),
-    ]  # an input may be named time, too
+    # Pairs, as an input may be named time, too.
+    columns = [("time", [table.times]), *file_columns(table, model).items()]
     lines = [",".join('"' + csv_cell(name).replace('"', '""') + '"' for name, _ in columns)]
     cells = [np.stack(column, axis=1).tolist() for _, column in columns]
     lines += [",".join(" ".join(map(repr, cell)) for cell in row) for row in zip(*cells, strict=True)]

@@ -101,7 +101,8 @@ class Explorer:
         weights = np.array([1.05 - self._new[s] / self._seen for s in sources])
         # The modes count as much as all signals together: they are the states of what the system does.
         weights[[s == MODES for s in sources]] *= len(sources)
-        marks = self._by_source[sources[int(rng.choice(len(sources), p=weights / weights.sum()))]]
+        source = sources[int(rng.choice(len(sources), p=weights / weights.sum()))]
+        marks = self._by_source[source]
         rarity = np.array([1.0 / sqrt(self._hits[m] * (1 + self._reached[m].tries)) for m in marks])
         return marks[int(rng.choice(len(marks), p=rarity / rarity.sum()))]
 

@@ -52,7 +52,7 @@ class Disguise:
     def view(self) -> View:
         """The view that prompts are built from."""
         real, names, space = self.real, self.names, self.real.space
-        others = [name for name in names if name not in space.names or real.info.is_start(name)]
+        others = [name for name in names if name not in space.names or name in real.info.starts]
         return View(
             info=ModelInfo(
                 name="not named",

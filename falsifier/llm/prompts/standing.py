@@ -194,7 +194,7 @@ def _choice(view: View) -> Iterator[str]:
     yield from _freedom(view)
     for p in view.space.parameters:
         nominal = "" if p.nominal is None else f", nominally {number(p.nominal)}"
-        is_start = view.info.is_start(p.name)
+        is_start = p.name in view.info.starts
         kind, once = ("start value", "at t = 0") if is_start else ("parameter", "for the whole simulation")
         what = f"- {kind} {with_unit(p.name, p.unit)}{_described(p.description)}"
         yield f"{what}; {_values(p)}{nominal}; one value {once}{_in_files(view, p.name)}"

@@ -73,8 +73,8 @@ class View:
     @property
     def formula_outputs(self) -> tuple[str, ...]:
         """Signals of the formula that are not searched themselves, in order of appearance."""
-        chosen = [name for name in self.space.names if not self.info.is_start(name)]
-        return tuple(n for n in self.requirement.formula.signals if n not in chosen)
+        signals, searched = self.requirement.formula.signals, self.space.names
+        return tuple(n for n in signals if n not in searched or n in self.info.starts)
 
     @property
     def recorded(self) -> tuple[str, ...]:

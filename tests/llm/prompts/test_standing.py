@@ -14,6 +14,7 @@ from falsifier.core.space import ParameterRange, SearchSpace
 from falsifier.errors import SpecError
 from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS, View, variant_named
+from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.standing import formula_text
 from falsifier.llm.replies import ReplyForm
 from falsifier.problem.loading import load_problem
@@ -104,6 +105,7 @@ def test_parameters_are_plain_numbers() -> None:
     moving = lag_problem(parameters=(ParameterRange("x", -0.5, 0.5),))
     assert "- start value x; from -0.5 to 0.5; one value at t = 0\n" in standing(moving)
     assert "Output signals: x\n" in standing(moving, "MP4")
+    assert "Output signals: p1\n" in standing(Disguise.of(View.of(moving)).view, "MP4")
 
 
 def kind_of_input(variant: str, **changes: Any) -> str:
