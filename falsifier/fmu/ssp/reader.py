@@ -404,8 +404,8 @@ class _Reader:
                 )
             value = found[0] * value + found[1]
         value = change.factor * value + change.offset
-        if excess := variable.excess(value, value):
-            raise self._wrong(f"the parameter {given.name} is {value:g}, which {excess}; correct it")
+        if wrong := variable.expected(value) or variable.excess(value, value):
+            raise self._wrong(f"the parameter {given.name} is {value:g}: {wrong}; correct it")
         return value
 
 

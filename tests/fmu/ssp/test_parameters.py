@@ -97,3 +97,6 @@ def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
     file = write(tmp_path / "p.ssp", ssd, "Table_2", "Echo_2")
     assert starts(file) == {"t.fileName": "other.txt", "e.in_Enumeration": 3.0, "e.in_Boolean": 1.0}
     assert read_package(file).info["e.in_Enumeration"].start == 3.0
+    ssd = structure(system(echo, before=bindings(inline("e.in_Integer Real 2.5"))))
+    with pytest.raises(SpecError, match=r"e\.in_Integer is 2\.5: expected an integer"):
+        read_package(write(file, ssd, "Echo_2"))

@@ -224,7 +224,7 @@ WRONG = {
     "the parameter plant.T: 'maybe': expected true or false": structure(
         system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
     ),
-    "plant.T is -5, which exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
+    "plant.T is -5: exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
         system(PLANT, before=BOUND.format(values("plant.T Real -5")))
     ),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
