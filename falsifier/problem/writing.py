@@ -228,23 +228,23 @@ def subject_of(target: str) -> Subject:
     path, requirement = find_spec(target)
     free_grid = read_spec(path).model.output_interval is None
     text = path.read_text(encoding="utf-8-sig")
-    problem = problem_of_starter(text, path, requirement)
+    problem = problem_of_starter(text, path, requirement or "", searches=False)
     return Subject(problem, path, text, is_new=False, free_grid=free_grid)
 
 
-def problem_of_starter(text: str, path: Path, requirement: str | None = None) -> Problem:
+def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool = True) -> Problem:
     """Return the problem of a spec, such as a starter, with another requirement than its own.
 
     Its paths are relative to the folder of the file ``path``, for which it is meant. What a requirement
     changes holds for that one alone.
 
     Raises:
-        SpecError: if anything else of it is not valid, or it has no such requirement.
+        SpecError: if anything else of it is not valid, or it has no requirement of this name.
     """
     spec = parse_spec(tomllib.loads(text), file=str(path))
     others = dict.fromkeys(spec.requirements, RequirementSection(formula=_ANY))
     spec = spec.model_copy(update={"requirements": others})
-    return Problem.of(join(spec, requirement or next(iter(others)), path=path, searches=False))
+    return Problem.of(join(spec, name or next(iter(others)), path=path, searches=searches))
 
 
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
