@@ -363,7 +363,7 @@ class _Reader:
         """Return a connector as a variable whose values a component gets as ``factor * value + offset``."""
         first = self._descriptions[target[0]].info[target[1]]
         limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
-        low, high = limits if factor > 0 else limits[::-1]
+        low, high = (x and float(f"{x:.15g}") for x in (limits if factor > 0 else limits[::-1]))
         start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
         unit = self._connectors.get(end, ("", ""))[1] or first.unit
         return replace(first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of="")

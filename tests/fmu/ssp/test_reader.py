@@ -129,6 +129,14 @@ def test_an_input_of_the_whole_may_have_the_values_that_all_its_targets_may(tmp_
     assert (info["r"].limits, info["n"].kind) == ((0.0, 2.0), "integer")
 
 
+def test_limits_of_what_is_converted_are_round(tmp_path: Path) -> None:
+    port = '<ssd:Connectors><ssd:Connector name="r" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+    change = '<ssc:LinearTransformation factor="0.002" offset="0.1"/></ssd:Connection>'
+    wire = f'<ssd:Connection startConnector="r" endElement="pi" endConnector="r">{change}'
+    model = read_package(write(tmp_path / "l.ssp", structure(system(PI, wire, before=port)), "Gain_2"))
+    assert model.info["r"].limits == (-50.0, 950.0)
+
+
 def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_path: Path) -> None:
     scaled = """<ssd:Connection startElement="plant" startConnector="y" endConnector="height">
       <ssc:LinearTransformation factor="2"/></ssd:Connection>"""
