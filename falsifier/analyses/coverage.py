@@ -217,7 +217,11 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     for r in described.inputs:
         signals = [c.signals[r.name] for c in candidates]
         paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
-        ranges.append(_of_range(r, [s.sample(times) for s in signals], {p: paces[p] for p in PACES}))
+        # Also what is held only between two of these times; what is sampled and held, when it is sampled.
+        most = max((len(s.times) for s in signals), default=0)
+        moments = [np.append(times, np.resize(s.times, most) + (s.hold or 0.0)) for s in signals]
+        values = [s.sample(np.minimum(at, stop_time)) for s, at in zip(signals, moments, strict=True)]
+        ranges.append(_of_range(r, values, {p: paces[p] for p in PACES}))
     for p in described.parameters:
         ranges.append(_of_range(p, [[c.parameters[p.name]] for c in candidates], {}))
     pairs = []
@@ -240,16 +244,17 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
 def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) -> tuple[RangeCoverage, Cells]:
     """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
-    n is _SAMPLES for an input, 1 for a parameter, which has no paces.
+    n is _SAMPLES for an input, which may have more values, and 1 for a parameter, which has no paces.
     """
-    values = np.array(tried, np.float64).reshape(len(tried), _SAMPLES if paces else 1)
+    values = np.array(tried, np.float64) if tried else np.empty((0, _SAMPLES if paces else 1))
     cells, count = cells_of(r, values), len(edges_of(r))
     low, high = (float(values.min()), float(values.max())) if values.size else (None, None)
     times = None
     if paces:
         of_slice = np.arange(_SAMPLES) * SLICES // _SAMPLES
-        times = np.stack([_had(cells[:, of_slice == k], count) for k in range(SLICES)])
-    return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells
+        even = cells[:, :_SAMPLES]
+        times = np.stack([_had(even[:, of_slice == k], count) for k in range(SLICES)])
+    return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells[:, :_SAMPLES].copy()
 
 
 def _had(cells: Cells, count: int) -> Counts:

@@ -133,7 +133,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     request = ChatRequest(messages=messages, reply_schema=formalizing.readings_schema())
     try:
         converse(chat, request, read, exchanges.append)
-    except NoValidReplyError:
+    except (NoValidReplyError, SpecError):  # also one that takes back what was valid
         if not readings:
             raise
     spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())

@@ -20,7 +20,9 @@ _HIDDEN = re.compile(
     r"<!--.*?(?:-->|\Z)|<(script|style)\b.*?(?:</\1\s*+>|\Z)|<head\b.*?(?:</head\s*+>|(?=<body)|\Z)",
     re.DOTALL | re.IGNORECASE,
 )
-_BLOCK_TAG = re.compile(r"</?(?:p|br|li|tr|div|h[1-6]|table|pre)\b[^<>]*+>?", re.IGNORECASE)
+_BLOCK_TAG = re.compile(r"</?(?:p|br|li|tr|d[dt]|div|h[1-6]|table|pre)\b[^<>]*+>?", re.IGNORECASE)
+# Without something in its place, numbers of two cells, or a number and its power, would be another number.
+_CELL, _POWER = (re.compile(rf"<{tag}\b[^<>]*+>?", re.IGNORECASE) for tag in ("t[dh]", "sup"))
 _TAG = re.compile(r"</?[a-z!?][^<>]*+>?", re.IGNORECASE)
 _ENTITY = re.compile(r"&#?\w{1,32};?")
 _HEADING = re.compile(r"(#{1,6}\s|=+\s|\d+(\.\d+)*\s+[A-Z])")
@@ -115,6 +117,7 @@ def _modes(diagram: Diagram) -> Iterator[Threshold]:
 
 
 def _without_tags(page: str) -> str:
-    page = _TAG.sub("", _BLOCK_TAG.sub("\n", _HIDDEN.sub("", page)))
+    for pattern, shown in ((_HIDDEN, ""), (_BLOCK_TAG, "\n"), (_CELL, " "), (_POWER, "^"), (_TAG, "")):
+        page = pattern.sub(shown, page)
     plain = _ENTITY.sub(lambda entity: html.unescape(entity[0]), re.sub(r"[ \t\r\f]+", " ", page))
     return re.sub(r"\n{3,}", "\n\n", plain)

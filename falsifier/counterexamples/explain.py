@@ -11,7 +11,7 @@ from math import inf
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.counterexamples.shrink import (
     constant_signal,
     stretches,
@@ -156,20 +156,18 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
             found = evaluate(problem, problem.space.admit(reset))
             yield replace(to, span=span, robustness=found.robustness, violated=found.violated)
 
-    of_inputs = {r.name: _reset(problem, r, candidate.signals[r.name].values) for r in problem.space.inputs}
     for r in problem.space.inputs:
-        to = of_inputs[r.name]
-        if set(candidate.signals[r.name].values) != {to.instead}:
+        signal = candidate.signals[r.name]
+        to = _reset(problem, r, signal.values)
+        if set(signal.values) != {to.instead}:
             yield from effect(with_signal(candidate, r.name, constant_signal(problem, r, to.instead)), to)
+        for first, end in _longest(signal):
+            span = _span(signal, first, end, problem.space.stop_time)
+            reset = with_signal(candidate, r.name, with_stretch(signal, first, end, to.instead))
+            yield from effect(reset, to, span)
     for p in problem.space.parameters:
         to = _reset(problem, p, (candidate.parameters[p.name],))
         yield from effect(with_parameter(candidate, p.name, to.instead), to)
-    for name, to in of_inputs.items():
-        signal = candidate.signals[name]
-        for first, end in _longest(signal):
-            span = _span(signal, first, end, problem.space.stop_time)
-            reset = with_signal(candidate, name, with_stretch(signal, first, end, to.instead))
-            yield from effect(reset, to, span)
 
 
 def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[float, ...]) -> Effect:
@@ -180,7 +178,8 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
     rest = rest_value(problem, ranged)
     if rest is not None and any(v != rest for v in values):
         return Effect(ranged.name, None, rest, is_rest=True)
-    return Effect(ranged.name, None, (ranged.low + ranged.high) / 2, is_rest=False)
+    middle = nearest_value(ranged, (ranged.low + ranged.high) / 2)
+    return Effect(ranged.name, None, middle, is_rest=False)
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:

@@ -28,6 +28,7 @@ _GRID_SHARE = 0.63
 _LEAST_BUDGET = 7
 # Maximum sizes of the changes as shares of the radius; each is used for an equal part of the samples.
 _SHELLS = (0.125, 0.25, 0.5, 1.0)
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +66,13 @@ class RobustnessMap:
 
     Attributes:
         original: robustness of the counterexample; not negative for a near miss.
-        coordinates: the values that are changed.
+        coordinates: the values that are changed; no whole numbers that the radius leaves as they are.
         radius: largest change as a share of the range.
         values: values of the coordinates, shape (samples, coordinates).
         sizes: size of each sample's change as a share of the range, shape (samples,).
         robustness: robustness of each sample, shape (samples,); NaN if the simulation failed.
-        influences: rank correlation of each coordinate with the robustness over the samples, -1 to 1; 0 if
-            one of them does not vary.
+        influences: rank correlation of each coordinate with the robustness, -1 to 1, by the ranks within a
+            shell; 0 if one of them does not vary.
         axes: indices of the two coordinates with the largest; one if there is only one.
         grid: values of these coordinates, one array each.
         surface: robustness over the grid, with the other coordinates unchanged, shape
@@ -114,7 +115,8 @@ class RobustnessMap:
             (size, share), *larger = self.persistence
             shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
             shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
-            return f"{shares} ({changes} of all inputs at once). {self._followed}"
+            names = listed(list(dict.fromkeys(c.name for c in self.coordinates)))
+            return f"{shares} ({changes} of {names} at once). {self._followed}"
         tried = f"{changes} of up to {_percent(self.persistence[-1][0])} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
@@ -145,7 +147,7 @@ def robustness_map(
         seed: seed of the sequence.
 
     Raises:
-        SpecError: for a failed simulation, a radius outside (0, 1], or a budget below 7.
+        SpecError: for a failed simulation, a radius outside (0, 1] or without effect, or a budget below 7.
     """
     check_evaluation(problem, evaluation)
     if evaluation.robustness is None:
@@ -157,20 +159,30 @@ def robustness_map(
     from scipy.stats.qmc import Sobol
 
     candidate = evaluation.candidate
-    coordinates = tuple(_coordinates(problem, candidate))
+    discrete = {r.name: radius * (r.high - r.low) for r in problem.space.ranges if r.kind != "real"}
+    found = _coordinates(problem, candidate)
+    coordinates = tuple(c for c in found if discrete.get(c.name, 1.0) >= 1 - _ROUNDING)
+    if not coordinates:
+        change = f"{_percent(radius)} of the range of a whole number is no change"
+        raise SpecError(f"{problem.name}: {change}; in Python, robustness_map accepts a larger radius")
     start, low, high = np.array([(c.value, c.low, c.high) for c in coordinates]).T
-    reach = radius * (high - low)
+    reach, is_whole = radius * (high - low), np.array([c.name in discrete for c in coordinates])
+    reach[is_whole] = np.floor(reach[is_whole] + _ROUNDING)
     unit = Sobol(len(coordinates), seed=seed).random_base2((samples - 1).bit_length())[:samples]
     # One block of samples per shell: alternating shells would correlate with the bits of the Sobol sequence.
-    shell = np.array(_SHELLS)[np.arange(samples) * len(_SHELLS) // samples, np.newaxis] * reach
+    shells = np.arange(samples) * len(_SHELLS) // samples
+    shell = np.array(_SHELLS)[shells, np.newaxis] * reach
     below, above = np.maximum(start - shell, low), np.minimum(start + shell, high)
     values = below + unit * (above - below)
+    values[:, is_whole] = np.rint(values[:, is_whole])
+    changed = (values != start).any(axis=1)
+    values, shells, samples = values[changed], shells[changed], int(changed.sum())
     sizes = np.abs((values - start) / (high - low)).max(axis=1)
     robustness = np.array(_simulated(problem, candidate, coordinates, values))
     if not robustness.size:
         raise KeyboardInterrupt
     values, sizes = values[: robustness.size], sizes[: robustness.size]
-    influences = _influences(values, robustness)
+    influences = _influences(values, robustness, shells[: robustness.size])
     axes = tuple(int(i) for i in np.argsort(-np.abs(influences), kind="stable")[:2])
     grid = tuple(
         np.linspace(max(start[i] - reach[i], low[i]), min(start[i] + reach[i], high[i]), points) for i in axes
@@ -180,8 +192,8 @@ def robustness_map(
     rows[:, axes[::-1]] = np.stack(np.meshgrid(*grid[::-1], indexing="ij"), axis=-1).reshape(-1, len(axes))
     rows = rows if robustness.size == samples else rows[:0]
     surface = np.full(points ** len(axes), np.nan)
-    found = _simulated(problem, candidate, coordinates, rows)
-    surface[: len(found)] = found
+    judged = _simulated(problem, candidate, coordinates, rows)
+    surface[: len(judged)] = judged
     return RobustnessMap(
         evaluation.robustness,
         coordinates,
@@ -193,7 +205,7 @@ def robustness_map(
         axes,
         grid,
         surface.reshape(-1, points),
-        interrupted=len(found) < len(surface),
+        interrupted=len(judged) < len(surface),
     )
 
 
@@ -223,31 +235,31 @@ def _simulated(
     """Return the robustness for each row of values; until Ctrl-C, for those that were simulated."""
     found: list[float] = []
     with suppress(KeyboardInterrupt):
-        for row in rows:
-            found.append(_robustness(problem, candidate, coordinates, row))
+        for row in rows.tolist():
+            changed = candidate
+            for c, value in zip(coordinates, row, strict=True):
+                if c.stretch is None:
+                    changed = with_parameter(changed, c.name, value)
+                else:
+                    signal = with_stretch(changed.signals[c.name], *c.stretch, value)
+                    changed = with_signal(changed, c.name, signal)
+            robustness = evaluate(problem, problem.space.admit(changed)).robustness
+            found.append(np.nan if robustness is None else robustness)
     return found
 
 
-def _robustness(
-    problem: Problem, candidate: Candidate, coordinates: Sequence[Coordinate], values: NDArray[np.float64]
-) -> float:
-    changed = candidate
-    for c, value in zip(coordinates, values.tolist(), strict=True):
-        if c.stretch is None:
-            changed = with_parameter(changed, c.name, value)
-        else:
-            changed = with_signal(changed, c.name, with_stretch(changed.signals[c.name], *c.stretch, value))
-    robustness = evaluate(problem, problem.space.admit(changed)).robustness
-    return np.nan if robustness is None else robustness
-
-
-def _influences(values: NDArray[np.float64], robustness: NDArray[np.float64]) -> NDArray[np.float64]:
+def _influences(
+    values: NDArray[np.float64], robustness: NDArray[np.float64], shells: NDArray[np.intp]
+) -> NDArray[np.float64]:
     """Rank correlation of each column of values, shape (samples, coordinates), with the robustness."""
     from scipy.stats import rankdata
 
     known = np.isfinite(robustness)
     if known.sum() < 2:
         return np.zeros(values.shape[1])
-    ranks = rankdata(np.column_stack((values, robustness))[known], axis=0)
+    table = np.column_stack((values, robustness))
+    # By shell: away from a bound, all values move the farther the larger it is, whatever they have effect on.
+    blocks = (table[known & (shells == k)] for k in range(len(_SHELLS)))
+    ranks = np.concatenate([rankdata(block, axis=0) - (len(block) + 1) / 2 for block in blocks])
     with np.errstate(invalid="ignore"):  # what does not vary has no correlation
         return np.asarray(np.nan_to_num(np.corrcoef(ranks, rowvar=False)[-1, :-1]))

@@ -1,13 +1,7 @@
 """A language model (LLM) and the surrogate engine, sharing one history.
 
-The LLM proposes the first candidate, because its first guess is better than any corner; the surrogate then
-shows how the system responds, with an input that steps or switches. From then on ``Turns`` decides who is
-next, from what each half has brought.
-
-A later answer has several candidates. The surrogate predicts them before any is simulated, and uses them as
-starts of its own search; the best predicted one is simulated if that is worth it. One that is the same
-experiment as an earlier sample is not simulated on untested predictions, and the LLM is told so. Before it
-answers, the LLM is told why the surrogate chose its samples and what it would do next.
+``Turns`` decides who is next; ``design/search.md`` says why. Of several candidates of the LLM, the surrogate
+predicts all before one is simulated, and uses them as starts of its own search.
 """
 
 import logging

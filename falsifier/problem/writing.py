@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import tomlkit
-from tomlkit.items import Item
+from tomlkit.items import InlineTable, Item
 
 from falsifier.core.files import absent
 from falsifier.core.literals import one_line
@@ -18,13 +18,13 @@ from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
-from falsifier.problem.loading import find_spec, load_source
+from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import RequirementSection
-from falsifier.problem.source import MODEL_FILES, ProblemSource
+from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
 from falsifier.stl.lexer import name_text
@@ -226,35 +226,41 @@ def subject_of(target: str) -> Subject:
         starter, text = fmu.with_suffix(".toml"), starter_spec(Path(fmu.name), info)
         return Subject(problem_of_starter(text, starter), starter, text, is_new=True, free_grid=True)
     path, requirement = find_spec(target)
-    spec = read_spec(path)
-    name = requirement or next(iter(spec.requirements))
-    return Subject(
-        load_source(ProblemSource(target=f"{path}:{name}", stl=_ANY)),
-        path,
-        path.read_text(encoding="utf-8-sig"),
-        is_new=False,
-        free_grid=spec.model.output_interval is None and spec.requirements[name].output_interval is None,
-    )
+    free_grid = read_spec(path).model.output_interval is None
+    text = path.read_text(encoding="utf-8-sig")
+    problem = problem_of_starter(text, path, requirement or "", searches=False)
+    return Subject(problem, path, text, is_new=False, free_grid=free_grid)
 
 
-def problem_of_starter(text: str, path: Path) -> Problem:
-    """Return the problem of a starter spec, with another requirement than its placeholder.
+def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool = True) -> Problem:
+    """Return the problem of a spec, such as a starter, with another requirement than its own.
 
-    Its paths are relative to the folder of the file ``path``, for which it is meant.
+    Its paths are relative to the folder of the file ``path``, for which it is meant. What a requirement
+    changes holds for that one alone.
 
     Raises:
-        SpecError: if anything else of it is not valid.
+        SpecError: if anything else of it is not valid, or it has no requirement of this name.
     """
-    spec, stated = parse_spec(tomllib.loads(text), file=str(path)), RequirementSection(formula=_ANY)
-    return Problem.of(join(spec, _STARTED, path=path, stated=stated))
+    spec = parse_spec(tomllib.loads(text), file=str(path))
+    others = dict.fromkeys(spec.requirements, RequirementSection(formula=_ANY))
+    spec = spec.model_copy(update={"requirements": others})
+    return Problem.of(join(spec, name or next(iter(others)), path=path, searches=searches))
 
 
 def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
-    """Change relative paths of FMUs to those from another file's folder."""
+    """Change relative paths of FMUs and context files to those from another file's folder."""
+
+    def moved(named: str) -> str:
+        there = Path(relpath((folder / named).resolve(), out.resolve().parent)).as_posix()
+        return named if Path(named).is_absolute() else there
+
     for section in (document.get("model", {}), *document.get("components", {}).values()):
-        if "fmu" in section and not Path(str(section["fmu"])).is_absolute():
-            fmu = (folder / str(section["fmu"])).resolve()
-            section["fmu"] = Path(relpath(fmu, out.resolve().parent)).as_posix()
+        if "fmu" in section:
+            section["fmu"] = moved(str(section["fmu"]))
+    context: Any = document.get("context", {})
+    files = list(context.get("files", ()))
+    for key in context.keys() & {"files", "checked"}:  # a file within an FMU is named after that
+        context[key] = [moved(name) if name in files else name for name in context[key]]
 
 
 def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
@@ -270,7 +276,7 @@ def with_requirement(subject: Subject, out: Path, formula: str, *, description: 
     if subject.is_started:
         del requirements[_STARTED]
     name = next(f"R{k}" for k in range(1, len(requirements) + 2) if f"R{k}" not in requirements)
-    table = tomlkit.table()
+    table = tomlkit.inline_table() if isinstance(requirements, InlineTable) else tomlkit.table()
     table.add("formula", _formula_item(formula))
     table.add("description", description)
     requirements[name] = table

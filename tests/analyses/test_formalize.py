@@ -207,6 +207,8 @@ def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, targ
     found = ask(server, target, replying(good, bad), replying(bad), replying(bad))
     assert [str(r.formula) for r in found.readings] == [GOOD]
     assert len(found.rejected) == 3
+    cannot = Step(json.dumps({"readings": [], "cannot": "No."}))
+    assert len(ask(server, target, replying(good, bad), cannot).readings) == 1
     with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
         ask(server, target, *[replying(bad)] * 3)
 

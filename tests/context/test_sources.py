@@ -228,6 +228,8 @@ def test_pages_lose_their_tags() -> None:
     assert "The value of speed stays < 3." in told["whole"]
     assert "x()" not in told["whole"]
     assert told["paragraphs that name a signal"] == "The value of speed stays < 3."
+    cells = of_text("<table><tr><td>12</td><td>0 <b>V</b> 10<sup>3</sup></table>", "a.html", [])
+    assert texts(cells)["whole"] == "12 0 V 10^3"
 
 
 def test_documents_keep_headings_and_paragraphs_that_name_a_signal() -> None:

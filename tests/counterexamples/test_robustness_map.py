@@ -105,3 +105,18 @@ def test_settings_are_checked() -> None:
         robustness_map(problem(), at(problem(), 0.54, 0.0), radius=0.0)
     with pytest.raises(SpecError, match="budget"):
         robustness_map(problem(), at(problem(), 0.54, 0.0), budget=6)
+
+
+def test_what_only_moves_along_with_the_size_of_the_changes_has_no_influence() -> None:
+    found = robustness_map(problem(), at(problem(), 1.0, -1.0), budget=300)
+    assert found.influences[0] < -0.99 and abs(found.influences[1]) < 0.15
+
+
+def test_whole_numbers_are_changed_by_whole_numbers_or_not_at_all() -> None:
+    def mapped(high: float) -> RobustnessMap:
+        steps = ParameterRange("x0", 0.0, high, kind="integer", nominal=0.0)
+        whole = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=(steps,))
+        return robustness_map(whole, at(whole, 1.0, 4.0), budget=60)
+
+    assert "random changes of u at once" in mapped(10.0).text
+    assert set(mapped(40.0).values[:, 1]) == {2.0, 3.0, 4.0, 5.0, 6.0}

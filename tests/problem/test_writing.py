@@ -106,12 +106,13 @@ def test_sections_in_any_order_are_kept(folder: Path) -> None:
     assert set(read_spec(path).profiles) == {"fast"}
 
 
-def test_in_another_folder_the_fmu_is_found(folder: Path) -> None:
-    path = Path(spec(folder, GOOD))
+def test_in_another_folder_the_fmu_and_context_files_are_found(folder: Path) -> None:
+    path = Path(spec(folder, GOOD + "[context]\nfiles = ['notes.md']\nchecked = ['notes.md']\n"))
     (folder / "deeper").mkdir()
     out = folder / "deeper" / "new.toml"
     out.write_text(with_requirement(subject_of(str(path)), out, "G (rpm <= 1)", description="")[0])
     assert load_problem(f"{out}:R1").name == "R1"
+    assert read_spec(out).context.files == read_spec(out).context.checked == ("../notes.md",)
 
 
 def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder(tmp_path: Path) -> None:
@@ -137,3 +138,19 @@ def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
         fixed.parsed("G[0,0.125] (speed <= 1)")
     with pytest.raises(SpecError, match="position"):
         subject.parsed("G[0,1] (speed <=")
+
+
+def test_what_a_requirement_changes_does_not_hold_for_a_new_one(folder: Path) -> None:
+    path = Path(spec(folder, GOOD.replace("[requirements.R]", "[requirements.R]\nstop_time = 99.0")))
+    for target in (f"{path}", f"{path}:R"):
+        with pytest.raises(SpecError, match="shorten the windows"):
+            subject_of(target).parsed("G[0,80] (rpm <= 1)")
+    with pytest.raises(SpecError, match="no requirement 'S'"):
+        subject_of(f"{path}:S")
+
+
+def test_an_inline_table_of_requirements_gets_one_more(folder: Path) -> None:
+    text, _, _ = GOOD.partition("[requirements.R]")
+    path = Path(spec(folder, f"requirements = {{ R = {{ formula = 'G (speed <= 1)' }} }}\n{text}"))
+    path.write_text(with_requirement(subject_of(str(path)), path, "G (rpm <= 1)", description="")[0])
+    assert set(read_spec(path).requirements) == {"R", "R1"}

@@ -57,7 +57,7 @@ def _structure(path: BlockPath, system: BlockSystem, only: Collection[BlockPath]
         yield f"- {_block(block)}{_from(leading.get(block.name, {}))}"
     left_out = len(system.blocks) - len(told)
     if left_out:
-        yield f"  ({counted(left_out, 'block')} left out: no influence on the requirement)"
+        yield f"  ({counted(left_out, 'block')} left out: in this file, nothing required depends on them)"
 
 
 def _block(block: Block) -> str:

@@ -1,17 +1,4 @@
-"""Counterexamples as files for people and other tools.
-
-::
-
-    counterexample.json         for falsifier itself
-    input.csv                   input signals, for FMPy, fmusim and OpenModelica
-    start_values.json, .ssv     parameters and start values, for scripts and for SSP tools
-    MODEL.fmu                   copy of the FMU
-    SYSTEM.ssp                  of a system of FMUs: its FMUs and connections, start values and inputs
-    components/                 of a system: what each component saw, to simulate it alone; see components.py
-    replay.py                   simulates the FMU with FMPy only; writes outputs.csv, prints where it broke
-    replay.mos                  the same in OpenModelica, from the Modelica model
-    inputs.mat                  input signals and start values for Simulink
-"""
+"""Counterexamples as files for people and other tools; ``docs/counterexamples.md`` lists the files."""
 
 import shutil
 from pathlib import Path

@@ -1,8 +1,6 @@
 """The files of an SSP package (``.ssp``, a zip archive) or beside a system description (``.ssd``).
 
-With the values that parameter bindings take from sets and files, renamed and transformed by mappings. FMPy's
-reader is not used: it resolves entities, ignores transformations of connections (it looks for them in another
-namespace), default experiments and inline mappings, and reads packages only, not ``.ssd`` files.
+With the values that parameter bindings take from sets and files, renamed and transformed by mappings.
 """
 
 import atexit

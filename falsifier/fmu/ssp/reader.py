@@ -147,8 +147,8 @@ class _Reader:
     def wiring(self) -> tuple[dict[str, Connection | str], tuple[Variable, ...], tuple[tuple[str, str], ...]]:
         """Return where the inputs of components get their values, and the inputs and outputs of the whole.
 
-        An input of the whole is like its first target, with the connector's own unit. Outputs of the whole
-        are those that pass an output of a component unchanged; they come with its name.
+        An input of the whole is like its first target, or the first of whole numbers, within the limits of
+        all. Outputs of the whole pass an output of a component unchanged; they come with its name.
         """
         connections: dict[str, Connection | str] = {}
         inputs: dict[End, Variable] = {}
@@ -168,8 +168,9 @@ class _Reader:
                 if (factor, offset) != _UNCHANGED:
                     shown = f"* {factor:.6g} {offset:+.6g}"
                     self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
-                if source not in inputs and source[0] not in self.components:
-                    inputs[source] = self._system_input(source, end, factor, offset)
+                if source[0] not in self.components:
+                    fed = self._passing(source, end, factor, offset)
+                    inputs[source] = _joint(inputs.get(source, fed), fed)
         return connections, tuple(inputs.values()), tuple(outputs)
 
     def values(self, inputs: Sequence[Variable], connected: Collection[str]) -> dict[str, float | str]:
@@ -182,14 +183,13 @@ class _Reader:
                 found[name] = self._value(given, own[name])
             elif not targets:
                 self.notes.append(f"the parameter {name} of the package names nothing that can be set")
-            for end in targets:
-                description = self._descriptions[end[0]]
+            for end, source, (factor, offset) in targets:
                 if _title(end) in connected:
                     continue
-                if refusal := description.slots[end[1]].refusal:
+                if refusal := self._descriptions[end[0]].slots[end[1]].refusal:
                     raise self._wrong(f"the parameter {_title(end)} cannot be set: {refusal}")
-                variable = replace(description.info[end[1]], name=_title(end))
-                found[variable.name] = self._value(given, variable)
+                value = self._value(given, self._passing(source, end, factor, offset))
+                found[_title(end)] = value if isinstance(value, str) else factor * value + offset
         return found
 
     def _wrong(self, what: str) -> SpecError:
@@ -359,26 +359,27 @@ class _Reader:
             unit, before = wanted or unit, target
         return at, (factor, offset)
 
-    def _system_input(self, end: End, target: End, factor: float, offset: float) -> Variable:
+    def _passing(self, end: End, target: End, factor: float, offset: float) -> Variable:
+        """Return a connector as a variable whose values a component gets as ``factor * value + offset``."""
         first = self._descriptions[target[0]].info[target[1]]
         limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
-        low, high = limits if factor > 0 else limits[::-1]
+        low, high = (x and float(f"{x:.15g}") for x in (limits if factor > 0 else limits[::-1]))
         start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
-        unit = self._connectors[end][1] or first.unit
+        unit = self._connectors.get(end, ("", ""))[1] or first.unit
         return replace(first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of="")
 
-    def _targets(self, name: str) -> Iterator[End]:
-        """Yield the variables that a name means: one of a component, or what a parameter connector feeds."""
+    def _targets(self, name: str) -> Iterator[tuple[End, End, tuple[float, float]]]:
+        """Yield the variables of components that a name means, the connector of this name, the conversion."""
         for element in sorted(self.components, key=len, reverse=True):
             local = name.removeprefix(f"{element}.")
             if local != name and local in self._descriptions[element].slots:
-                yield element, local
+                yield (element, local), (element, local), _UNCHANGED
                 return
         for end in self._steps:
             if end[0] in self.components and self._connectors[end][0] == "parameter":
                 source, found = self._traced(end)
-                if _title(source) == name and found == _UNCHANGED:
-                    yield end
+                if _title(source) == name:
+                    yield end, source, found
 
     def _value(self, given: Given, variable: Variable) -> float | str:
         """Return a value for a variable, in its unit."""
@@ -403,9 +404,15 @@ class _Reader:
                 )
             value = found[0] * value + found[1]
         value = change.factor * value + change.offset
-        if excess := variable.excess(value, value):
-            raise self._wrong(f"the parameter {given.name} is {value:g}, which {excess}; correct it")
+        if wrong := variable.expected(value) or variable.excess(value, value):
+            raise self._wrong(f"the parameter {given.name} is {value:g}: {wrong}; correct it")
         return value
+
+
+def _joint(one: Variable, other: Variable) -> Variable:
+    lows, highs = ([x for x in ends if x is not None] for ends in zip(one.limits, other.limits, strict=True))
+    first = other if one.kind == "real" != other.kind else one
+    return replace(first, low=max(lows, default=None), high=min(highs, default=None))
 
 
 def _kind(type_name: str) -> str:

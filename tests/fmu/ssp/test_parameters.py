@@ -76,6 +76,15 @@ def test_units_types_and_names_that_mean_nothing(tmp_path: Path) -> None:
     assert "the parameter engine.T of the package names nothing that can be set" in model.info.notes
 
 
+def test_a_connection_of_parameters_converts_the_value(tmp_path: Path) -> None:
+    wire = """<ssd:Connection startConnector="p" endElement="plant" endConnector="T">
+        <ssc:LinearTransformation factor="2" offset="1"/></ssd:Connection>"""
+    port = '<ssd:Connector name="p" kind="parameter"><ssc:Real/></ssd:Connector>'
+    before = f"<ssd:Connectors>{port}</ssd:Connectors>{bindings(inline('p Real 4'))}"
+    ssd = structure(system(PLANT, wire, before=before))
+    assert starts(write(tmp_path / "p.ssp", ssd, "Plant_2")) == {"plant.T": 9.0}
+
+
 def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
     table = '<ssd:Component name="t" source="resources/Table_2.fmu"/>'
     echo = '<ssd:Component name="e" source="resources/Echo_2.fmu"/>'
@@ -88,3 +97,6 @@ def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
     file = write(tmp_path / "p.ssp", ssd, "Table_2", "Echo_2")
     assert starts(file) == {"t.fileName": "other.txt", "e.in_Enumeration": 3.0, "e.in_Boolean": 1.0}
     assert read_package(file).info["e.in_Enumeration"].start == 3.0
+    ssd = structure(system(echo, before=bindings(inline("e.in_Integer Real 2.5"))))
+    with pytest.raises(SpecError, match=r"e\.in_Integer is 2\.5: expected an integer"):
+        read_package(write(file, ssd, "Echo_2"))

@@ -111,6 +111,32 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
 
 
+def test_an_input_of_the_whole_may_have_the_values_that_all_its_targets_may(tmp_path: Path) -> None:
+    echo = """<ssd:Component name="e" source="resources/Echo_2.fmu"><ssd:Connectors>
+        <ssd:Connector name="in_Real" kind="input"><ssc:Real/></ssd:Connector>
+        <ssd:Connector name="in_Integer" kind="input"><ssc:Integer/></ssd:Connector>
+    </ssd:Connectors></ssd:Component>"""
+    ports = "".join(f'<ssd:Connector name="{n}" kind="input"><ssc:Real/></ssd:Connector>' for n in "rn")
+    wires = "".join(
+        f'<ssd:Connection startConnector="{start}" endElement="{element}" endConnector="{end}"/>'
+        for start, element, end in (
+            ("r", "plant", "u"), ("r", "pi", "r"), ("n", "e", "in_Real"), ("n", "e", "in_Integer"),
+        )
+    )  # fmt: skip
+    ports = f"<ssd:Connectors>{ports}</ssd:Connectors>"
+    ssd = structure(system(PLANT + PI + echo, wires, before=ports))
+    info = read_package(write(tmp_path / "i.ssp", ssd, "Plant_2", "Gain_2", "Echo_2")).info
+    assert (info["r"].limits, info["n"].kind) == ((0.0, 2.0), "integer")
+
+
+def test_limits_of_what_is_converted_are_round(tmp_path: Path) -> None:
+    port = '<ssd:Connectors><ssd:Connector name="r" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>'
+    change = '<ssc:LinearTransformation factor="0.002" offset="0.1"/></ssd:Connection>'
+    wire = f'<ssd:Connection startConnector="r" endElement="pi" endConnector="r">{change}'
+    model = read_package(write(tmp_path / "l.ssp", structure(system(PI, wire, before=port)), "Gain_2"))
+    assert model.info["r"].limits == (-50.0, 950.0)
+
+
 def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_path: Path) -> None:
     scaled = """<ssd:Connection startElement="plant" startConnector="y" endConnector="height">
       <ssc:LinearTransformation factor="2"/></ssd:Connection>"""
@@ -206,7 +232,7 @@ WRONG = {
     "the parameter plant.T: 'maybe': expected true or false": structure(
         system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
     ),
-    "plant.T is -5, which exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
+    "plant.T is -5: exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
         system(PLANT, before=BOUND.format(values("plant.T Real -5")))
     ),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
