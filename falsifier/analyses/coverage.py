@@ -217,9 +217,9 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     for r in described.inputs:
         signals = [c.signals[r.name] for c in candidates]
         paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
-        # Also what is held only between two of these times; what is sampled and held, when it is sampled.
+        # Also what is held only between two of these times; if sampled and held, from the next sampling on.
         most = max((len(s.times) for s in signals), default=0)
-        moments = [np.append(times, np.resize(s.times, most) + (s.hold or 0.0)) for s in signals]
+        moments = [np.append(times, np.resize(s.times, most) + 0.999999 * (s.hold or 0)) for s in signals]
         values = [s.sample(np.minimum(at, stop_time)) for s, at in zip(signals, moments, strict=True)]
         ranges.append(_of_range(r, values, {p: paces[p] for p in PACES}))
     for p in described.parameters:

@@ -43,9 +43,9 @@ def test_before_the_first_simulation_nothing_was_tried() -> None:
     assert [(r.low, r.tried, r.gaps) for r in found.ranges] == [(None, 0, ((0.0, 1.0),))] * 2
 
 
-@pytest.mark.parametrize("hold", (None, 0.02))
-def test_a_pulse_between_two_samples_is_seen(hold: float | None) -> None:
-    (u,) = tried(Signal((0.0, 4.01, 4.035), (5.0, 95.0, 5.0), "constant", hold)).ranges
+@pytest.mark.parametrize(("hold", "at"), ((None, 4.01), (0.02, 4.01), (0.02, 4.02)))
+def test_a_pulse_between_two_samples_is_seen(hold: float | None, at: float) -> None:
+    (u,) = tried(Signal((0.0, at, at + 0.02), (5.0, 95.0, 5.0), "constant", hold)).ranges
     assert (u.high, u.parts[9]) == (95.0, 1)
 
 
