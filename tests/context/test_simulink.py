@@ -158,7 +158,7 @@ def test_only_parameters_with_a_meaning_are_told(tmp_path: Path, block: str, tol
     assert f"- {told}" in structure_text(drawn(tmp_path, [block])).splitlines()
 
 
-def test_blocks_behind_a_signal_are_left_out(files: dict[str, Path]) -> None:
+def test_blocks_behind_a_signal_are_left_out(files: dict[str, Path], tmp_path: Path) -> None:
     diagram = read_diagram(files["newer"])
     found = before(diagram, "limphome.power")
     # The feedback over the bath is part of it, the safety switch behind it is not.
@@ -168,6 +168,9 @@ def test_blocks_behind_a_signal_are_left_out(files: dict[str, Path]) -> None:
     assert upstream(diagram, ["other"]) is None, "nothing can be left out"
     inport = diagram.root.ports("Inport")[0]
     assert upstream(diagram, [inport]) is None, "a controller may act on what it measures"
+    assert inport in before(diagram, inport, "trips")
+    inner = f"SubSystem s\nSystem {{\n{BLOCK.format('Inport', 'v', '')}}}"
+    assert upstream(drawn(tmp_path, ["Inport v", inner, "Gain k"], [("v", "s")]), ["v"]) is None
     text = structure_text(diagram, upstream(diagram, ["power"]))
     assert "Safety switch" not in text
     assert "(4 blocks left out: in this file, nothing required depends on them)" in text

@@ -133,14 +133,15 @@ def upstream(diagram: Diagram, signals: Iterable[str]) -> frozenset[BlockPath] |
     tag anywhere in the model.
 
     Of the requirement's names, ``controller.u`` also names ``u``. None is returned if no signal was found, or
-    only inports of the whole, which may depend on all of it outside, so that nothing can be left out.
+    only inports of the whole, whatever passes them on under their names: they may depend on all of it
+    outside, so that nothing can be left out.
     """
     sources = _sources(diagram)
     wanted = {name.rpartition(".")[2].strip("'") for name in signals} | set(signals)
     queue = [place for place in sources if place[-1] in wanted and place[0]]
     for path, system in diagram.root.walk():
         queue += [(*path, wire.source.block) for wire in system.wires if wire.name and wire.name in wanted]
-    if not (queue := [p for p in queue if len(p) > 1 or p[0] not in diagram.root.ports("Inport")]):
+    if all(place[-1] in diagram.root.ports("Inport") for place in queue):
         return None
     found: set[BlockPath] = set()
     while queue:

@@ -43,19 +43,12 @@ def test_sets_and_mappings_are_read_from_files(tmp_path: Path) -> None:
     }
     file = write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=more)
     assert starts(file) == {"plant.T": 9.0}, "with a mapping, only what it names"
-    wrong = more | {"resources/m.ssm": mapping.replace('"a"', '"b"')}
+    more["resources/m.ssm"] = mapping.replace('"a"', '"b"')
     with pytest.raises(SpecError, match=r"the system: a mapping names the unknown parameter 'b'"):
-        read_package(write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=wrong))
+        read_package(write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=more))
+    more["resources/p.ssv"] = values("a Real x")
     with pytest.raises(SpecError, match=r"p\.ssp: resources/p\.ssv: the parameter a: value: 'x' is not"):
-        read_package(
-            write(
-                tmp_path / "p.ssp",
-                ssd,
-                "Plant_2",
-                "Gain_2",
-                more=more | {"resources/p.ssv": values("a Real x")},
-            )
-        )
+        read_package(write(tmp_path / "p.ssp", ssd, "Plant_2", "Gain_2", more=more))
 
 
 def test_units_types_and_names_that_mean_nothing(tmp_path: Path) -> None:
