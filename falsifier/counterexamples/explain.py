@@ -59,7 +59,7 @@ class Explanation:
         problem: the problem with the requirement.
         evaluation: the counterexample, or the nearest miss.
         diagnosis: the path from the formula to the deciding predicate.
-        effects: effects of resetting parts: whole signals and parameters, then stretches.
+        effects: effects of resetting parts: each whole signal and its stretches, then parameters.
     """
 
     problem: Problem
@@ -149,7 +149,7 @@ def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
 
 
 def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
-    """Reset each signal and each parameter, then each of the longest stretches, if that changes anything."""
+    """Reset each signal, each of its longest stretches and each parameter, if that changes anything."""
 
     def effect(reset: Candidate, to: Effect, span: tuple[float, float] | None = None) -> Iterator[Effect]:
         if reset.key != candidate.key:
@@ -178,8 +178,10 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
     rest = rest_value(problem, ranged)
     if rest is not None and any(v != rest for v in values):
         return Effect(ranged.name, None, rest, is_rest=True)
-    middle = nearest_value(ranged, (ranged.low + ranged.high) / 2)
-    return Effect(ranged.name, None, middle, is_rest=False)
+    middle = (ranged.low + ranged.high) / 2
+    # Of two that are equally near, such as those of a Boolean, the other one.
+    aside = 0.0 if ranged.kind == "real" else 0.25 if values[0] < middle else -0.25
+    return Effect(ranged.name, None, nearest_value(ranged, middle + aside), is_rest=False)
 
 
 def _longest(signal: Signal) -> list[tuple[int, int]]:
