@@ -147,7 +147,7 @@ def robustness_map(
         seed: seed of the sequence.
 
     Raises:
-        SpecError: for a failed simulation, a radius outside (0, 1] or without effect, or a budget below 7.
+        SpecError: for a failed simulation, a radius outside (0, 1] or without effect, or too small a budget.
     """
     check_evaluation(problem, evaluation)
     if evaluation.robustness is None:
@@ -177,6 +177,8 @@ def robustness_map(
     values[:, is_whole] = np.rint(values[:, is_whole])
     changed = (values != start).any(axis=1)
     values, shells, samples = values[changed], shells[changed], int(changed.sum())
+    if not samples:
+        raise SpecError(f"{setting('budget')}: {budget} simulations are too few to change a whole number")
     sizes = np.abs((values - start) / (high - low)).max(axis=1)
     robustness = np.array(_simulated(problem, candidate, coordinates, values))
     if not robustness.size:
@@ -191,9 +193,8 @@ def robustness_map(
     # The second axis first, so that the first one varies along the rows of the surface.
     rows[:, axes[::-1]] = np.stack(np.meshgrid(*grid[::-1], indexing="ij"), axis=-1).reshape(-1, len(axes))
     rows = rows if robustness.size == samples else rows[:0]
-    surface = np.full(points ** len(axes), np.nan)
     judged = _simulated(problem, candidate, coordinates, rows)
-    surface[: len(judged)] = judged
+    surface = np.array(judged + [np.nan] * (points ** len(axes) - len(judged)))
     return RobustnessMap(
         evaluation.robustness,
         coordinates,
@@ -258,6 +259,7 @@ def _influences(
     if known.sum() < 2:
         return np.zeros(values.shape[1])
     table = np.column_stack((values, robustness))
+    shells = shells * (known.sum() >= 4 * len(_SHELLS))  # of one or two in a shell, ranks say nothing
     # By shell: away from a bound, all values move the farther the larger it is, whatever they have effect on.
     blocks = (table[known & (shells == k)] for k in range(len(_SHELLS)))
     ranks = np.concatenate([rankdata(block, axis=0) - (len(block) + 1) / 2 for block in blocks])

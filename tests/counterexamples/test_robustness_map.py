@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange
+from falsifier.core.space import Freedom, ParameterRange, ValueKind
 from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -110,13 +110,18 @@ def test_settings_are_checked() -> None:
 def test_what_only_moves_along_with_the_size_of_the_changes_has_no_influence() -> None:
     found = robustness_map(problem(), at(problem(), 1.0, -1.0), budget=300)
     assert found.influences[0] < -0.99 and abs(found.influences[1]) < 0.15
+    assert robustness_map(problem(), at(problem(), 1.0, -1.0), budget=7).influences[0] < -0.99
 
 
 def test_whole_numbers_are_changed_by_whole_numbers_or_not_at_all() -> None:
-    def mapped(high: float) -> RobustnessMap:
+    def mapped(high: float, kind: ValueKind = "real", budget: int = 60) -> RobustnessMap:
         steps = ParameterRange("x0", 0.0, high, kind="integer", nominal=0.0)
         whole = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=(steps,))
-        return robustness_map(whole, at(whole, 1.0, 4.0), budget=60)
+        inputs = (replace(whole.space.inputs[0], kind=kind),)
+        whole = replace(whole, space=replace(whole.space, inputs=inputs))
+        return robustness_map(whole, at(whole, 1.0, 4.0), budget=budget)
 
+    with pytest.raises(SpecError, match="budget: 7 simulations are too few to change a whole number"):
+        mapped(20.0, "integer", 7)
     assert "random changes of u at once" in mapped(10.0).text
     assert set(mapped(40.0).values[:, 1]) == {2.0, 3.0, 4.0, 5.0, 6.0}
