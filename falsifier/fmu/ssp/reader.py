@@ -95,14 +95,7 @@ def is_package(path: str | Path) -> bool:
 class _Reader:
     """What a walk through nested systems collects, and what follows from it.
 
-    Args:
-        shown: name of the package in messages.
-
-    Attributes:
-        name: name of the whole.
-        times: start and stop time of the default experiment in s, by attribute, if they are stated.
-        components: the FMUs.
-        notes: what the user should know, one sentence each.
+    ``times``: those of the default experiment in s, by attribute, if stated; ``notes``: for the user.
     """
 
     def __init__(self, shown: str) -> None:
@@ -170,7 +163,7 @@ class _Reader:
                     self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
                 if source[0] not in self.components:
                     fed = self._passing(source, end, factor, offset)
-                    inputs[source] = _joint(inputs.get(source, fed), fed)
+                    inputs[source] = self._joint(inputs.get(source, fed), fed)
         return connections, tuple(inputs.values()), tuple(outputs)
 
     def values(self, inputs: Sequence[Variable], connected: Collection[str]) -> dict[str, float | str]:
@@ -324,9 +317,8 @@ class _Reader:
     def _bind(self, element: Element, at: str, package: Package) -> None:
         """Add the values of an element's bindings; called from the inside out, so that outer ones win."""
         with within(_named(at)):
-            self._given |= {
-                _title((at, name)): value for name, value in bound_values(element, package).items()
-            }
+            for name, value in bound_values(element, package).items():
+                self._given[_title((at, name))] = value
 
     def _traced(self, end: End) -> tuple[End, tuple[float, float]]:
         """Follow the connections back from a connector; return where they begin, and the conversion."""
@@ -359,11 +351,24 @@ class _Reader:
             unit, before = wanted or unit, target
         return at, (factor, offset)
 
+    def _joint(self, one: Variable, other: Variable) -> Variable:
+        both = zip(one.limits, other.limits, strict=True)
+        lows, highs = ([x for x in ends if x is not None] for ends in both)
+        first = other if one.kind == "real" != other.kind else one
+        if lows and highs and min(highs) < max(lows) and one is not other:
+            self.notes.append(f"no value of {one.name} is within the limits of all that it feeds")
+            return replace(first, low=one.low, high=one.high)
+        return replace(first, low=max(lows, default=None), high=min(highs, default=None))
+
     def _passing(self, end: End, target: End, factor: float, offset: float) -> Variable:
         """Return a connector as a variable whose values a component gets as ``factor * value + offset``."""
         first = self._descriptions[target[0]].info[target[1]]
-        limits = [None if x is None else (x - offset) / factor for x in (first.low, first.high)]
-        low, high = (x and float(f"{x:.15g}") for x in (limits if factor > 0 else limits[::-1]))
+        low, high = first.low, first.high
+        if (factor, offset) != _UNCHANGED:
+            if first.kind != "real":
+                raise self._wrong(f"{_title(target)}: only reals can be converted; remove factor and offset")
+            limits = [None if x is None else float(f"{(x - offset) / factor:.15g}") for x in (low, high)]
+            low, high = limits if factor > 0 else limits[::-1]
         start = (float(first.start) - offset) / factor if isinstance(first.start, int | float) else 0.0
         unit = self._connectors.get(end, ("", ""))[1] or first.unit
         return replace(first, name=_title(end), unit=unit, low=low, high=high, start=start, alias_of="")
@@ -407,12 +412,6 @@ class _Reader:
         if wrong := variable.expected(value) or variable.excess(value, value):
             raise self._wrong(f"the parameter {given.name} is {value:g}: {wrong}; correct it")
         return value
-
-
-def _joint(one: Variable, other: Variable) -> Variable:
-    lows, highs = ([x for x in ends if x is not None] for ends in zip(one.limits, other.limits, strict=True))
-    first = other if one.kind == "real" != other.kind else one
-    return replace(first, low=max(lows, default=None), high=min(highs, default=None))
 
 
 def _kind(type_name: str) -> str:

@@ -23,6 +23,7 @@ PORTS = """
 <ssd:Connection startConnector="reference" endElement="pi" endConnector="r"/>
 <ssd:Connection startElement="plant" startConnector="y" endConnector="height"/>
 <ssd:Connection startConnector="slowness" endElement="plant" endConnector="T"/>"""
+SHIFT = '><ssc:LinearTransformation offset="9"/></ssd:Connection>'
 MILLIMETRE = '<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>'
 
 
@@ -108,6 +109,10 @@ def test_one_input_of_the_whole_feeds_several_components(tmp_path: Path) -> None
     )
     found = run(model, "pi.y", "pj.y", signals={"r": Signal((0.0, 1.0), (0.0, 1.0), "linear")})
     np.testing.assert_array_equal(found["pi.y"], found["pj.y"])
+    ssd = structure(system(PI + second, wires.removesuffix("/>") + SHIFT, before=port))
+    info = read_package(write(tmp_path / "fan.ssp", ssd, "Gain_2")).info
+    assert info["r"].limits == (0.0, 2.0)
+    assert "no value of r is within the limits of all that it feeds" in info.notes
     np.testing.assert_allclose(found["pi.y"][1:], 2.0 * np.arange(10) / 10, atol=1e-12)
 
 
@@ -127,6 +132,9 @@ def test_an_input_of_the_whole_may_have_the_values_that_all_its_targets_may(tmp_
     ssd = structure(system(PLANT + PI + echo, wires, before=ports))
     info = read_package(write(tmp_path / "i.ssp", ssd, "Plant_2", "Gain_2", "Echo_2")).info
     assert (info["r"].limits, info["n"].kind) == ((0.0, 2.0), "integer")
+    ssd = ssd.replace('"in_Integer"/>', f'"in_Integer"{SHIFT}')
+    with pytest.raises(SpecError, match=r"e\.in_Integer: only reals can be converted"):
+        read_package(write(tmp_path / "i.ssp", ssd, "Plant_2", "Gain_2", "Echo_2"))
 
 
 def test_limits_of_what_is_converted_are_round(tmp_path: Path) -> None:
@@ -135,6 +143,10 @@ def test_limits_of_what_is_converted_are_round(tmp_path: Path) -> None:
     wire = f'<ssd:Connection startConnector="r" endElement="pi" endConnector="r">{change}'
     model = read_package(write(tmp_path / "l.ssp", structure(system(PI, wire, before=port)), "Gain_2"))
     assert model.info["r"].limits == (-50.0, 950.0)
+    turn = altered(path("Gain_2"), tmp_path / "t", lambda x: x.replace(b'x="2.0', b'x="2.000000000000004'))
+    ssd = structure(system(PI, wire.removesuffix(f">{change}") + "/>", before=port))
+    file = write(tmp_path / "t.ssp", ssd, more={"resources/Gain_2.fmu": turn.read_bytes()})
+    assert read_package(file).info["r"].high == 2.000000000000004, "unchanged"
 
 
 def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_path: Path) -> None:
@@ -161,6 +173,13 @@ def feedback(old: str, new: str, *, pi: str = PI) -> str:
 
 BOUND = "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>{}</ssd:ParameterValues>"
 BOUND += "</ssd:ParameterBinding></ssd:ParameterBindings>"
+
+
+def given(value: str) -> str:
+    """A structure with the plant alone, for which the whole gives a value."""
+    return structure(system(PLANT, before=BOUND.format(values(value))))
+
+
 FLAT = """<ssd:Connection startConnector="a" endElement="plant" endConnector="u">
 <ssc:LinearTransformation factor="0"/></ssd:Connection>"""
 MAPPED = FEEDBACK.replace('"u"/>', '"u"><ssc:IntegerMappingTransformation/></ssd:Connection>')
@@ -173,9 +192,7 @@ FROM_INNER = FEEDBACK.replace('"pi"', '"inner.pi"')
 IN_KELVIN = PI.replace("Gain_2", "Gain_2kelvin").replace(' unit="m"', "")
 SCHEDULED, EXCHANGED = (f'<ssd:Component implementation="{each}" ' for each in ("Scheduled", "ModelExchange"))
 OUT = '<ssd:Connectors><ssd:Connector name="out" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>'
-FED_BY_NOTHING = FEEDBACK.replace(
-    'startElement="pi" startConnector="y"', 'startElement="box" startConnector="out"'
-)
+FED_BY_NOTHING = FEEDBACK.replace('"pi" startConnector="y"', '"box" startConnector="out"')
 WRONG = {
     "not well-formed XML": "<ssd",
     "expected the SSP element SystemStructureDescription, got a": "<a/>",
@@ -207,9 +224,7 @@ WRONG = {
     ),
     "nested more than 400 deep": structure(DEEP),
     "the FMU of plant has no variable for the connector plant.v; ": plant('"u"', '"v"'),
-    "plant.u is of kind output, the FMU's variable of kind input": plant(
-        '"u" kind="input"', '"u" kind="output"'
-    ),
+    "plant.u is of kind output, the FMU's variable of kind input": plant('kind="input"', 'kind="output"'),
     "plant.u is of type Boolean, the FMU's variable of type Real": plant('Real unit="m"', "Boolean"),
     "the connector plant.u is in kg, the FMU's variable in m": plant('unit="m"', 'unit="kg"'),
     "names the unknown connector 'plant.v'; known: u, y, T": feedback('Connector="u"', 'Connector="v"'),
@@ -222,28 +237,18 @@ WRONG = {
     "the element plant: <Connector kind=\"input\">: the attribute 'name' is missing": plant(
         'name="u" kind', "kind"
     ),
-    "the system: the parameter plant.T: value: 'much' is not a finite number": structure(
-        system(PLANT, before=BOUND.format(values("plant.T Real much")))
-    ),
+    "the system: the parameter plant.T: value: 'much' is not a finite number": given("plant.T Real much"),
     "the element plant: the parameter T: value: 'nan' is not a finite number": plant(
         "<ssd:Connectors>", BOUND.format(values("T Real nan")) + "<ssd:Connectors>"
     ),
     "the connection pi.y - plant.T feeds a parameter": feedback('Connector="u"', 'Connector="T"'),
-    "the parameter plant.T: 'maybe': expected true or false": structure(
-        system(PLANT, before=BOUND.format(values("plant.T Boolean maybe")))
-    ),
-    "plant.T is -5: exceeds the model's limits for 'plant.T', [0.1, no limit]; correct": structure(
-        system(PLANT, before=BOUND.format(values("plant.T Real -5")))
-    ),
+    "the parameter plant.T: 'maybe': expected true or false": given("plant.T Boolean maybe"),
+    "plant.T is -5: exceeds the model's limits for 'plant.T', [0.1, no limit]": given("plant.T Real -5"),
     "plant.u is fed by pi.y and by pi.y": structure(system(PLANT + PI, FEEDBACK + FEEDBACK)),
     "plant.y is in m, pi.measured in K; the package defines no": feedback("", "", pi=IN_KELVIN),
-    "the element pi: it is of type application/x-modelica; only FMUs": structure(
-        system(PI.replace("x-fmu-sharedlibrary", "x-modelica"))
-    ),
+    "plant: it is of type application/x-m; only FMUs": plant(" source", ' type="application/x-m" source'),
     "the system contains itself, at me": structure(system(ITSELF)),
-    "the parameter plant.y cannot be set": structure(
-        system(PLANT, before=BOUND.format(values("plant.y Real 1")))
-    ),
+    "the parameter plant.y cannot be set": given("plant.y Real 1"),
     "'bus' refers to a signal dictionary, which is not supported": structure(system(BUS)),
     "pi.y - plant.u: the element IntegerMappingTransformation is not supported": structure(
         system(PLANT + PI, MAPPED)
@@ -277,9 +282,7 @@ def test_an_fmu_with_wrong_units_is_a_wrong_package(tmp_path: Path) -> None:
         read_package(file)
 
 
-def test_descriptions_that_grow_like_powers_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_packages_that_grow_like_powers_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ssp, "_MAX_ELEMENTS", 100)
 
     def twice(name: str) -> str:
