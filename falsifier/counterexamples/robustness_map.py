@@ -28,6 +28,7 @@ _GRID_SHARE = 0.63
 _LEAST_BUDGET = 7
 # Maximum sizes of the changes as shares of the radius; each is used for an equal part of the samples.
 _SHELLS = (0.125, 0.25, 0.5, 1.0)
+# Error of rounding in a share of the range of a whole number, up to which it is a change of one.
 _ROUNDING = 1e-9
 
 
