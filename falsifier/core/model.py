@@ -48,6 +48,7 @@ class Variable:
         nominal: typical magnitude.
         start: start value.
         settable: whether it can be set before the simulation starts.
+        refusal: why it cannot be set; empty if it can, or nobody says so.
         is_state: whether it is a continuous state.
         literals: numbers of an enumeration's items by name.
         description: its meaning, from the model.
@@ -70,6 +71,7 @@ class Variable:
     nominal: float | None = None
     start: float | str | None = None
     settable: bool = False
+    refusal: str = ""
     is_state: bool = False
     literals: Mapping[str, int] = field(default_factory=dict)
     description: str = ""

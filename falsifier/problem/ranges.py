@@ -77,7 +77,7 @@ def _parameter(name: str, info: ModelInfo) -> Variable:
     _check_unconnected(name, info)
     if name in info and not info[name].settable:
         v = info[name]
-        reason = f"it is a {v.variability} {v.causality} of the {info.noun}"
+        reason = v.refusal or f"it is a {v.variability} {v.causality} of the {info.noun}"
         reason = f"it is another name of {v.alias_of!r}; use that one" if v.alias_of else reason
         raise SpecError(f"cannot be set: {reason}")
     settable = [v for v in info.variables if v.settable and v.causality != "input"]

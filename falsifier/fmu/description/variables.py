@@ -63,7 +63,6 @@ class Slot:
     offset: int = 0  # position in the array in row-major order, 0 for scalars
     size: int = 1  # number of elements of the array, 1 for scalars
     negated: bool = False  # whether it is an FMI 1 alias with the opposite sign
-    refusal: str = ""  # why it cannot be set; empty if it can
     # Name in modelDescription.xml, if another: an array's for its elements, the variable's for aliases of
     # FMI 3.
     declared: str = ""
@@ -94,7 +93,7 @@ def read_variables(
             raise ValueError(f"value reference {slot.reference} of {variable.name!r} does not fit 32 bits")
         variables.append(variable)
         slots[variable.name] = slot
-    return *_with_aliases_marked(variables, slots), arrays
+    return _with_aliases_marked(variables, slots), slots, arrays
 
 
 @contextmanager
@@ -123,22 +122,19 @@ def check_length(name: str) -> None:
         raise ValueError(f"the name {name[:40]!r}... has more than {LONGEST_NAME} characters")
 
 
-def _with_aliases_marked(
-    variables: Sequence[Variable], slots: Mapping[str, Slot]
-) -> tuple[tuple[Variable, ...], dict[str, Slot]]:
+def _with_aliases_marked(variables: Sequence[Variable], slots: Mapping[str, Slot]) -> tuple[Variable, ...]:
     """Mark all names but one of each variable that can be set: setting two of them would set it twice."""
     first: dict[tuple[str, int, int], str] = {}
     marked: dict[str, Variable] = {}
-    changed = dict(slots)
     # Inputs before parameters before start values: an input may share its reference with a local variable.
     for v in sorted(variables, key=lambda v: (v.causality != "input", v.causality != "parameter")):
         slot = slots[v.name]
         if v.causality == "input" or v.settable:
             known = first.setdefault((slot.type, slot.reference, slot.offset), v.name)
             if known != v.name:
-                marked[v.name] = replace(v, alias_of=known, settable=False)
-                changed[v.name] = replace(slot, refusal=f"it is another name of {known!r}; set that one")
-    return tuple(marked.get(v.name, v) for v in variables), changed
+                refusal = f"it is another name of {known!r}; use that one"
+                marked[v.name] = replace(v, alias_of=known, settable=False, refusal=refusal)
+    return tuple(marked.get(v.name, v) for v in variables)
 
 
 def input_clocks(root: Element) -> dict[int, str]:
@@ -166,7 +162,7 @@ def _variables_1_2(root: Element, major: int) -> Iterator[tuple[Variable, Slot]]
             variable = _variable(element, typed, definition, (kind, code), role, start, is_state=is_state)
             reference = whole(element.attrib, "valueReference")
             negated = element.get("alias") == "negatedAlias"
-            yield variable, Slot(reference, code, negated=negated, refusal=role[2])
+            yield variable, Slot(reference, code, negated=negated)
 
 
 def _states_2(root: Element, elements: list[Element]) -> set[int]:
@@ -235,7 +231,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                             start=starts[offset] if starts else None,
                             is_clocked=is_clocked,
                         ),
-                        Slot(reference, code, offset, count, refusal=role[2], declared=variable.name),
+                        Slot(reference, code, offset, count, declared=variable.name),
                     )
 
 
@@ -264,6 +260,7 @@ def _variable(
         nominal=finite(attributes, "nominal"),
         start=start,
         settable=not role[2],
+        refusal=role[2],
         is_state=is_state,
         literals={item.attrib["name"]: int(item.get("value", k)) for k, item in items},
         description=element.get("description", ""),

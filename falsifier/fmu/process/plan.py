@@ -77,7 +77,8 @@ def make_plan(
                 f"{model}: {name!r} is not an input, its causality is {role}; the inputs are: {known}"
             )
     for name in parameters:
-        if refusal := description.slot(name).refusal:
+        description.slot(name)
+        if refusal := variables[name].refusal:
             raise ModelError(f"{model}: {name!r} cannot be set: {refusal}")
     for name in experiment.outputs:
         description.slot(name)
@@ -85,8 +86,9 @@ def make_plan(
         slot = description.slots.get(name)
         if slot is None:
             raise ModelError(f"{model}: no variable {name!r}; {did_you_mean(name, description.slots)}")
-        if slot.refusal or slot.type != "String" or slot.size != 1:
-            reason = slot.refusal or "it is not a single string"
+        refusal = variables[name].refusal
+        if refusal or slot.type != "String" or slot.size != 1:
+            reason = refusal or "it is not a single string"
             raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
     return Plan(
         model=model,

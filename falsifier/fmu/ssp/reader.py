@@ -179,7 +179,7 @@ class _Reader:
             for end, source, (factor, offset) in targets:
                 if _title(end) in connected:
                     continue
-                if refusal := self._descriptions[end[0]].slots[end[1]].refusal:
+                if refusal := self._descriptions[end[0]].info[end[1]].refusal:
                     raise self._wrong(f"the parameter {_title(end)} cannot be set: {refusal}")
                 value = self._value(given, self._passing(source, end, factor, offset))
                 found[_title(end)] = value if isinstance(value, str) else factor * value + offset

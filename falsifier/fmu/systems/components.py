@@ -125,8 +125,8 @@ def merged(
             shown = replace(variable, name=title, alias_of=alias, start=values.get(title, variable.start))
             if link is not None:
                 source = full_name(members, link.source)
-                shown = replace(shown, causality="local", settable=False)
-                slot = replace(slot, refusal=f"it is connected to {source}")
+                refusal = f"it is connected to {source}"
+                shown = replace(shown, causality="local", settable=False, refusal=refusal)
             variables.append(shown)
             slots[title], places[title] = slot, place
     for other, meant in frame.outputs:

@@ -73,12 +73,12 @@ ROLES = """
 
 
 def test_what_cannot_be_set_says_why() -> None:
-    slots = described(ROLES).slots
-    assert "constant" in slots["c"].refusal
-    assert "calculated parameter" in slots["k"].refusal
-    assert "computes its initial value" in slots["y"].refusal
-    assert "time" in slots["t"].refusal
-    assert slots["p"].refusal == ""
+    info = described(ROLES).info
+    assert "constant" in info["c"].refusal
+    assert "calculated parameter" in info["k"].refusal
+    assert "computes its initial value" in info["y"].refusal
+    assert "time" in info["t"].refusal
+    assert info["p"].refusal == ""
     lag = read_info(fixtures.path("Lag_2"))
     assert [v.name for v in lag.variables if v.is_state] == ["x"]
     assert [v.name for v in lag.variables if v.settable] == ["u", "x", "T", "gain"]
@@ -97,7 +97,7 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     assert names == ["n", "x[1]", "x[2]", "x[3]", "state[1]", "state[2]", "state[3]"]
     assert description.slots["state[2]"].reference == 1
     assert description.arrays[1] == (7.0, 7.0, 7.0)
-    assert "structural parameter" in description.slots["n"].refusal
+    assert "structural parameter" in description.info["n"].refusal
 
 
 @pytest.mark.parametrize(
