@@ -118,8 +118,7 @@ class SimulationError(FalsifierError):
     """A simulation did not produce a complete trajectory.
 
     Attributes:
-        status: ``failed`` (the model reported an error, or an output was NaN or inf), ``crashed`` or
-            ``timeout``.
+        status: ``failed`` (an error of the model, or a NaN or inf output), ``crashed`` or ``timeout``.
         time: simulated time reached, in s, if known.
         log: messages of the model during this simulation.
     """

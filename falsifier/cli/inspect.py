@@ -144,7 +144,12 @@ def _print_convergence(
         raise SpecError(f"{found.name}: no output, state or other computed variable to compare")
     interval, reason = stated.output_interval, "as the spec states"
     if interval is None:
-        grid = choose_grid(stop_time, fmu_step=found.step_size, step_size=stated.step_size)
+        grid = choose_grid(
+            stop_time,
+            fmu_step=found.step_size,
+            internal_step=found.internal_step,
+            step_size=stated.step_size,
+        )
         interval, reason = grid.interval, grid.reason
     settings = (stated.step_size, stated.tolerance, stated.time_limit)
     experiment = Experiment(stop_time, interval, outputs, *settings)

@@ -168,6 +168,7 @@ class ModelInfo:
         start_time: start time of its default experiment in s, if given; simulations start at 0.
         stop_time: stop time of its default experiment in s, if given.
         step_size: step size of its default experiment in s, if given.
+        internal_step: step in s of its own solver, if given (FMI 3); its communication steps are multiples.
         tolerance: relative tolerance of its default experiment, if given.
         variables: all scalar variables.
         notes: what the user should know: what is ignored, unusual or needed, one sentence each.
@@ -184,6 +185,7 @@ class ModelInfo:
     start_time: float | None = None
     stop_time: float | None = None
     step_size: float | None = None
+    internal_step: float | None = None
     tolerance: float | None = None
     variables: tuple[Variable, ...] = ()
     notes: tuple[str, ...] = ()
@@ -267,8 +269,7 @@ class Experiment:
         stop_time: end of the simulation in s; simulations start at 0.
         output_interval: step of the trajectory's time grid in s; the stop time is an integer multiple of it.
         outputs: names of the variables to record.
-        step_size: communication step (co-simulation) or maximum solver step (model exchange) in s; None: the
-            output interval.
+        step_size: communication step or, in model exchange, longest solver step in s; None: output interval.
         tolerance: relative tolerance passed to the model or used by the solver; None: the model's default.
         time_limit: maximum wall-clock time of one simulation in s; None: as long as it makes progress, see
             ``falsifier.fmu.process.plan``.

@@ -168,8 +168,7 @@ class SearchSpace:
         stop_time: end of the simulation in s.
 
     Raises:
-        SpecError: if the stop time is not positive or shorter than a period of an input, or a name occurs
-            twice.
+        SpecError: if the stop time is not positive or shorter than an input's period, or names are equal.
     """
 
     inputs: tuple[InputRange, ...]
@@ -280,8 +279,7 @@ class SearchSpace:
         """Check that a candidate has a value for all that is searched, and none outside its range.
 
         Raises:
-            CandidateError: naming the input or parameter that is unknown or missing, or all that are outside
-                their ranges.
+            CandidateError: naming the input or parameter that is unknown or missing, or all out of range.
         """
         for name in (*candidate.signals, *candidate.parameters):
             if name not in self.names:

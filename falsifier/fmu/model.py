@@ -65,8 +65,7 @@ class FmuModel(Isolated):
         """Simulate once, as described in ``falsifier.core.model.Model.simulate``.
 
         In co-simulation an input is set at each communication point to the signal's value at that time; in
-        model exchange the solver evaluates it at any time. Integer, Boolean and enumeration inputs are
-        rounded.
+        model exchange the solver evaluates it at any time. Inputs of other types than real are rounded.
         """
         try:
             return simulate(self.order, experiment, self._pieces(signals, experiment), parameters)

@@ -45,6 +45,7 @@ def choose_grid(
     *,
     times: Iterable[float] = (),
     fmu_step: float | None = None,
+    internal_step: float | None = None,
     step_size: float | None = None,
 ) -> Grid:
     """Return the grid with the FMU's step, or the next finer one, that fits the stop time and all times.
@@ -53,6 +54,7 @@ def choose_grid(
         stop_time: end of the simulation in s.
         times: times in s that formulas name; those after the stop time are ignored.
         fmu_step: the FMU's default step in s, if it specifies one.
+        internal_step: step in s of its own solver, of which the interval is a multiple if no other is given.
         step_size: communication step in s, if it is stated; the interval is a multiple of it.
 
     Raises:
@@ -69,7 +71,11 @@ def choose_grid(
     if step_size and common % exact(step_size):
         fits = _fitting(stop, named)
         raise SpecError(f"{step_size:g} s does not divide {fits}; change one of these", key="model.step_size")
-    interval = common / _count(common, wanted, exact(step_size) if step_size else None)
+    if fmu_step or step_size or not internal_step or stop_time / internal_step > MAX_STEPS:
+        internal_step = None
+    base = step_size or internal_step
+    is_multiple = base is not None and common % exact(base) == 0
+    interval = common / _count(common, wanted, exact(base) if base and is_multiple else None)
     finest = min(wanted, stop / _MAX_INTERVALS)
     if interval < finest:
         rounded = stop / _DEFAULT_INTERVALS
@@ -78,7 +84,11 @@ def choose_grid(
             f"for example to multiples of {_text(rounded)} s",
             key="model.output_interval",
         )
-    return Grid(float(interval), _reason(interval, _fitting(stop, named), stop_time, fmu_step, step_size))
+    fits = _fitting(stop, named)
+    if internal_step and is_multiple:
+        said = f"a multiple of the FMU's internal step {internal_step:g} s; this divides {fits}"
+        return Grid(float(interval), said)
+    return Grid(float(interval), _reason(interval, fits, stop_time, fmu_step or internal_step, step_size))
 
 
 def formula_times(formulas: Iterable[str]) -> list[float]:

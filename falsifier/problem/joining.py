@@ -217,7 +217,8 @@ def _experiment(
     with naming(setting(changed[0]) if changed else None):
         if output_interval is None:
             times = formula_times(formulas_of(stop_time))
-            grid = choose_grid(stop_time, times=times, fmu_step=info.step_size, step_size=step_size)
+            steps = {"fmu_step": info.step_size, "internal_step": info.internal_step}
+            grid = choose_grid(stop_time, times=times, **steps, step_size=step_size)
             output_interval = grid.interval
         check_steps(stop_time, output_interval, key="model.output_interval")
         check_steps(stop_time, step_size, key="model.step_size")

@@ -168,8 +168,7 @@ class Journal:
 def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0.0) -> Iterator[Journal]:
     """Open the journal of a run directory as its only writer, and close it even after an exception.
 
-    The directory is created if missing. Another process that writes here is waited for, ``patience`` s at
-    most.
+    The directory is created if missing. Another process that writes here is given ``patience`` s to end.
 
     Raises:
         JournalError: if another process still writes here after that time, or a line is damaged.

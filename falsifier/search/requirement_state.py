@@ -54,8 +54,7 @@ class RequirementState:
     ) -> Result:
         """Return the result for this requirement of a search that has ended.
 
-        ``spent`` is that of the whole search. A requirement that was falsified has a status and a reason of
-        its own.
+        ``spent`` is the whole search's. A requirement that was falsified has its own status and reason.
         """
         found, findings = self.counterexample, list[Finding]()
         if self.best is not None and found is None:

@@ -53,10 +53,8 @@ def proposals(engine: Engine, space: SearchSpace, wanted: int) -> list[Candidate
     """Ask an engine, and return its candidates as they will be simulated.
 
     Raises:
-        SpecError: if the engine returns something else than a list of candidates, none, or more than it was
-            asked for.
-        CandidateError: naming the engine and the input or parameter that is unknown, missing or outside its
-            range.
+        SpecError: if the engine returns something else than a list of candidates, none, or more than wanted.
+        CandidateError: naming the engine and the input or parameter that is unknown, missing or out of range.
     """
     try:
         candidates = engine.ask(wanted)

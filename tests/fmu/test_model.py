@@ -52,8 +52,6 @@ def test_no_binary_for_this_platform_says_what_there_is_and_what_to_do() -> None
 def test_interfaces_that_are_not_there_name_the_one_that_is() -> None:
     with pytest.raises(ModelError, match='does not offer co-simulation; set interface = "model-exchange"'):
         FmuModel(fixtures.path("Stiff_2"))
-    with pytest.raises(ModelError, match="scheduled execution is not supported"):
-        FmuModel(fixtures.path("Scheduled_3"))
 
 
 def test_one_hash_for_all_files_does_not_depend_on_their_order() -> None:

@@ -3,37 +3,39 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.grid import check_steps, choose_grid, default_freedom, exact, formula_times
+from falsifier.problem.grid import check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.problem import Problem
 from tests.fmu.fixtures import path as fmu_path
 from tests.problem.support import echo
 
 
 @pytest.mark.parametrize(
-    ("stop", "times", "fmu_step", "interval"),
+    ("stop", "times", "fmu_step", "internal_step", "interval"),
     [
-        (3.0, [1.0], None, 0.002),  # not 0.003 s, of which 1 s is no multiple
-        (50.0, [20.0], 0.01, 0.01),
-        (10.0, [0.25], 0.1, 0.05),
-        (10.0, [2.0], 0.0125, 0.0125),
-        (1.0, [1 / 3], None, 1 / 1002),
-        (0.7, [], 0.2, 0.1),
-        (15.0, [], 1 / 30, 1 / 30),  # divides it but for rounding
-        (10.0, [], 20.0, 0.01),  # longer than the simulation
-        (50.0, [], 0.0, 0.05),
-        (100.0, [200.0], None, 0.1),  # a time after the end is an error of the formula, not of the grid
+        (3.0, [1.0], None, None, 0.002),  # not 0.003 s, of which 1 s is no multiple
+        (50.0, [20.0], 0.01, None, 0.01),
+        (10.0, [0.25], 0.1, None, 0.05),
+        (10.0, [2.0], 0.0125, None, 0.0125),
+        (1.0, [1 / 3], None, None, 1 / 1002),
+        (0.7, [], 0.2, None, 0.1),
+        (15.0, [], 1 / 30, None, 1 / 30),  # divides it but for rounding
+        (10.0, [], 20.0, None, 0.01),  # longer than the simulation
+        (50.0, [], 0.0, None, 0.05),
+        (100.0, [200.0], None, None, 0.1),  # a time after the end is an error of the formula, not of the grid
+        (2.0, [1.0], None, 0.25, 0.25),
+        (10.0, [], None, 0.004, 0.008),  # a multiple, not 0.01 s
+        (2.0, [1.1], None, 0.25, 0.002),
+        (10.0, [], 0.1, 0.3, 0.1),  # the default experiment decides
+        (10.0, [], None, 1e-9, 0.01),
     ],
 )
 def test_the_grid_divides_all_times(
-    stop: float, times: list[float], fmu_step: float | None, interval: float
+    stop: float, times: list[float], fmu_step: float | None, internal_step: float | None, interval: float
 ) -> None:
-    grid = choose_grid(stop, times=times, fmu_step=fmu_step)
+    grid = choose_grid(stop, times=times, fmu_step=fmu_step, internal_step=internal_step)
     assert grid.interval == pytest.approx(interval, rel=1e-12)
     for time in (stop, *(t for t in times if t <= stop)):
-        assert (
-            exact(time) % exact(grid.interval) == 0
-            or abs(time / grid.interval - round(time / grid.interval)) < 1e-9
-        )
+        assert time / grid.interval == pytest.approx(round(time / grid.interval), abs=1e-9)
 
 
 def test_the_reason_names_what_did_not_fit() -> None:
@@ -42,6 +44,8 @@ def test_the_reason_names_what_did_not_fit() -> None:
     assert choose_grid(10.0, times=[0.25], fmu_step=0.1).reason == (
         "the FMU's step 0.1 s does not divide the stop time 10 s and the formula's times 0.25 s; this does"
     )
+    assert "a multiple of the FMU's internal step 0.1 s;" in choose_grid(1e3, internal_step=0.1).reason
+    assert "step 0.25 s does not divide" in choose_grid(2.0, times=[1.1], internal_step=0.25).reason
 
 
 def test_the_grid_is_a_multiple_of_a_stated_communication_step() -> None:

@@ -5,8 +5,7 @@ import pytest
 from falsifier.campaigns.analysis import read_published
 from falsifier.problem.loading import load_problem, load_problems
 
-# Requirements and coordinates of the default parameterization, then of instance 2 if there is one; one more
-# for AFC27.
+# Requirements and coordinates of the default parameterization, then of instance 2 if any; one more for AFC27.
 SYSTEMS = {
     "AFC": ("AFC27 AFC29 AFC33", 11, 11),
     "AT": ("AT1 AT2 AT51 AT52 AT53 AT54 AT6a AT6b AT6c AT6abc", 10, 10),

@@ -24,8 +24,7 @@ _MAX_BYTES = 8 << 30
 _MAX_FILES = 100_000
 # A description of 100,000 variables takes 20 to 30 MB and seconds to read.
 _MAX_TEXT_BYTES = 128 << 20
-# Text compresses by a factor of 5 to 20, a file of zeros by 1000: only a zip bomb is both large and this
-# dense.
+# Text compresses by a factor of 5 to 20, a file of zeros by 1000: only a zip bomb is large and dense.
 _MAX_COMPRESSION = 300
 _DENSE_FROM_BYTES = 256 << 20
 # What a method may add to data that it cannot compress.

@@ -138,6 +138,7 @@ def _parse(root: Element, version: str) -> Description:
         start_time=finite(experiment, "startTime"),
         stop_time=_positive(experiment, "stopTime"),
         step_size=_positive(experiment, "stepSize"),
+        internal_step=_positive(interfaces.get("co-simulation", {}), "fixedInternalStepSize"),
         tolerance=_positive(experiment, "tolerance"),
         variables=tuple(map(_without_impossible_limits, variables)),
         notes=_notes(root, variables, experiment, tool=tool, needs_tool=needs_tool),

@@ -63,8 +63,7 @@ class Slot:
     offset: int = 0  # position in the array in row-major order, 0 for scalars
     size: int = 1  # number of elements of the array, 1 for scalars
     negated: bool = False  # whether it is an FMI 1 alias with the opposite sign
-    # Name in modelDescription.xml, if another: an array's for its elements, the variable's for aliases of
-    # FMI 3.
+    # Name in modelDescription.xml, if another: of an element, the array's; of an alias, the variable's.
     declared: str = ""
 
 

@@ -29,8 +29,7 @@ class Coupling:
             the steps of the components in the loop until their outputs no longer change.
         extrapolation: value of an input during a step: ``hold`` the last value, or follow the ``linear``
             course through the last two, for continuous real inputs.
-        tolerance: change, relative for values above 1, below which an initialisation or iteration has
-            converged.
+        tolerance: change, relative for values above 1, below which initialisation or iteration ends.
         max_rounds: maximum number of rounds of an initialisation, and of an iterated step.
         isolation: ``together``: all components run in one process; ``each``: each in one of its own.
 

@@ -123,8 +123,7 @@ def simulate(
         SimulationError: if there is no complete trajectory of finite numbers.
         ModelError: if the model cannot be used.
     """
-    # Rounded up to a power of two, so that a few plans suffice for candidates with any number of control
-    # points.
+    # Rounded up to a power of two, so that a few plans suffice for any number of control points.
     pieces = 1 << (max(map(len, inputs.values()), default=1) - 1).bit_length()
     plan = _plan(order, experiment, tuple(inputs), tuple(parameters), pieces)
     outputs, log = REGISTRY.runner(order).simulate(plan, given_values(plan, inputs, parameters))

@@ -91,8 +91,7 @@ class Patience:
 class Worker(Started):
     """One worker: its process, its memory, and its messages.
 
-    Simulations after the first start by ``reuse``; without one, it finds out how, and does not try untrusted
-    ways.
+    Simulations after the first start by ``reuse``; without one, it finds out how, but tries no untrusted way.
 
     Attributes:
         plan: the plan for which it is prepared; None: it has not loaded the FMU.

@@ -55,8 +55,7 @@ class Panel:
     steps: bool = False  # whether values are held until the next sample
     # Names of its numbers if these are whole, empty if they have none; None for real values.
     labels: Mapping[int, str] | None = None
-    # Component of a system that it belongs to; empty for other models, and for a quantity of several
-    # components.
+    # Component of a system that it belongs to; empty for other models, and for what several share.
     component: str = ""
 
 

@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 _MOST_DRAWN, _MOST_TALKS, _MOST_QUESTIONS = 3, 3, 30
 # Longer tables of inputs are folded.
 _MOST_ROWS = 12
-# Columns of the table of statistics that name a row, and those that are folded away so that the others fit on
-# paper.
+# Columns of the table of statistics that name a row, and those folded away so that the others fit on paper.
 _KEYS = ("requirement", "method")
 _FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 

@@ -87,7 +87,7 @@ def test_what_cannot_be_set_says_why() -> None:
 def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     description = described(
         """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="g">
-        <CoSimulation modelIdentifier="M"/><ModelVariables>
+        <CoSimulation modelIdentifier="M" fixedInternalStepSize="0.25"/><ModelVariables>
         <UInt64 name="n" valueReference="0" causality="structuralParameter" variability="fixed" start="3"/>
         <Float64 name="x" valueReference="1" causality="output" initial="exact" start="7">
           <Dimension valueReference="0"/><Alias name="state"/></Float64>
@@ -98,6 +98,7 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     assert description.slots["state[2]"].reference == 1
     assert description.arrays[1] == (7.0, 7.0, 7.0)
     assert "structural parameter" in description.info["n"].refusal
+    assert description.info.internal_step == 0.25
 
 
 @pytest.mark.parametrize(
