@@ -28,8 +28,7 @@ def compile_sources(path: Path, out: Path) -> Path:
         The path of the FMU that was written.
 
     Raises:
-        ModelError: if it has no sources, there is no compiler, the sources do not compile, or the result
-            cannot be loaded.
+        ModelError: if sources or a compiler are missing, or the sources or the result do not work.
     """
     description = read_description(path)
     with tempfile.TemporaryDirectory(prefix="falsifier-build-") as name:

@@ -14,6 +14,7 @@ from falsifier.problem.template_arguments import Template
 from falsifier.stl import Formula, Monitor, parse
 from falsifier.stl.expression import Name
 from falsifier.stl.formula import Bare, Flag, replaced
+from falsifier.stl.lexer import name_text
 
 # What a starter spec has in place of a number; a model's own variable of this name goes before it.
 PLACEHOLDER = "LIMIT"
@@ -61,8 +62,7 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
     """Parse a formula and check its signals and windows against a model and an experiment.
 
     Raises:
-        SpecError: naming the position of a syntax error, the unknown signal, or the window that extends past
-            the stop time.
+        SpecError: naming the position of a syntax error, the unknown signal, or what the stop time cuts off.
     """
     try:
         formula = parse(text)
@@ -121,6 +121,8 @@ def formula_of(section: AnyRequirement, info: ModelInfo, experiment: Experiment,
 def _unknown(name: str, info: ModelInfo) -> str:
     """Say that a signal is unknown: an item's number, or the most similar one and what is usually named."""
     word = name.strip("'")
+    if word in info:
+        return f"unknown signal {name}: single quotes would be part of its name; write {name_text(word)}"
     if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
         told = ", ".join(items[:3])
         return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"

@@ -151,8 +151,7 @@ def worker_program(root: Path, *, windows: bool = False) -> Path:
     """Return the path of the program that runs FMUs.
 
     Args:
-        root: folder for a copy, if the installed one may not be executed, or for one that is compiled and
-            cannot be kept.
+        root: folder for a copy, if the installed one may not be executed, or a compiled one not be kept.
         windows: whether it is the program for Windows, which is executed by Wine.
 
     Raises:
