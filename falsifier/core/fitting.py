@@ -24,8 +24,7 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
     """Fit a candidate to a search space.
 
     Signals whose control points the space does not allow are sampled at as many evenly spaced ones as it
-    allows. Inputs that are not searched are left out, and parameters that are not given have their nominal
-    value.
+    allows. Inputs that are not searched are left out, and parameters that are not given are nominal.
 
     Raises:
         CandidateError: naming the searched input that is missing, the value outside its range, or the

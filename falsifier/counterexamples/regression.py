@@ -89,8 +89,7 @@ def check(
         database: where counterexamples are stored; None: nowhere.
 
     Raises:
-        SimulationError: if a stored counterexample cannot be simulated, or every simulation of the search
-            fails.
+        SimulationError: if a stored counterexample cannot be simulated, or all of the search fail.
     """
     replayed: dict[Path, Replayed] = {}
     for path, stored in database.fetch(problem) if database else ():

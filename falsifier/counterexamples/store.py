@@ -238,8 +238,7 @@ def beside(counterexample: Path, name: str) -> Path:
 def keep_recorded(directory: Path) -> None:
     """Write the files of counterexamples that are only in a run directory's journal.
 
-    Runs that were killed, and runs of a campaign, leave only a journal. A directory without a run is left
-    unchanged.
+    Runs that were killed, and runs of a campaign, leave only a journal. Without a run, nothing is done.
 
     Raises:
         JournalError: if what was confirmed is not recorded as a violation.

@@ -114,8 +114,7 @@ def simulate(
         inputs: a signal, or for a constant one a number or the name of an enumeration's item, by input name;
             or a CSV file of inputs; or a candidate with its parameters. Other inputs keep the problem's fixed
             or the model's start values.
-        parameters: values, names of items or texts of strings, by name; others keep the problem's or the
-            model's values.
+        parameters: values, names of items or texts of strings, by name; others stay as they are.
 
     Raises:
         CandidateError: if a name is not an input, or not a parameter or start value that can be set, or a

@@ -38,8 +38,7 @@ def check_chat(chat: Chat) -> tuple[list[Feature], Usage]:
     """Ask an LLM for what runs ask for.
 
     Returns:
-        What was found, first of all of the ``answer``, without which a run is of no use; tokens and cost of
-        all requests.
+        What was found, first of all of the ``answer``, without which a run is of no use; tokens and cost.
 
     Raises:
         ChatError: if the first request has no reply.

@@ -1,7 +1,6 @@
 """Replies of a language model: the required form, and the candidates of a search space that a reply has.
 
-A prompt asks for signals by name, or for the numbers of a point in order. A reply in the other form is read
-too.
+A prompt asks for signals by name, or for the numbers of a point in order. The other form is read, too.
 """
 
 from collections.abc import Sequence

@@ -145,8 +145,7 @@ def join_formula(
     """Join an FMU, SSP package or system with a requirement, without a spec.
 
     If no input or parameter is to be searched, all inputs with a min and a max are searched, and those whose
-    type states them (Booleans, enumerations). There must be one, unless the problem is made for other things
-    than a search.
+    type states them (Booleans, enumerations). There must be one, unless the problem is not for a search.
 
     Raises:
         SpecError: naming what is unknown and the option that specifies it.

@@ -111,8 +111,7 @@ def falsify(
         One result, or for a list of problems a list of results in the same order.
 
     Raises:
-        SpecError: if a problem, an engine, a language model or a number is not valid, or two problems have
-            the same name.
+        SpecError: if a problem, an engine, a language model or a number is not valid, or two names are equal.
         CandidateError: if an engine made in Python returns a candidate outside the search space, or one to
             start from does not fit it.
         ModelError: if the FMU cannot be used.

@@ -100,8 +100,7 @@ class Formula:
     def horizon(self, step: float = 0.0) -> float:
         """Return the minimum length in s of a trajectory on which the formula can be evaluated at time 0.
 
-        An operator without a window extends to the end of the trajectory, however long that is, and adds
-        nothing.
+        An operator without a window extends to the end of any trajectory, and adds nothing.
 
         Args:
             step: sampling step in s; each ``X`` adds one.

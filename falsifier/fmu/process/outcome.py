@@ -1,5 +1,6 @@
 """What a worker's replies, and its end, mean in words."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from falsifier.errors import FalsifierError, ModelError, SimulationError
@@ -88,18 +89,29 @@ def failure(
 
 def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation whose process was ended because it did not return in time."""
-    at = f" at t = {reached:g} s" if 0.0 < reached <= plan.stop_time else ""
+    at, time = _reached(plan, reached)
     return SimulationError(
         f"{plan.model}: did not return{at}{during} and was stopped {_out_of_time(plan)}{last_lines(log)}",
         status="timeout",
-        time=reached if at else None,
+        time=time,
         log=log,
     )
 
 
-def crash(plan: Plan, reason: str, log: tuple[str, ...]) -> SimulationError:
+def crash(plan: Plan, reached: float, reason: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation that its process did not survive."""
-    return SimulationError(f"{plan.model}: {reason}{last_lines(log)}", status="crashed", log=log)
+    at, time = _reached(plan, reached)
+    how = re.split("[:;] ", reason)[0]
+    text = f"{plan.model}: {how}{at}{reason.removeprefix(how)}{last_lines(log)}"
+    return SimulationError(text, status="crashed", time=time, log=log)
+
+
+def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
+    """Return how far a simulation came, in words and in s, as its process says: it may be any number."""
+    if not 0.0 < time < plan.stop_time * (1.0 + 1e-9):
+        return "", None
+    is_last = time > plan.stop_time * (1.0 - 1e-9)
+    return f" after its last step (t = {time:g} s)" if is_last else f" at t = {time:g} s", time
 
 
 def last_lines(log: tuple[str, ...]) -> str:

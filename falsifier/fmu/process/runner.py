@@ -149,7 +149,7 @@ class Runner:
             during = worker.during + worker.refusals
             raise outcome.overdue(plan, worker.reached, during, worker.output.take()) from None
         except ConnectionError as error:
-            raise outcome.crash(plan, *worker.crash(error)) from None
+            raise outcome.crash(plan, worker.reached, *worker.crash(error)) from None
         if not reply.is_done:
             log, refusals = worker.output.take(), worker.refusals
             raise outcome.failure(self._order.network, plan, reply, refusals, log)

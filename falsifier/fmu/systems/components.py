@@ -56,8 +56,7 @@ class Connection:
 
     Attributes:
         source: the output, as ``component.variable``.
-        factor: factor of a conversion ``factor * value + offset``; with it, or with an offset, units are not
-            converted.
+        factor: factor of a conversion ``factor * value + offset``; with it, or an offset, units stay.
         offset: offset of the conversion.
         extrapolation: ``hold`` or ``linear``; None: that of the system.
     """

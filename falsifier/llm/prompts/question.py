@@ -115,8 +115,7 @@ class Questions:
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
         """Add a sample.
 
-        ``doubt`` says why a violation does not count; ``why`` is the LLM's rationale, if it was its
-        candidate.
+        ``doubt`` says why a violation does not count; ``why`` is the LLM's rationale of its candidate.
         """
         self._told += 1
         if evaluation.verdict is None and not self._variant.has("failures"):

@@ -49,7 +49,7 @@ def misdeeds() -> Iterator[FmuModel]:
 @pytest.mark.parametrize(
     ("misdeed", "status", "reason"),
     [
-        (CRASH, "crashed", "signal SIGSEGV"),
+        (CRASH, "crashed", "crashed at t = 0.5 s: signal SIGSEGV"),
         (ABORT, "crashed", "signal SIGABRT; its last message: assertion failed: pressure > 0"),
         (EXIT, "crashed", "it exited with code 7"),
         (ALLOCATE, "failed", "the step returned error at t = 0.5 s.*no memory for the table"),

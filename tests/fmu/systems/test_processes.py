@@ -68,7 +68,7 @@ def test_a_component_that_crashes_or_hangs_is_named_and_the_next_simulation_work
     assert len(others) == 3
     for each in others:  # nothing but what every program has
         assert {file.name for file in Path(f"/proc/{each}/fd").iterdir()} == {"0", "1", "2"}
-    with pytest.raises(SimulationError, match=r"crashed in component bad: .*SIGSEGV") as failed:
+    with pytest.raises(SimulationError, match=r"crashed in component bad at t = 0.5 s: .*SIGSEGV") as failed:
         run(model, "plant.y", parameters={"bad.misdeed": CRASH})
     assert failed.value.status == "crashed"
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in others))
