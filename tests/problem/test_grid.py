@@ -15,7 +15,6 @@ from tests.problem.support import echo
         (3.0, [1.0], None, None, 0.002),  # not 0.003 s, of which 1 s is no multiple
         (50.0, [20.0], 0.01, None, 0.01),
         (10.0, [0.25], 0.1, None, 0.05),
-        (10.0, [2.0], 0.0125, None, 0.0125),
         (1.0, [1 / 3], None, None, 1 / 1002),
         (0.7, [], 0.2, None, 0.1),
         (15.0, [], 1 / 30, None, 1 / 30),  # divides it but for rounding

@@ -225,7 +225,8 @@ def _doubt(v: Variable) -> str:
     """Say what of a variable's limits and start value cannot be meant; empty if nothing is wrong."""
     if v.low is not None and v.high is not None and v.low > v.high:
         return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}, so both are ignored"
-    if (start := v.start_number) is None:
+    # Integers that are no exact doubles follow the standard, but cannot be compared here.
+    if (start := v.start_number) is None or (v.kind == "integer" and v.expected(start)):
         return ""
     if not isfinite(start):
         return f"start of {v.name!r} is {start}"

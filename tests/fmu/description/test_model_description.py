@@ -91,14 +91,15 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
         <UInt64 name="n" valueReference="0" causality="structuralParameter" variability="fixed" start="3"/>
         <Float64 name="x" valueReference="1" causality="output" initial="exact" start="7">
           <Dimension valueReference="0"/><Alias name="state"/></Float64>
+        <Int64 name="i" valueReference="2" causality="input" start="9223372036854775807"/>
         </ModelVariables><ModelStructure/></fmiModelDescription>"""
     )
     names = [v.name for v in description.info.variables]
-    assert names == ["n", "x[1]", "x[2]", "x[3]", "state[1]", "state[2]", "state[3]"]
+    assert names == ["n", "x[1]", "x[2]", "x[3]", "state[1]", "state[2]", "state[3]", "i"]
     assert description.slots["state[2]"].reference == 1
     assert description.arrays[1] == (7.0, 7.0, 7.0)
     assert "structural parameter" in description.info["n"].refusal
-    assert description.info.internal_step == 0.25
+    assert description.info.internal_step == 0.25 and not description.info.notes
 
 
 @pytest.mark.parametrize(
