@@ -97,7 +97,9 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     finer = half_step(problem)
     halved = _repeat(finer, evaluation.candidate, known=fresh)
     outcome: Outcome = "confirmed"
-    steps = f"half the communication step ({finer.experiment.step_size:.4g} s)"
+    is_solved = getattr(problem.model, "interface", "") == "model-exchange"
+    step = "largest solver step" if is_solved else "communication step"
+    steps = f"half the {step} ({finer.experiment.step_size:.4g} s)"
     if halved.robustness is None or fresh.robustness is None:
         # No verdict either way: the violation at the given step stands, and the reason states the failure.
         reason += f"; with {steps} it {halved.doubt}"
@@ -106,7 +108,7 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
         change = halved.robustness - fresh.robustness
         reason = f"{reason}, but with {steps} it {halved.doubt}, a change of {signed(change, 4)}"
     elif _same(fresh.trajectory, halved.trajectory):
-        reason += "; its outputs do not depend on the communication step"
+        reason += f"; its outputs do not depend on the {step}"
     else:
         reason += f"; {steps} gives {signed(halved.robustness)}"
     return replace(found, outcome=outcome, reason=reason, halved=halved.robustness)

@@ -138,13 +138,10 @@ def test_a_function_has_no_second_interface() -> None:
 def test_the_other_interface_of_an_fmu_confirms_too() -> None:
     problem = load_problem("AT1")
     other = other_interface(problem)
-    assert [getattr(p.model, "interface", None) for p in (problem, other)] == [
-        "co-simulation",
-        "model-exchange",
-    ]
     vector = [100.0] * 7 + [0.0] * 3
     here, there = (confirm(p, evaluate(p, p.space.decode(vector))) for p in (problem, other))
     assert (here.outcome, there.outcome) == ("confirmed", "confirmed")
+    assert "communication step" in here.reason and "largest solver step" in there.reason
     assert there.robustness == pytest.approx(here.robustness, abs=0.05)
 
 

@@ -154,8 +154,7 @@ def write_mat(table: InputTable, start: Mapping[str, float | str], path: Path) -
     """Write inputs and start values for MATLAB, whose names of variables cannot be the model's.
 
     ``inputs`` is a matrix of the time and one column per input, as Simulink takes it for root inports; a
-    repeated time is a step. ``input_names`` names the columns after the time. ``start_values`` belong to
-    ``start_names``.
+    repeated time is a step. ``input_names`` names the columns after it, ``start_names`` the ``start_values``.
     """
     from scipy.io import savemat
 

@@ -1,7 +1,6 @@
 """Figures: simulations, what was tried, the progress of searches, the comparison of methods.
 
-The only package that imports matplotlib. Functions draw on the given axes or make a new figure; none of them
-needs a display.
+The only package that imports matplotlib. Functions draw on given axes or a new figure, and need no display.
 """
 
 from typing import TYPE_CHECKING
