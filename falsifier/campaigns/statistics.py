@@ -23,8 +23,7 @@ R = TypeVar("R", bound=RunProgress)
 class Statistics:
     """Statistics of several runs.
 
-    Except for ``unfinished`` and ``best``, all numbers cover finished runs only, which spent their budget or
-    falsified.
+    All numbers but ``unfinished`` and ``best`` cover finished runs only: they spent the budget or falsified.
 
     Attributes:
         runs: number of finished runs.

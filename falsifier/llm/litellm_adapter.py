@@ -7,8 +7,7 @@ github.com/BerriAI/litellm that tells of it:
   ``_ENVIRONMENT`` prevents both.
 - It makes pydantic warn of its own types (1.83, #37949) and of replies in another form than its own
   (1.106.2, #11759): ``_WARNINGS`` are not shown.
-- It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` tells its own handler how to
-  make one.
+- It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` lets its handler make one.
 - Without ``max_retries`` OpenAI's library sends a failed request again (1.106.2, #5124): ``completed``.
 - Without an address it asks OpenAI, whoever the provider is (1.106.2, no issue): ``HOST_OF_OPENAI``. That
   library takes headers from the environment, whatever server it asks: ``headers_of_openai``.
@@ -143,8 +142,7 @@ def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
 def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None = None) -> None:
     """Reject options that the provider does not have.
 
-    What a server of the user's own, a router or an unlisted provider takes is not known: its options are sent
-    as they are.
+    What a user's own server, a router or an unlisted one takes is not known: options are sent as they are.
 
     Raises:
         ChatSetupError: naming the option.

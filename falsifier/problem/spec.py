@@ -15,6 +15,7 @@ from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
+import tomlkit
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
 from falsifier.core.literals import one_line
@@ -209,6 +210,7 @@ def _error_of(error: ValidationError) -> SpecError:
     if where[:1] == ["requirements"] and len(where) > 2:
         where.pop(2)  # below the name of a requirement comes the tag of its kind, which is no key
     section, name = ("", "", *where)[-2:]
+    shown_name = tomlkit.key(str(name)).as_string() if name else ""
     if first["type"] == "union_tag_not_found":
         where.append("template")
         message = f"no such template; {did_you_mean(str(given.get('template')), TEMPLATES)}"
@@ -217,14 +219,14 @@ def _error_of(error: ValidationError) -> SpecError:
         if wrong == "formula" and "template" in given:
             message = "this requirement has a template, too; give one of the two"
         elif section == "parameters" and wrong in sections.InputSection.model_fields:
-            message = f"only inputs have {wrong}: write [inputs.{name}] if it is one"
+            message = f"only inputs have {wrong}: write [inputs.{shown_name}] if it is one"
         elif quoted := _unquoted(where, wrong, given):
             is_near = message.startswith("unknown key; did you mean") and "=" in quoted
             said = f"names with dots are written in quotes: {quoted}"
             return SpecError(f"{message}; {said}" if is_near else said, key=key_of(where[:2]))
         where.append(wrong)
     elif section in _TABLES and not isinstance(given, Mapping):
-        message = f"expected a table: {_TABLES[str(section)].format(name)}"
+        message = f"expected a table: {_TABLES[str(section)].format(shown_name)}"
     return SpecError(message, key=key_of(where))
 
 

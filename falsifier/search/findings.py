@@ -6,6 +6,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
+import tomlkit
+
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
@@ -149,6 +151,6 @@ def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
             if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
                 return written("--parameterization free", "parameterization='free'")
     elif source.parts.kind == "spec":
-        places = " and ".join(f"[inputs.{name}]" for name in coarse)
+        places = " and ".join(f"[inputs.{tomlkit.key(name).as_string()}]" for name in coarse)
         option += f", or free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in {places}"
     return option

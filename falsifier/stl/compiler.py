@@ -218,8 +218,7 @@ class _Compiler:
         """Emit ``l U[a,b] r`` as ``G[0,a-1] l and F[a,b] (l and r) and F[a,a] (l U (l and r))``, in samples.
 
         The three parts together are equivalent to the bounded until, and each takes linear time. The
-        unbounded until in the last part ensures that l holds from a until r does; the middle part bounds
-        when.
+        unbounded until in the last part ensures that l holds from a until r does; the middle bounds when.
         """
         ahead = window_samples(node.window, self.step) if node.window else (0, self.samples - 1 - last)
         begin, end = first + ahead[0], last + ahead[1]

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -61,6 +62,15 @@ def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
     fixed = load_problem("AT1", parameterization="fixed")
     assert told(fixed).endswith("To try them: parameterization='free'.")
     assert told(fixed, "cma").endswith("To try them: engine='surrogate' with parameterization='free'.")
+
+
+def test_a_section_in_the_remedy_is_one_that_toml_reads(tmp_path: Path) -> None:
+    given = (
+        f'[model]\nfmu = "{fmu_path("Arrays_3")}"\nstop_time = 9\n[requirements]\nR.formula = "y[1] > 0"\n'
+    )
+    (tmp_path / "a.toml").write_text(f'{given}[inputs."u[1]"]\nrange = [0, 1]\ncontrol_points = 2\n')
+    problem = load_problem(tmp_path / "a.toml", interface="co-simulation")
+    assert told(problem).endswith('} in [inputs."u[1]"].')
 
 
 def test_constant_and_held_inputs_are_described_as_such() -> None:
