@@ -163,7 +163,7 @@ def assess(
         simulation with a verdict, KeyboardInterrupt is raised.
 
     Raises:
-        SpecError: if a number is out of range, there is nothing to vary, or a range exceeds limits.
+        SpecError: if a number is out of range, there is nothing to vary, or a range exceeds the model's.
         SimulationError: if every simulation failed.
         ModelError: if the model cannot be used at all.
     """
