@@ -329,9 +329,5 @@ struct outcome simulate_system(struct system *s, struct progress *progress)
 {
     s->progress = progress;
     struct outcome o = initialise_system(s);
-    if (o.where == DONE)
-        o = step_system(s);
-    if (o.where == DONE)
-        ask_each(s, END);
-    return o;
+    return o.where == DONE ? step_system(s) : o;
 }
