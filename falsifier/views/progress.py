@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted
+from falsifier.core.words import counted, readable
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.budget import Budget, Spent
@@ -183,7 +183,7 @@ class News:
             if verdict is None or verdict.robustness >= self._least.get(name, inf):
                 continue
             self._least[name] = verdict.robustness
-            text = f"best robustness {signed(verdict.robustness)} at t = {verdict.critical_time:.5g} s"
+            text = f"best robustness {signed(verdict.robustness)} at t = {readable(verdict.critical_time)} s"
             if self._is_new(f"{name}: {text}"):
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)
