@@ -39,8 +39,8 @@ def result_text(result: Result) -> str:
         lines.append(f"  files          {result.directory}")
         lines += [f"  picture        {picture}" for picture in _pictures(result)]
         if result.status == "not falsified" and result.best is not None:
-            nearest = f"falsifier explain {place} (the nearest miss)"
-            lines.append(f"to look closer: {nearest}, falsifier coverage {place} (what was tried)")
+            nearest = f"falsifier explain {place} (the nearest miss), " if not result.best.violated else ""
+            lines.append(f"to look closer: {nearest}falsifier coverage {place} (what was tried)")
     if result.directory is not None and _can_continue(result):
         lines.append(_continue_line(result.directory))
     if result.status == "failed":
