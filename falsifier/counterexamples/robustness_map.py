@@ -158,7 +158,7 @@ def robustness_map(
     if evaluation.robustness is None:
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1:
-        raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:g}")
+        raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:.12g}")
     points = isqrt(int(_GRID_SHARE * whole(setting("budget"), budget, least=_LEAST_BUDGET)))
     samples = budget - points * points
     from scipy.stats.qmc import Sobol
