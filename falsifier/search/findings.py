@@ -50,11 +50,6 @@ class Finding:
     simulation: int | None = None
 
     @property
-    def vacuous(self) -> bool:
-        """Whether a part of the requirement was not tested, so that the answer says less than it seems to."""
-        return self.kind not in ("parameterization", "effect", "margin")
-
-    @property
     def untested(self) -> bool:
         """Whether a part of the requirement never had a say, or nothing moved it; not: a wide margin."""
         return self.kind in ("condition", "disjunct", "constant")

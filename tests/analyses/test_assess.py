@@ -119,8 +119,7 @@ def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero(
     searched = falsify(system(0.9999), "corners", budget=10).evaluations
     found = assess(system(0.9999), budget=100, searched=searched)
     assert found.violations == 0
-    number = len(searched)
-    assert found.searched == Searched(number, searched[-1].robustness, number)
+    assert found.searched == Searched(1, searched[-1].robustness, 1)
     assert "The search found a violation in 1 simulation, although no draw is one." in found.text
 
 
