@@ -131,9 +131,12 @@ class Explanation:
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
         number = readable(effect.instead, 4) + (f" {unit}" if unit not in ("", "1") else "")
-        is_parameter = any(p.name == effect.name for p in self.problem.space.parameters)
-        rest = "at its nominal value" if is_parameter else "at rest"
-        return f"{rest if effect.is_rest else 'at the middle of its range'} ({number})"
+        ranged = next(r for r in self.problem.space.ranges if r.name == effect.name)
+        if effect.is_rest:
+            return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
+        is_between = ranged.low < effect.instead < ranged.high
+        middle = "at" if effect.instead == (ranged.low + ranged.high) / 2 else "near"
+        return f"{f'{middle} the middle of its range' if is_between else 'at an end of its range'} ({number})"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
