@@ -96,9 +96,9 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.spent.simulations_text}{untested(result.findings)}{robustness}{where}"
         )
         below = [] if found is None else list(broken_lines(found.evaluation.verdict))
-        below += [f"note: {finding.text}" for finding in result.findings]
+        below += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)]
+        below += [f"note: {text}" for text in (*(f.text for f in result.findings), *result.remarks)]
         below += [f"failed: {failure.text}" for failure in result.failures]
-        below += [f"note: {remark}" for remark in result.remarks]
         lines += [f"{'':{width}}  {line}" for line in below]
     held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
     lines += [f"not searched: {text}" for text in held if text]
