@@ -341,7 +341,7 @@ def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: 
 def _tell_untested(item: pytest.Item, checked: "Checked", *, strict: bool) -> None:
     """Warn of parts of the requirement that no simulation tested, or fail."""
     __tracebackhide__ = True
-    found = [f.text for f in checked.result.findings if f.vacuous] if checked.result else []
+    found = [f.text for f in checked.result.findings if f.untested] if checked.result else []
     text = "\n".join((f"{checked.problem.name} is not violated, but not all of it was tested", *found))
     if found and strict:
         raise UntestedError(text)

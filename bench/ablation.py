@@ -73,7 +73,7 @@ PARTS = {
     "no trial of the dynamics": Part({"trial": 0}),
     "nothing reserved": Part({"reserved": 0.0}),
     "ratings not sharpened": Part(patches=[(policy, "_SHARPNESS", 1.0)]),
-    "half the population": Part({"pool": 250, "children": 125}),
+    "half the population": Part({"pool": 250}),
 }
 
 

@@ -161,6 +161,7 @@ class TestMarked:
         with pytest.raises(AssertionError, match="not all of it was tested"):
             falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"))
         falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), strict=False)
+        falsifier_check(lag_problem("G[0,10] (x <= 9)"))  # a wide margin was tested
 
     @pytest.mark.falsifier(budgets=2)
     def test_unknown(self, falsifier_check):

@@ -7,13 +7,14 @@ is extrapolated from the draws: a narrow region of violations leaves no trace in
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from math import inf
 
 import numpy as np
 
 from falsifier.core.arguments import finite, whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.core.words import counted
+from falsifier.core.words import counted, readable
 from falsifier.engines.box import Proposal
 from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
@@ -93,13 +94,13 @@ class Assurance:
         """The result in sentences."""
         share = f"{self.confidence * 100:g} %"
         lines = [
-            f"{self.violations} of {counted(self.drawn, 'random simulation')} violate the requirement.",
+            f"Violations: {self.violations} of {counted(self.drawn, 'random simulation')}.",
             f"With {share} confidence (one-sided), the probability of a violation is at most "
-            f"{self.bound:.3g}.",
+            f"{_rounded(self.bound, ROUND_CEILING)}.",
         ]
         if self.violations:
-            low, high = self.interval
-            lines.append(f"With {share} confidence (two-sided), it is between {low:.3g} and {high:.3g}.")
+            low, high = map(_rounded, self.interval, (ROUND_FLOOR, ROUND_CEILING))
+            lines.append(f"With {share} confidence (two-sided), it is between {low} and {high}.")
         if self.failures:
             lines += [f"{failure.text}." for failure in self.failures]
             lines.append("The bound counts failed simulations as violations.")
@@ -115,7 +116,7 @@ class Assurance:
             f"parameterization, not of inputs in operation: {self.distribution}."
         )
         if self.interrupted:
-            lines.append("Stopped by the user: more simulations would give a lower bound.")
+            lines.append("Stopped by the user: more simulations would say more.")
         return "\n".join(lines)
 
     def _searched_text(self, searched: Searched) -> str:
@@ -128,12 +129,7 @@ class Assurance:
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."
-        if self.violations:
-            return f"{found}."
-        return (
-            f"{found}; none of {counted(self.drawn, 'draw')} did: with {self.confidence * 100:g} % "
-            f"confidence, the probability is at most {self.bound:.3g}, but not zero."
-        )
+        return f"{found}." if self.violations else f"{found}, although no draw is one."
 
 
 def assess(
@@ -216,6 +212,11 @@ def _robustness(evaluation: Evaluation) -> float:
     return inf if evaluation.robustness is None else evaluation.robustness
 
 
+def _rounded(bound: float, rounding: str) -> str:
+    """Return a bound with three digits, rounded away from what it bounds; errors of floats do not count."""
+    return f"{float(Context(prec=3, rounding=rounding).create_decimal(round(bound, 12))):g}"
+
+
 def upper_bound(happened: int, trials: int, confidence: float) -> float:
     """Return the bound below which the probability lies with at least this confidence.
 
@@ -269,4 +270,4 @@ def _input_text(r: InputRange, space: SearchSpace) -> str:
 def _range_text(r: InputRange | ParameterRange) -> str:
     unit = f" {r.unit}" if r.unit else ""
     allowed = "" if r.kind == "real" else ", each allowed number equally likely"
-    return f"[{r.low:g}, {r.high:g}]{unit}{allowed}"
+    return f"[{readable(r.low)}, {readable(r.high)}]{unit}{allowed}"

@@ -146,15 +146,12 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
 
 
 def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Reading]) -> Reading:
-    """Return a reading that passed all checks.
+    """Return a reading that passed all checks; RejectedReplyError stating what is wrong.
 
     Its formula must parse, name signals of the model, fit the stop time and the grid, compare what has the
     same unit, neither hold nor fail for all values in range, and require something else than the others. It
     must hold on the example that came with it and fail on the counterexample: a reversed inequality
     contradicts its own examples.
-
-    Raises:
-        RejectedReplyError: stating what is wrong.
     """
     try:
         formula, problem = subject.parsed(reply.formula)

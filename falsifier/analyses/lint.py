@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, readable
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import FmuModel
@@ -124,7 +124,7 @@ def _constants(problem: Problem) -> dict[str, float]:
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
     ranges = ranges_of(problem)
     bounds = [
-        f"{n} = {low:g}" if low == high else f"{n} in [{low:g}, {high:g}]"
+        f"{n} = {readable(low)}" if low == high else f"{n} in [{readable(low)}, {readable(high)}]"
         for n in part.signals
         for low, high in [(ranges[n].low, ranges[n].high)]
     ]
@@ -146,9 +146,7 @@ def _windows(problem: Problem) -> Iterator[LintFinding]:
         if part.window == Window(0.0, 0.0) and not isinstance(part, Until):
             text, advice = "the window contains only the present", f"leave it out: {part.children[0]}"
         elif part.signals and set(part.signals) <= still:
-            text = (
-                f"{listed(list(part.signals))} does not change over time, so that the window does not matter"
-            )
+            text = f"nothing changes {listed(part.signals)} over time, so that the window does not matter"
             advice = "leave the window out, or name a signal that changes"
         else:
             continue
@@ -211,7 +209,7 @@ def unmoved_findings(group: Sequence[Problem], simulations: int) -> Iterator[Lin
         courses = {tuple(t[name].tobytes() for name in signals) for t in simulated}
         if len(courses) > 1 or (not declared[problem.name] and len(simulated) < 2):
             continue
-        measured = f"{listed(list(signals))} was the same in {counted(len(simulated), 'random simulation')}"
+        measured = f"{counted(len(simulated), 'random simulation')} had the same {listed(signals)}"
         if declared[problem.name]:
             text = "declared: the FMU's structure has no path from a searched input to its signals"
             text += f"; measured: {measured}" if len(simulated) > 1 else ""

@@ -56,8 +56,7 @@ class Margin:
     @property
     def text(self) -> str:
         """The result in one sentence."""
-        searches = "1 search" if len(self.searches) == 1 else f"{len(self.searches)} searches"
-        effort = f"({counted(self.simulations, 'simulation')}, {searches})"
+        effort = f"({counted(self.simulations, 'simulation')}, {counted(len(self.searches), 'search')})"
         ends = [] if self.falsified is None else [f"falsified at {self.falsified:.12g}"]
         ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.12g}"]
         if self.interrupted:

@@ -304,4 +304,4 @@ def _check_range(what: str, values: Matrix, low: float, high: float) -> None:
     margin = _ROUNDING * (high - low)
     outside = (values < low - margin) | (values > high + margin)
     if outside.any():
-        raise ValueError(f"{what}: {values[outside][0]:g} is outside its range [{low:g}, {high:g}]")
+        raise ValueError(f"{what}: {values[outside][0]:.12g} is outside its range [{low:.12g}, {high:.12g}]")

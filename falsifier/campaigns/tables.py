@@ -258,7 +258,6 @@ _PUBLISHED_LEGEND = (
     "a rank. Published cells: falsified runs / mean S."
 )
 
-
 _LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
 _UNFINISHED = (
     "+n: n more runs failed, have not ended or have not begun; of the other numbers, only best robustness "

@@ -68,7 +68,6 @@ _COMMANDS: _Table = {
     "tools": (_TOOLS, "Build FMUs, repair records, validate results, print schemas."),
 }
 
-
 # Words that people try for what a command, or an option of one, does.
 _WHERE = {
     "lint": "check",

@@ -116,14 +116,7 @@ def margin(
 
 
 def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
-    """Load the problem of a target or a run; of a run, return what it evaluated, too.
-
-    Raises:
-        click.UsageError: if options change the problem of a run, or a requirement is chosen from no run.
-        JournalError: if the target is a folder without a run, no requirement is chosen of several, or the
-            FMU or the spec has changed since.
-        SpecError: if the run's problem was made in Python.
-    """
+    """Load the problem of a target or a run; of a run, which is as it was, return what it evaluated, too."""
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)

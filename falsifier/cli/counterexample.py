@@ -227,10 +227,9 @@ def _shrink(
         lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")
         lines += fact_lines(broken_facts(confirmation.evaluation.verdict))
     share = "a tenth more than before" if case.is_miss else "half of the original's"
-    changed = f", {share}; --at-most changes it" if at_most is None else ""
-    lines.append(
-        f"  robustness     {signed(found.robustness)}; up to {signed(shrunk.at_most)} was allowed{changed}"
-    )
+    allowed = "" if found.violated and case.is_miss else f"; up to {signed(shrunk.at_most)} was allowed"
+    allowed += f", {share}; --at-most changes it" if allowed and at_most is None else ""
+    lines.append(f"  robustness     {signed(found.robustness)}{allowed}")
     lines += fact_lines(candidate_facts(found.candidate, problem.space))
     if confirmation is not None and case.changes(problem):
         lines.append("  note           not of the run's FMU and spec: its reports show the original")

@@ -335,9 +335,7 @@ def inputs_option(text: str, *, multiple: bool = False) -> Decorator:
 
 run_argument = click.argument("run", metavar="RUN", type=PATH)
 
-
 directory_argument = click.argument("directory", type=PATH)
-
 
 requirement_option = click.option(
     "--requirement", metavar="NAME", help="Which requirement, if a run searched several."

@@ -14,7 +14,7 @@ from falsifier.cli.llm_options import connection_options, llm_option, llm_settin
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted, parameterization_text
+from falsifier.core.words import counted, parameterization_text, readable
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
@@ -64,8 +64,10 @@ def check(*, budget: int, as_json: bool, **given: Any) -> None:
 
 def _problem_line(problem: Problem) -> str:
     space = problem.space
-    searched = [f"{r.name} [{r.low:g}, {r.high:g}] {parameterization_text(r)}" for r in space.inputs]
-    searched += [f"{p.name} [{p.low:g}, {p.high:g}]" for p in space.parameters]
+    searched = [
+        f"{r.name} [{readable(r.low)}, {readable(r.high)}] {parameterization_text(r)}" for r in space.inputs
+    ]
+    searched += [f"{p.name} [{readable(p.low)}, {readable(p.high)}]" for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"
 
 

@@ -60,7 +60,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         tried |= {n: (value, value) for n, value in given.items() if n in problem.info}
         for name, (low, high) in tried.items():
             if excess := problem.info[name].excess(low, high):
-                warn(f"{name}: {f'{low:g}' if low == high else f'[{low:g}, {high:g}]'} {excess}")
+                warn(f"{name}: {f'{low:.12g}' if low == high else f'[{low:.12g}, {high:.12g}]'} {excess}")
         known = {*signals, *stored.parameters, *given}
         if signals and (kept := [n for n in problem.space.names if n not in known]):
             warn(f"no values given for {', '.join(kept)}: kept at the model's start value")
@@ -116,9 +116,9 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     if found.unused:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:g} s; the simulation at {stop_time:g} s: --stop-time changes it")
+        warn(f"{file}: ends at {found.end:.12g} s; the simulation at {stop_time:g} s: --stop-time changes it")
     if 0.0 < found.end < stop_time:
-        warn(f"{file}: ends at {found.end:g} s; the last values are kept until {stop_time:g} s")
+        warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
     return dict(found.signals)
 
 

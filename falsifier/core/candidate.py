@@ -41,10 +41,7 @@ class Candidate:
     @property
     def key(self) -> tuple[object, ...]:
         """Signals and parameters without origin and rationale: equal keys give equal simulations."""
-        return (
-            tuple(sorted(self.signals.items(), key=lambda kv: kv[0])),
-            tuple(sorted(self.parameters.items())),
-        )
+        return tuple(sorted(self.signals.items())), tuple(sorted(self.parameters.items()))
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON form used in journals and exports."""

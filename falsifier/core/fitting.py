@@ -65,7 +65,7 @@ def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[S
     for time, value in zip(signal.times, signal.values, strict=True):
         if time <= space.stop_time and not r.low <= value <= r.high:
             raise CandidateError(
-                f"{r.label} at t = {time:g} s: {value:g} is outside its range [{r.low:g}, {r.high:g}]"
+                f"{r.label} at t = {time:g} s: {value:.12g} is outside its range [{r.low:g}, {r.high:g}]"
             )
     times, interpolation = _allowed(r, signal, space)
     values = signal.held(None).sample(np.asarray(times))

@@ -92,6 +92,13 @@ def modelica_path(name: str) -> str:
     return f"'{''.join(_MODELICA_ESCAPES.get(c, c) for c in _writable(name))}'"
 
 
+def toml_key(name: str) -> str:
+    """Return a name as TOML writes it between dots: ``ba[2]`` in double quotes."""
+    from tomlkit import key  # takes long
+
+    return key(name).as_string()
+
+
 def csv_cell(text: str) -> str:
     """Return the content of a CSV cell that spreadsheets show as text or as a number, never run as a formula.
 

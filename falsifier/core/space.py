@@ -63,7 +63,7 @@ class Range:
         what = self.label
         low, high = finite(f"{what}: low", self.low), finite(f"{what}: high", self.high)
         if low > high:
-            raise SpecError(f"{what}: expected low <= high, got [{low:g}, {high:g}]")
+            raise SpecError(f"{what}: expected low <= high, got [{low:.12g}, {high:.12g}]")
         if not isfinite(high - low):
             raise SpecError(f"{what}: [{low:g}, {high:g}] is too wide to calculate with; narrow the range")
         one_of(f"{what}: kind", self.kind, get_args(ValueKind))
@@ -71,7 +71,7 @@ class Range:
             return
         if not (numbers := self.numbers):
             missing = "item of the enumeration" if self.items else "integer"
-            raise SpecError(f"{what}: [{low:g}, {high:g}] contains no {missing}; widen the range")
+            raise SpecError(f"{what}: [{low:.12g}, {high:.12g}] contains no {missing}; widen the range")
         # Engines try the bounds, so these must be numbers that are allowed.
         object.__setattr__(self, "low", float(numbers[0]))
         object.__setattr__(self, "high", float(numbers[-1]))
@@ -218,7 +218,7 @@ class SearchSpace:
         if not 0 < shortest <= self.stop_time:
             raise SpecError(
                 f"the shortest piece of an input must be positive and at most the stop time of "
-                f"{self.stop_time:g} s, got {shortest:g} s"
+                f"{self.stop_time:.12g} s, got {shortest:.12g} s"
             )
         free = Freedom(max(1, int(self.stop_time / shortest + 1e-9)), shortest)
         return replace(self, inputs=tuple(replace(r, free=free) for r in self.inputs))
@@ -291,7 +291,7 @@ class SearchSpace:
         outside = [
             *(_signal_outside(r, candidate.signals[r.name]) for r in self.inputs),
             *(
-                f"{p.label}: {value:g} is {_outside(p)}"
+                f"{p.label}: {value:.12g} is {_outside(p)}"
                 for p in self.parameters
                 if _is_outside(p, value := candidate.parameters[p.name])
             ),
@@ -355,8 +355,8 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
     if gaps.size and gaps.min() < r.free.min_interval * (1 - 1e-6):
         k = int(gaps.argmin())
         raise CandidateError(
-            f"{r.label}: control points at {signal.times[k]:g} s and {signal.times[k + 1]:g} s are "
-            f"less than {r.free.min_interval:g} s apart"
+            f"{r.label}: control points at {signal.times[k]:.12g} s and {signal.times[k + 1]:.12g} s are "
+            f"less than {r.free.min_interval:.12g} s apart"
         )
     if signal.times[-1] > stop_time * (1 + 1e-9):
         raise CandidateError(
@@ -391,13 +391,13 @@ def _signal_outside(r: InputRange, signal: Signal) -> str:
     if not found:
         return ""
     if len(set(values)) == 1 < len(values):
-        return f"{r.label}: {values[0]:g} is {_outside(r)}"
+        return f"{r.label}: {values[0]:.12g} is {_outside(r)}"
     shown = found[:_SHOWN_VALUES]
     more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
-    at, what = (", ".join(f"{pair[k]:g}" for pair in shown) for k in (0, 1))
+    at, what = (", ".join(f"{pair[k]:.12g}" for pair in shown) for k in (0, 1))
     verb = "is" if len(found) == 1 else "are"
     return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {_outside(r)}"
 
 
 def _outside(ranged: Range) -> str:
-    return f"outside its range [{ranged.low:g}, {ranged.high:g}]"
+    return f"outside its range [{ranged.low:.12g}, {ranged.high:.12g}]"

@@ -16,12 +16,13 @@ def with_unit(name: str, unit: str) -> str:
 
 
 def readable(value: float, digits: int = 6) -> str:
-    """Return a number with at most so many digits; a whole number, of which none can be left out, with ten.
+    """Return a number with so many digits, a large one with its hundredths, a whole one with all up to ten.
 
-    >>> readable(2147483647.0), readable(1 / 3), readable(43215.0, 4)
-    ('2147483647', '0.333333', '43215')
+    >>> readable(2147483647.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4)
+    ('2147483647', '0.333333', '16.67', '86399.95')
     """
-    return f"{value:.{10 if float(value).is_integer() else digits}g}"
+    least = 10 if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
+    return f"{value:.{max(digits, least)}g}"
 
 
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
@@ -61,7 +62,7 @@ def signal_text(signal: Signal) -> str:
         half = _SHOWN_POINTS // 2
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
     dwell = signal.shortest_dwell
-    lively = "" if dwell is None else f", shortest dwell {dwell:.4g} s"
+    lively = "" if dwell is None else f", shortest dwell {readable(dwell, 4)} s"
     form = "held" if signal.interpolation == "constant" else signal.interpolation
     return f"{form}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"
 

@@ -184,7 +184,8 @@ def nearest_miss(directory: Path, name: str) -> Case:
         empty = f"its journal contains no simulation; to simulate: falsifier resume {place}"
         raise SpecError(f"{directory}: {why if simulated(directory) else empty}")
     if not misses:
-        raise SpecError(f"{directory}: no simulation of this run nearly violates {name}; choose another run")
+        why = f"each simulation that was judged violates {name}, but no violation was confirmed"
+        raise SpecError(f"{directory}: no nearest miss: {why}")
     robustness, candidate = min(misses, key=lambda pair: pair[0])
     manifest.check_in_sight(directory, described.request.problems)
     return Case(

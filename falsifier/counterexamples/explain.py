@@ -12,6 +12,7 @@ from math import inf
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
+from falsifier.core.words import readable
 from falsifier.counterexamples.shrink import (
     constant_signal,
     stretches,
@@ -89,7 +90,7 @@ class Explanation:
             yield f"{found}: {self.diagnosis.text}"
             return
         yield f"What broke: {verdict.breach.text}."
-        decided = f"decided by {verdict.predicate} at {verdict.critical_time:.5g} s"
+        decided = f"decided by {verdict.predicate} at {readable(verdict.critical_time)} s"
         limit = f": {margin_words(robustness, verdict.predicate)}" if is_on_limit(robustness) else ""
         yield f"The {named}, is {signed(robustness)}, {decided}{limit}."
         yield from (vacuity.text for vacuity in self.diagnosis.vacuities)
@@ -113,7 +114,7 @@ class Explanation:
         return sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1] if rising else []
 
     def _told(self, effect: Effect) -> str:
-        during = "" if effect.span is None else " from {:.4g} to {:.4g} s".format(*effect.span)
+        during = "" if effect.span is None else f" from {' to '.join(readable(t, 4) for t in effect.span)} s"
         what = f"With {effect.name} {self._instead(effect)}{during} alone"
         if effect.robustness is None:
             return f"{what}, the simulation fails."
@@ -129,10 +130,13 @@ class Explanation:
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
-        number = f"{effect.instead:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
-        is_parameter = any(p.name == effect.name for p in self.problem.space.parameters)
-        rest = "at its nominal value" if is_parameter else "at rest"
-        return f"{rest if effect.is_rest else 'at the middle of its range'} ({number})"
+        number = readable(effect.instead, 4) + (f" {unit}" if unit not in ("", "1") else "")
+        ranged = next(r for r in self.problem.space.ranges if r.name == effect.name)
+        if effect.is_rest:
+            return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
+        is_between = ranged.low < effect.instead < ranged.high
+        middle = "at" if effect.instead == (ranged.low + ranged.high) / 2 else "near"
+        return f"{f'{middle} the middle of its range' if is_between else 'at an end of its range'} ({number})"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.words import counted, listed, with_unit
+from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
@@ -57,7 +57,7 @@ class Coordinate:
     @property
     def label(self) -> str:
         """Name, time and unit."""
-        at = "" if self.time is None else f" from {self.time:.4g} s"
+        at = "" if self.time is None else f" from {readable(self.time, 4)} s"
         return with_unit(f"{self.name}{at}", self.unit)
 
 
@@ -114,8 +114,8 @@ class RobustnessMap:
         changes = counted(len(self.robustness), "random change")
         if self.original < 0:
             (size, share), *larger = self.persistence
-            shares = f"{100 * share:.0f} % of changes up to {_percent(size)} of the range still violate"
-            shares += "".join(f", {100 * share:.0f} % up to {_percent(size)}" for size, share in larger)
+            shares = f"{_rounded(share)} % of changes up to {_percent(size)} of the range still violate"
+            shares += "".join(f", {_rounded(share)} % up to {_percent(size)}" for size, share in larger)
             names = listed(list(dict.fromkeys(c.name for c in self.coordinates)))
             return f"{shares} ({changes} of {names} at once). {self._followed}"
         tried = f"{changes} of up to {_percent(self.persistence[-1][0])} of the range"
@@ -127,11 +127,15 @@ class RobustnessMap:
     @property
     def _followed(self) -> str:
         """What was measured, so that it is not taken for what resetting one input alone would do."""
-        end = " Stopped by the user." if self.interrupted else ""
-        if not any(self.influences):
+        known = self.robustness[~np.isnan(self.robustness)]
+        failed = len(self.robustness) - len(known)
+        end = f" {counted(failed, 'simulation')} failed and counted as no violation." if failed else ""
+        end += " Stopped by the user." if self.interrupted else ""
+        if (known == self.original).all():
             return f"None of these changes moved the robustness.{end}"
         most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
-        return f"Over these changes the robustness follows {listed(most)} most (rank correlation).{end}"
+        named = f"{listed(most)} most" if any(self.influences) else "none of these values"
+        return f"Over these changes the robustness follows {named} (rank correlation).{end}"
 
 
 def robustness_map(
@@ -154,7 +158,7 @@ def robustness_map(
     if evaluation.robustness is None:
         raise SpecError(f"{problem.name}: a failed simulation has no robustness to map around")
     if not 0 < radius <= 1:
-        raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:g}")
+        raise SpecError(f"radius: expected a share of the ranges, above 0 and up to 1, got {radius:.12g}")
     points = isqrt(int(_GRID_SHARE * whole(setting("budget"), budget, least=_LEAST_BUDGET)))
     samples = budget - points * points
     from scipy.stats.qmc import Sobol
@@ -209,6 +213,11 @@ def robustness_map(
         surface.reshape(-1, points),
         interrupted=len(judged) < len(surface),
     )
+
+
+def _rounded(share: float) -> int:
+    """Return a share in percent: 0 only if it is none, 100 only if it is all."""
+    return min(max(round(100 * share), share > 0), 100 - (share < 1))
 
 
 def _percent(size: float) -> str:

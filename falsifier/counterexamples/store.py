@@ -232,6 +232,8 @@ def beside(counterexample: Path, name: str) -> Path:
     """
     place, (kind, dash, requirement) = Path(name), counterexample.stem.partition("-")
     which = f"{dash}{requirement}" if kind in ("counterexample", "shrunk") else ""
+    if kind == "fragile":  # a run may have several, and a counterexample beside them
+        which = f"-{counterexample.stem}"
     return counterexample.with_name(f"{place.stem}{which}{place.suffix}")
 
 

@@ -173,7 +173,7 @@ def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mappin
             )
         for value in values:
             if expected := variable.expected(value):
-                raise CandidateError(f"{name} = {value:g}: {expected}")
+                raise CandidateError(f"{name} = {value:.12g}: {expected}")
 
 
 def _signal(variable: Variable, given: Signal | float | str) -> Signal:

@@ -94,9 +94,9 @@ def _inputs_of(column: str, info: ModelInfo) -> list[Variable]:
 def _time(cell: str, before: Sequence[float], line: int) -> float:
     time = _number(cell, f"row {line}: time")
     if not before and time != 0.0:
-        raise SpecError(f"row {line}: the first time must be 0 s, got {time:g} s: shift it")
+        raise SpecError(f"row {line}: the first time must be 0 s, got {time:.12g} s: shift it")
     if before and time < before[-1]:
-        raise SpecError(f"row {line}: time {time:g} s is before {before[-1]:g} s: sort the rows by time")
+        raise SpecError(f"row {line}: time {time:.12g} s is before {before[-1]:g} s: sort the rows by time")
     return time
 
 
@@ -112,7 +112,7 @@ def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell:
         named = variable.number_of(part)
         number = _number(part, what, variable.or_name) if named is None else named
         if expected := variable.expected(number):
-            raise SpecError(f"{what}: {number:g}: {expected}")
+            raise SpecError(f"{what}: {number:.12g}: {expected}")
         values[variable.name].append(number)
 
 

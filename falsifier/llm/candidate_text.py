@@ -43,7 +43,6 @@ _PARTS = frozenset({"signals", "parameters", "point"})
 _KEYS = _PARTS | {"candidates", "lessons", "rationale"}
 _KEYS |= {"name", "value", "values", "points", "times", "interpolation"}
 
-
 # In a point: which of its places are Boolean is known once it is read.
 _NumberOrTruth = Annotated[float, WrapValidator(lambda v, read: v if isinstance(v, bool) else read(v))]
 

@@ -149,7 +149,7 @@ class ReplyForm:
                 raise RejectedReplyError(f"number {place}: {quoted(str(value).lower())} is no number")
         numbers = [_clamped(v, d) for v, d in zip(written, dimensions, strict=True)]
         outside = [
-            f"number {place}: {value:g} is outside its range [{d.low:g}, {d.high:g}]"
+            f"number {place}: {value:.12g} is outside its range [{d.low:.12g}, {d.high:.12g}]"
             for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1)
             if not d.low <= value <= d.high
         ]

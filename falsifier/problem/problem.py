@@ -65,8 +65,8 @@ class Problem:
     def __post_init__(self) -> None:
         if self.space.stop_time != self.experiment.stop_time:
             raise SpecError(
-                f"{self.name}: stop_time is {self.space.stop_time:g} s in the search space, but "
-                f"{self.experiment.stop_time:g} s in the experiment"
+                f"{self.name}: stop_time is {self.space.stop_time:.12g} s in the search space, but "
+                f"{self.experiment.stop_time:.12g} s in the experiment"
             )
         if self.info.variables:
             _check_variables(self)
@@ -281,7 +281,7 @@ def check_limits(problem: Problem) -> None:
     """Check that all values to be tried are within the model's limits; SpecError naming a range."""
     for each in problem.space.ranges:
         if each.name in problem.info and (excess := problem.info[each.name].excess(each.low, each.high)):
-            raise SpecError(f"{problem.name}: [{each.low:g}, {each.high:g}] {excess}; narrow the range")
+            raise SpecError(f"{problem.name}: [{each.low:.12g}, {each.high:.12g}] {excess}; narrow the range")
 
 
 def check_problem(given: object) -> None:

@@ -166,7 +166,7 @@ def _number(variable: Variable, value: float | str, key: str) -> float:
 
 def _check(variable: Variable, key: str, *numbers: float) -> None:
     """Check the ends of a range, or a single value, against the variable's type and the FMU's min and max."""
-    shown = f"{numbers[0]:g}" if key == "value" else "[{:g}, {:g}]".format(*numbers)
+    shown = f"{numbers[0]:.12g}" if key == "value" else "[{:.12g}, {:.12g}]".format(*numbers)
     if excess := variable.excess(numbers[0], numbers[-1]):
         raise SpecError(f"{shown} {excess}", key=key)
     # Whether a range contains such a number is checked by the range itself.

@@ -55,7 +55,7 @@ Count = Annotated[int, BeforeValidator(_plain)]
 def in_order(limits: tuple[float, float]) -> tuple[float, float]:
     """Return the ends of a range; ValueError if the first one is not the smaller one."""
     if not limits[0] < limits[1]:
-        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:g}, {limits[1]:g}]")
+        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:.12g}, {limits[1]:.12g}]")
     return limits
 
 

@@ -15,10 +15,9 @@ from operator import or_
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import tomlkit
 from pydantic import BaseModel, Discriminator, Field, Tag, ValidationError, ValidationInfo, field_validator
 
-from falsifier.core.literals import one_line
+from falsifier.core.literals import one_line, toml_key
 from falsifier.errors import SpecError, did_you_mean, in_section, key_of, rejected
 from falsifier.fmu import is_package
 from falsifier.problem import sections
@@ -210,7 +209,7 @@ def _error_of(error: ValidationError) -> SpecError:
     if where[:1] == ["requirements"] and len(where) > 2:
         where.pop(2)  # below the name of a requirement comes the tag of its kind, which is no key
     section, name = ("", "", *where)[-2:]
-    shown_name = tomlkit.key(str(name)).as_string() if name else ""
+    shown_name = toml_key(str(name)) if name else ""
     if first["type"] == "union_tag_not_found":
         where.append("template")
         message = f"no such template; {did_you_mean(str(given.get('template')), TEMPLATES)}"

@@ -197,7 +197,7 @@ class Template(ModelChanges):
         start, end = self.during
         if not 0 <= start <= end:
             raise SpecError(
-                f"expected [start, end] with 0 <= start <= end, got [{start:g}, {end:g}]", key="during"
+                f"expected [start, end] with 0 <= start <= end, got [{start:.12g}, {end:.12g}]", key="during"
             )
         if end > latest + 1e-9 * clock.stop_time:
             cure = f"end it at {latest:g} s, " if latest >= start else ""

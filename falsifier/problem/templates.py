@@ -162,7 +162,7 @@ class StaysWithin(Template):
         if limited == is_near or (self.reference is None) != (self.within is None):
             raise ValueError("expected low, high or both; or reference and within")
         if isinstance(self.low, float) and isinstance(self.high, float) and self.low > self.high:
-            raise ValueError(f"low is {self.low:g}, more than high, {self.high:g}: exchange them")
+            raise ValueError(f"low is {self.low:.12g}, more than high, {self.high:.12g}: exchange them")
         return self
 
     def _formula(self, clock: Clock) -> str:

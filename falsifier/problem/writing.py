@@ -12,7 +12,7 @@ import tomlkit
 from tomlkit.items import InlineTable, Item
 
 from falsifier.core.files import absent
-from falsifier.core.literals import one_line
+from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package
@@ -80,7 +80,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
 def _components(fmus: Mapping[str, Path], info: ModelInfo) -> Iterator[str]:
     for name, path in fmus.items():
         yield (
-            f"[components.{_key(name)}]\nfmu = {_toml(path.as_posix())}\n"
+            f"[components.{toml_key(name)}]\nfmu = {_toml(path.as_posix())}\n"
             "# step = SECONDS  # of its own; default: the communication step"
         )
     lines = ["INPUT = OUTPUT; an input that is connected needs no [inputs] section below:"]
@@ -99,7 +99,7 @@ def _local(name: str) -> str:
 
 def _input(v: Variable) -> str:
     meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
-    lines = [f"[inputs.{_key(v.name)}]"]
+    lines = [f"[inputs.{toml_key(v.name)}]"]
     lines += [_comment(line) for line in (meaning, v.items_text) if line]
     low, high = v.limits
     # What the FMU leaves open is one unit away from what it states.
@@ -122,7 +122,7 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
         reach = max(abs(start), 1.0) / 2
         low, high = v.limits
         limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)
-        lines.append(_noted(f"{_key(v.name)}.range = {limits}", "replace with the real range"))
+        lines.append(_noted(f"{toml_key(v.name)}.range = {limits}", "replace with the real range"))
     others = [v for v in tunable if v not in searched]
     if others:
         lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
@@ -130,7 +130,7 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
         low, high = v.limits
         shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
         default = "not stated" if v.start is None else f"{v.start} {v.unit}".rstrip()
-        lines.append(_comment(f"{_key(v.name)}.range = {shown}  # default: {default}"))
+        lines.append(_comment(f"{toml_key(v.name)}.range = {shown}  # default: {default}"))
     return "\n".join(lines)
 
 
@@ -156,10 +156,6 @@ def _requirement(info: ModelInfo, stop_time: float) -> str:
 def _range(v: Variable, low: float, high: float) -> str:
     """Return a range; with integer bounds if the variable has only integer values."""
     return str([float(low), float(high)] if v.kind == "real" else [floor(low), ceil(high)])
-
-
-def _key(name: str) -> str:
-    return tomlkit.key(name).as_string()
 
 
 def _toml(value: object) -> str:

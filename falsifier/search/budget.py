@@ -73,6 +73,7 @@ class Spent:
     def simulations_text(self) -> str:
         """Number of simulations in words, with those that failed."""
         failed = f", {self.failures} of them failed" if self.failures else ""
+        failed = ", which failed" if self.failures == self.simulations == 1 else failed
         return counted(self.simulations, "simulation") + failed
 
     @property

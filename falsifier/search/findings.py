@@ -6,8 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
-import tomlkit
-
+from falsifier.core.literals import toml_key
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
@@ -50,11 +49,6 @@ class Finding:
     margin: float | None = None
     time: float | None = None
     simulation: int | None = None
-
-    @property
-    def vacuous(self) -> bool:
-        """Whether a part of the requirement was not tested, so that the answer says less than it seems to."""
-        return self.kind not in ("parameterization", "effect", "margin")
 
     @property
     def untested(self) -> bool:
@@ -151,6 +145,6 @@ def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
             if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
                 return written("--parameterization free", "parameterization='free'")
     elif source.parts.kind == "spec":
-        places = " and ".join(f"[inputs.{tomlkit.key(name).as_string()}]" for name in coarse)
+        places = " and ".join(f"[inputs.{toml_key(name)}]" for name in coarse)
         option += f", or free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in {places}"
     return option

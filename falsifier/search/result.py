@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
+from falsifier.core.words import readable
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -151,7 +152,7 @@ def _signal_columns(name: str, signals: Sequence[Signal | None]) -> Columns:
     if len(shapes) > 1:
         return {name: [None if signal is None else _text(signal) for signal in signals]}
     ((shared, _),) = shapes
-    labels = [name] if len(shared) == 1 else [f"{name} @ {time:.6g} s" for time in shared]
+    labels = [name] if len(shared) == 1 else [f"{name} @ {readable(time)} s" for time in shared]
     return {
         label: [None if signal is None else signal.values[i] for signal in signals]
         for i, label in enumerate(labels)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted, listed
+from falsifier.core.words import counted, listed, readable
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, FindingKind
@@ -169,20 +169,20 @@ class Vacuity:
         return _untested("threshold", seen, closest, what, "it was off")
 
 
-def _untested(kind: FindingKind, seen: _Seen, closest: _Extreme, what: str, off: str) -> Finding:
+def _untested(kind: FindingKind, seen: _Seen, best: _Extreme, what: str, off: str) -> Finding:
     """Return the finding about a part: what was not tested, and how close the part came to changing.
 
     ``off`` says how the margin is told if its values are not telling.
     """
-    margin = abs(closest.margin)
-    near = _reached(seen.part, closest.values) or f"{off} by {shown(margin):.6g}"
+    margin = abs(best.margin)
+    near = _reached(seen.part, best.values) or f"{off} by {shown(margin):.6g}"
     return Finding(
         kind=kind,
-        text=f"{what}; at the closest, {near} (simulation {closest.simulation + 1}, {closest.time:.6g} s).",
+        text=f"{what}; at the closest, {near} (simulation {best.simulation + 1}, {readable(best.time)} s).",
         part=str(seen.part),
         margin=margin,
-        time=closest.time,
-        simulation=closest.simulation,
+        time=best.time,
+        simulation=best.simulation,
     )
 
 
@@ -191,9 +191,9 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     if any(isinstance(part, Temporal | Next) for part in formula.walk()):
         return ""
     sides = dict.fromkeys(s for p in formula.predicates for s in p.sides if not isinstance(s, Number))
-    if not all(name in values for side in sides for name in side.signals):
+    if not sides or not all(name in values for side in sides for name in side.signals):
         return ""
-    return listed([f"{side} reached {float(side.evaluate(values)):.6g}" for side in sides]) if sides else ""
+    return listed([f"{side} reached {readable(float(side.evaluate(values)))}" for side in sides])
 
 
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import readable
 from falsifier.stl import formula as stl
-from falsifier.stl.diagnosis import number, seconds, valued
+from falsifier.stl.diagnosis import seconds, valued
 from falsifier.stl.expression import Expression, Number, unit_of
 from falsifier.stl.lexer import name_text
 from falsifier.stl.program import CompiledPart, Floats
@@ -324,7 +325,7 @@ class _Search:
         if len(names) <= _MOST_SIGNALS and not condition.formula.horizon(self.trajectory.step):
             values, units = self._signals(sample), self.trajectory.units
             read = ", ".join(
-                f"{name_text(n)} = {number(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
+                f"{name_text(n)} = {readable(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
             )
         if now:
             return f"{condition.text} held{f' ({read} at {at})' if read else ''}"
@@ -355,4 +356,4 @@ def compared_sides(predicate: stl.Predicate) -> tuple[Expression, Expression]:
 
 
 def _over(start: float, end: float) -> str:
-    return f"at {seconds(start)}" if start == end else f"from {number(start)} to {seconds(end)}"
+    return f"at {seconds(start)}" if start == end else f"from {readable(start)} to {seconds(end)}"

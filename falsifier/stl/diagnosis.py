@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import readable
 from falsifier.stl import formula as stl
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.margins import is_on_limit
@@ -115,7 +116,7 @@ class VacuousImplication:
     def text(self) -> str:
         """The finding in words."""
         over = f"at {seconds(self.window[0])}" if self.window[0] == self.window[1] else _over(self.window)
-        off = "exactly on its limit" if is_on_limit(self.margin) else f"false by {number(-self.margin)}"
+        off = "exactly on its limit" if is_on_limit(self.margin) else f"false by {readable(-self.margin)}"
         never, near = "not", f"it was {off}"
         if self.window[0] < self.window[1]:
             never = "never"
@@ -237,7 +238,7 @@ def _comparison(predicate: stl.Predicate, value: float, values: dict[str, float]
     else:
         is_left_larger = (value > 0) == (predicate.operator in (">", ">="))
         relation = "exceeds" if is_left_larger else "is below"
-    return f"{left} {relation} {right} by {number(abs(value))}"
+    return f"{left} {relation} {right} by {readable(abs(value))}"
 
 
 def valued(side: Expression, values: Mapping[str, float], margin: float, unit: str = "") -> str:
@@ -248,19 +249,14 @@ def valued(side: Expression, values: Mapping[str, float], margin: float, unit: s
     # So many digits that both sides read as different.
     ratio = 0.0 if is_on_limit(margin) else abs(value / margin)
     digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
-    return f"{side} = {value:.{int(np.clip(digits, _DIGITS, _MOST_DIGITS))}g}{unit and f' {unit}'}"
+    return f"{side} = {readable(value, int(np.clip(digits, _DIGITS, _MOST_DIGITS)))}{unit and f' {unit}'}"
 
 
 def _over(window: tuple[float, float] | None) -> str:
     start, end = window or (0.0, 0.0)
-    return f"over [{number(start)}, {number(end)}] s"
+    return f"over [{readable(start)}, {readable(end)}] s"
 
 
 def seconds(time: float) -> str:
     """A time with its unit."""
-    return f"{number(time)} s"
-
-
-def number(value: float) -> str:
-    """A number with the usual digits."""
-    return f"{value:.{_DIGITS}g}"
+    return f"{readable(time)} s"

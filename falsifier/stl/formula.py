@@ -271,7 +271,6 @@ class Until(_Binary):
 # Operators that look at all times of a window.
 Temporal = Always | Eventually | Until
 
-
 Node = Formula | Expression
 
 

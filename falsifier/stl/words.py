@@ -54,7 +54,7 @@ def _read(formula: stl.Formula, *, later: bool) -> str:
         case stl.Eventually(operand, window):
             return f"{_when(window, later=later)}, {_read(operand, later=True)}"
         case stl.Until(left, right, window):
-            end = _when(window, later=later).replace("at some time ", "")
+            end = _when(window, later=later)
             return f"{_part(left, later=True)} until, {end}, {_part(right, later=True)}"
         case stl.Next(operand):
             return f"at the next recorded time, {_read(operand, later=True)}"

@@ -10,7 +10,7 @@ from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverag
 from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import aligned, counted, listed, with_unit
+from falsifier.core.words import aligned, counted, listed, readable, with_unit
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, llm_use
 
@@ -39,7 +39,7 @@ def coverage_text(found: Coverage, name: str) -> str:
     if found.outputs:
         lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
         lines += _indented(
-            (with_unit(o.name, o.unit), f"{o.lows.min():.6g} to {o.highs.max():.6g}")
+            (with_unit(o.name, o.unit), _span(o.lows.min(), o.highs.max()))
             for o in sorted(found.outputs, key=lambda o: o.name)
         )
     if found.modes:
@@ -100,16 +100,20 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
     }
 
 
+def _span(low: float, high: float) -> str:
+    return readable(low) if low == high else f"{readable(low)} to {readable(high)}"
+
+
 def _indented(rows: Iterable[Sequence[str]]) -> list[str]:
     return [f"  {line}" for line in aligned(rows)]
 
 
 def _range_row(r: RangeCoverage) -> tuple[str, ...]:
-    tried = "nothing" if r.low is None else f"{r.low:.6g} to {r.high:.6g}"
+    tried = "nothing" if r.low is None or r.high is None else _span(r.low, r.high)
     changes = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces.get(pace))
     return (
         with_unit(r.searched.name, r.searched.unit),
-        f"{r.searched.low:.6g} to {r.searched.high:.6g}",
+        _span(r.searched.low, r.searched.high),
         tried,
         f"{r.tried} of {len(r.parts)}",
         changes if r.paces else "parameter",
@@ -119,8 +123,7 @@ def _range_row(r: RangeCoverage) -> tuple[str, ...]:
 def _gap_rows(found: Coverage) -> Iterator[tuple[str, str]]:
     for r in found.ranges:
         if r.gaps:
-            gaps = [f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}" for low, high in r.gaps]
-            yield r.searched.name, f"values {listed(gaps)}"
+            yield r.searched.name, f"values {listed([_span(*gap) for gap in r.gaps])}"
         # Values that are held between changes have no slope.
         possible = PACES if r.searched.kind == "real" else ("constant", "steps")
         missing = [pace for pace in possible if r.paces and not r.paces[pace]]
@@ -204,6 +207,6 @@ def trace_lines(trajectory: Trajectory, *, width: int = _WIDTH) -> list[str]:
         low, high = float(np.min(column)), float(np.max(column))
         heights = np.zeros(width) if low == high else (column[at] - low) / (high - low)
         bars = "".join(_BARS[round(h * (len(_BARS) - 1))] for h in heights)
-        span = f"constant {low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
+        span = "constant " * (low == high) + _span(low, high)
         lines.append(f"{name:<{longest}}  {bars}  {span}")
     return lines

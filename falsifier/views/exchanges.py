@@ -16,7 +16,7 @@ _WRAPPED = "white-space: pre-wrap; overflow-wrap: anywhere"
 
 
 def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
-    """Show the latest turns in which a requirement's engine asked, and how many are left out.
+    """Show the latest turns in which a requirement's engine asked, and how the others are shown.
 
     Empty if the recorded run asked nothing.
     """
@@ -25,8 +25,8 @@ def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
     for one in asked[-most:]:
         parts.append(_iteration(one, before))
         before = one.exchanges[-1].messages
-    if missing := len(asked) - len(parts):
-        said = f"The first {counted(missing, 'question')} are not shown; the question before sample N: "
+    if len(asked) > len(parts):
+        said = "Earlier questions are not shown; the last one before sample N: "
         command = el("code", f"falsifier llm prompt {shlex.quote(str(directory))} --at N")
         parts.insert(0, el("p", said, command, class_="note"))
     return join(*parts)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted
+from falsifier.core.words import counted, readable
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search.budget import Budget, Spent
@@ -99,19 +99,20 @@ class _Line:
 
     def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None] | None) -> None:
         self._show, self._keep, self._news = show, keep, News()
-        self._begin("", None)
+        self._begin("", Budget())
 
-    def _begin(self, title: str, total: int | None) -> None:
-        self.title, self.total, self.done = title, total, 0
+    def _begin(self, title: str, budget: Budget) -> None:
+        self.title, self.total, self.done = title, budget.simulations, 0
         self.handle: Any = None
-        self._seconds, self._note = 0.0, ""
+        self._seconds, self._most, self._note = 0.0, budget.seconds or inf, ""
 
     @property
     def text(self) -> str:
         """How far it is, and the latest news."""
         of = f"{self.done} of " if self.total else ""
         count = counted(self.total or self.done, "simulation")
-        left = self._seconds / self.done * (self.total - self.done) if self.total and self.done else 0.0
+        each, more = self._seconds / max(1, self.done), (self.total or 0) - self.done
+        left = min(each * more, self._most - self._seconds)
         rest = f", about {_duration(left)} left" if left >= 1 else ""
         return f"{of}{count}{rest}. {self._note}"
 
@@ -119,7 +120,7 @@ class _Line:
         """Show what an event has changed."""
         if isinstance(event, RunStarted):
             names = ", ".join(problem.name for problem in event.problems)
-            self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget.simulations)
+            self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget)
         for line in self._news.lines(event):
             if self._keep is None:
                 self._note = line
@@ -183,7 +184,7 @@ class News:
             if verdict is None or verdict.robustness >= self._least.get(name, inf):
                 continue
             self._least[name] = verdict.robustness
-            text = f"best robustness {signed(verdict.robustness)} at t = {verdict.critical_time:.5g} s"
+            text = f"best robustness {signed(verdict.robustness)} at t = {readable(verdict.critical_time)} s"
             if self._is_new(f"{name}: {text}"):
                 several = self._started is not None and len(self._started.problems) > 1
                 told.append(f"{name}: {text}" if several else text)
@@ -208,7 +209,7 @@ class News:
         left += [] if budget.seconds is None else [budget.seconds - spent.seconds]
         of = "" if most is None else f" of {most}"
         pace = f"{rate:.3g} per s" if rate >= 1 else f"{1 / rate:.3g} s each"
-        rest = f", at most {_duration(max(0.0, min(left)))} left" if left else ""
+        rest = f", about {_duration(max(0.0, min(left)))} left at most" if left else ""
         yield f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
 
 

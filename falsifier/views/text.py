@@ -39,8 +39,8 @@ def result_text(result: Result) -> str:
         lines.append(f"  files          {result.directory}")
         lines += [f"  picture        {picture}" for picture in _pictures(result)]
         if result.status == "not falsified" and result.best is not None:
-            nearest = f"falsifier explain {place} (the nearest miss)"
-            lines.append(f"to look closer: {nearest}, falsifier coverage {place} (what was tried)")
+            nearest = f"falsifier explain {place} (the nearest miss), " if not result.best.violated else ""
+            lines.append(f"to look closer: {nearest}falsifier coverage {place} (what was tried)")
     if result.directory is not None and _can_continue(result):
         lines.append(_continue_line(result.directory))
     if result.status == "failed":
@@ -96,9 +96,9 @@ def results_text(results: Sequence[Result]) -> str:
             f"{result.spent.simulations_text}{untested(result.findings)}{robustness}{where}"
         )
         below = [] if found is None else list(broken_lines(found.evaluation.verdict))
-        below += [f"note: {finding.text}" for finding in result.findings]
+        below += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)]
+        below += [f"note: {text}" for text in (*(f.text for f in result.findings), *result.remarks)]
         below += [f"failed: {failure.text}" for failure in result.failures]
-        below += [f"note: {remark}" for remark in result.remarks]
         lines += [f"{'':{width}}  {line}" for line in below]
     held = dict.fromkeys(held_text(r.problem.held_inputs) for r in results)
     lines += [f"not searched: {text}" for text in held if text]

@@ -130,7 +130,7 @@ def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) 
 def test_what_no_input_moves_is_measured_and_says_so() -> None:
     (found,) = unmoved_findings([lag_problem(response=still)], 3)
     assert (found.kind, found.place) == ("unmoved", "")
-    assert found.text.startswith("measured: x was the same in 3 random simulations; the FMU does not declare")
+    assert found.text.startswith("measured: 3 random simulations had the same x; the FMU does not declare")
     assert not list(unmoved_findings([lag_problem()], 3))
     assert not list(unmoved_findings([lag_problem(response=still)], 0))
 

@@ -321,5 +321,6 @@ def test_a_nearest_miss_that_becomes_a_violation_is_written_as_named(tmp_path: P
     done = falsifier("explain", "r", "--shrink", "--out", "x.csv", "--json", cwd=tmp_path)
     assert done.json["outcome"] == "confirmed", done.err
     assert done.json["files"] == ["x.csv", "x.json", "x.png"]
+    assert "was allowed" not in falsifier("explain", "r", "--shrink", "--out", "y.csv", cwd=tmp_path).out
     for again, target in (("x.csv", ["simulate", hard[1], "--inputs"]), ("x.json", ["replay"])):
         assert falsifier(*target, again, cwd=tmp_path).code == 1

@@ -34,9 +34,9 @@ def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_pat
 
 
 def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
-    done = falsifier("simulate", "AT1", "--set", "throttle=120", "--out", "out", cwd=tmp_path)
-    assert "constant 120" in done.out, done.err
-    assert "throttle: 120 exceeds the model's limits for 'throttle', [0, 100]" in done.err
+    done = falsifier("simulate", "AT1", "--set", "throttle=100.000001", "--out", "out", cwd=tmp_path)
+    assert "constant 100" in done.out, done.err
+    assert "throttle: 100.000001 exceeds the model's limits for 'throttle', [0, 100]" in done.err
     assert (tmp_path / "out" / "trajectory.png").is_file()
 
 
@@ -52,9 +52,9 @@ def test_files_in_the_directory_are_kept(tmp_path: Path) -> None:
 
 
 def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
-    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,50,-3\n20,50,0\n")
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,50,-3\n49.999999,50,0\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
-    assert "u.csv: ends at 20 s; the last values are kept until 50 s" in done.err
+    assert "u.csv: ends at 49.999999 s; the last values are kept until 50 s" in done.err
     assert "brake: [-3, 0] exceeds the model's limits" in done.err and "throttle:" not in done.err
 
 

@@ -8,7 +8,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.regression import Database
-from falsifier.counterexamples.store import load_counterexample, replay, save, to_store
+from falsifier.counterexamples.store import beside, load_counterexample, replay, save, to_store
 from falsifier.errors import JournalError, SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import evaluate
@@ -94,6 +94,7 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
     coarse = euler_problem("G[1,1] (x <= 0.65)")
     found = violation(coarse)
     assert replay(to_store(found), coarse).status == "fragile"
+    assert beside(Path("fragile-1.json"), "shrunk.json").name == "shrunk-fragile-1.json"
     broken = lag_problem(response=never)
     with pytest.raises(SimulationError, match="out of order"):
         replay(to_store(found), broken)

@@ -15,7 +15,7 @@ from falsifier.stl import Verdict
 from falsifier.testing import FREE, START, drive, lag_problem
 
 # Neither the contract nor who proposes when depends on how thorough a plan is.
-HASTY = Settings(cells=20, pool=40, children=20, generations=1, bound_steps=1, trial=2)
+HASTY = Settings(cells=20, pool=40, generations=1, bound_steps=1, trial=2)
 TARGET = np.array([0.6, -0.2, 0.15, -0.75, 0.35])
 
 

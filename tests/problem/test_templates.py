@@ -12,7 +12,6 @@ from falsifier.stl import Monitor, parse
 
 STOP, STEP = 10.0, 0.1
 
-
 WRITTEN: list[tuple[str, str]] = [
     ("settles signal=x reference=0.5 within=20% time=3", "G[3,10] (x >= 0.4 and x <= 0.6)"),
     (

@@ -22,7 +22,7 @@ from tests.searches import stop_after
 def findings(problem: Problem, budget: int = 5) -> list[Finding]:
     result = falsify(problem, "sobol", budget=budget)
     assert not result.falsified
-    return [finding for finding in result.findings if finding.vacuous]
+    return [f for f in result.findings if f.kind not in ("parameterization", "effect", "margin")]
 
 
 def test_a_condition_that_never_held_is_told_with_how_close_it_came() -> None:
@@ -163,4 +163,4 @@ def test_the_result_of_a_search_tells_it(starts: tuple[ParameterRange, ...]) -> 
     problem = lag_problem("G[0,10] (x <= 2)", inputs=2, parameters=starts, response=deaf)
     result = falsify(problem, "corners", budget=6)
     (found,) = [f for f in result.findings if f.kind == "effect"]
-    assert found.part == "v" and not found.vacuous
+    assert found.part == "v"

@@ -30,6 +30,7 @@ def test_of_an_implication_the_consequence_is_told_while_the_condition_held() ->
     assert (found.part, found.quantity, found.value, found.limit) == ("error <= 3", "error", 9.4, 3.0)
     assert (found.start, found.end, found.time) == (2.0, 4.0, 4.0)
     assert not found.never
+    assert "load = 1234567 kN" in broken("G[0,6] (load < 5)", load=[*LOAD[1:], 1234567.0]).text
 
 
 @pytest.mark.parametrize(

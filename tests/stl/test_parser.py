@@ -237,7 +237,6 @@ def test_what_is_not_one_formula_is_an_error_that_points_there(text: str, positi
 
 PIECES = "G F U X [0,1] [0, 1 not and or -> <-> ( ) x y b 3 -2 'q' ms , <= < == + - * / ^ abs( min("
 
-
 PHRASES = st.lists(st.sampled_from(PIECES.split()), max_size=12).map(" ".join)
 
 

@@ -34,7 +34,7 @@ from tests.stl.randoms import random_formula
         ),
         (
             "(speed >= 10) U[5,30] (rpm >= 3400)",
-            "speed is at least 10 until, from 5 to 30 s, rpm is at least 3400.",
+            "speed is at least 10 until, at some time from 5 to 30 s, rpm is at least 3400.",
         ),
         (
             "G[0,9] (a and X not a -> F[1,2] b)",

@@ -51,10 +51,8 @@ def test_a_jump_at_a_tick_acts_one_tick_later() -> None:
 
 
 def test_the_share_of_late_shifts_is_proportional_to_the_step() -> None:
-    """With Jacobi and no step of its own, the shift logic sees the speed of one communication step before.
-
-    A shift is a tick late if the speed reaches its threshold within that step before a tick.
-    """
+    # With Jacobi and no step of its own, the shift logic sees the speed of one communication step before.
+    # A shift is a tick late if the speed reaches its threshold within that step before a tick.
     system = TWO[0].model
     assert isinstance(system, System)
     parts = {name: Component(component.fmu) for name, component in system.parts.items()}

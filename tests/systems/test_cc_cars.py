@@ -12,7 +12,6 @@ CARS = {f"y{k}": f"car{k}.y" for k in range(1, 6)}
 MONOLITHIC, COUPLED = problems("CC"), problems("CCcars")
 SPACE = MONOLITHIC[0].space.fixed
 
-
 # Control points that violate CC4 and CCx by more than the coupling can change.
 DEEP = {
     "CC4": {

@@ -15,7 +15,6 @@ from tests.systems.driving import ROOT, Array
 PROBLEM = load_problem("SharedFeeder")
 GRID = PROBLEM.experiment.times
 
-
 PERIOD, LIMIT, WARMING = 0.1, 100.0, 2.0
 
 

@@ -6,6 +6,7 @@ from tests.fmu.fixtures import path
 
 def test_all_variables_of_a_large_model_have_a_line_each() -> None:
     many = tuple(Variable(f"plant.x[{k}]", start=float(k)) for k in range(20_000))
+    assert "2147483647" in info_text(ModelInfo("one", variables=(Variable("n", start=2147483647),)))
     info = ModelInfo("large", variables=many)
     lines = info_text(info, everything=True).splitlines()
     assert len([line for line in lines if line.startswith("plant.x[")]) == 20_000

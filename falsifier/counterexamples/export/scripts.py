@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.core.model import INTERFACE_TAGS
+from falsifier.core.words import readable
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
@@ -136,7 +137,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
 def _recorded_lines(verdict: Verdict) -> str:
     """What broke in the recorded simulation, and what decided its robustness."""
     broken = verdict.breach.lines if verdict.breach else ()
-    decided = f"decided at t = {verdict.critical_time:.6g} s by {verdict.predicate}"
+    decided = f"decided at t = {readable(verdict.critical_time)} s by {verdict.predicate}"
     return "\n".join(map(one_line, (*broken, f"Recorded robustness {signed(verdict.robustness)}, {decided}")))
 
 

@@ -26,7 +26,6 @@ _LEVELS = 12
 # Changes of a trajectory that are looked at; a signal that chatters would otherwise hide the others.
 _MAX_CHANGES = 200
 
-
 # Source of the marks of all discrete signals together.
 MODES = "the modes"
 

@@ -46,7 +46,7 @@ def plan(
     and ``seen`` all simulated or pending points, shape (s, d).
     """
     share = min(1.0, _MOST_SIGNALS / (outputs + len(layout.groups)))
-    first, later = (max(round(share * n), _PARENTS) for n in (settings.pool, settings.children))
+    first, later = (max(round(share * n), _PARENTS) for n in (settings.pool, settings.pool / 2))
     bred = first // 3
     children = np.concatenate(
         [

@@ -10,22 +10,19 @@ class Settings:
     """How the engine opens, learns, plans and chooses who proposes."""
 
     cells: int = CELLS  # number of grid cells over the formula's horizon
-    # Number of constant extremes and of random programs among the first simulations of a formula that a
+    # Number of constant extremes before the random program with which the search for a formula begins that a
     # single extreme can violate: an extreme often does, and a program shows more of the dynamics.
     constants: int = 1
-    programs: int = 1
     bangs: int = 2  # number of switching inputs among the first simulations of a formula with nested windows
     pauses: int = 2  # number of constant extremes between these
     # Number of stepping inputs, instead of constant extremes, if a violation requires several conditions at
     # once: no single extreme causes it, and dynamics are worth more than steady states.
     probes: int = 2
-    pool: int = 500  # number of first candidates of a plan
-    children: int = 250  # number of new candidates per generation
+    pool: int = 500  # number of first candidates of a plan; each generation adds half as many
     generations: int = 4  # number of generations of a plan, after the first candidates
     bound_steps: int = 4  # number of gradient steps towards bounds after the generations
     reserved: float = 0.04  # share of the turns that no rating takes away from each of the simple arms
-    # Number of simulations after the first ones in which nothing is reserved, so that dynamics that predict
-    # well are not held up.
+    # Number of simulations after the first ones with nothing reserved: good dynamics are not held up.
     trial: int = 8
     # Number of further proposals if one will probably fail; the least risky one is simulated.
     retries: int = 12

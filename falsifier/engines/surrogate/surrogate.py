@@ -185,7 +185,7 @@ class Surrogate:
             return [kind for turn in turns for kind in turn if kind is not None]
         if needs_several(self.problem.requirement.formula):
             return ["stepping"] * settings.probes
-        return ["corners"] * settings.constants + ["program"] * settings.programs
+        return ["corners"] * settings.constants + ["program"]
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])

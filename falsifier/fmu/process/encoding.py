@@ -29,7 +29,6 @@ STORED: Mapping[int, Mapping[str, str]] = {
     },
 }
 
-
 # The largest integer of a request.
 _MOST = (1 << 63) - 1
 

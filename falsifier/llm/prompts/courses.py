@@ -41,7 +41,6 @@ _URGENT = 1e6
 # A period that changes by more than this factor is told at the beginning and at the end.
 _PERIOD_FACTOR = 1.5
 
-
 Label = Callable[[float, str], str]
 
 

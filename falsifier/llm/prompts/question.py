@@ -62,8 +62,7 @@ _SUCH = (
 _FLAT = (
     "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction. Look "
     "instead at how close a condition came to being true, how briefly a discrete value was held, and how far "
-    "a signal was from its switching point.\n\n"
-    "By what the recorded signals did, these got furthest: {named}."
+    "a signal was from its switching point."
 )
 
 # How much of a sample is told.
@@ -216,13 +215,13 @@ class Questions:
             yield f"Your lessons so far: {lessons}"
         if waiting:
             yield "\n".join((_PENDING, *waiting))
-        if is_own and self._samples:
+        if is_own and self._judged:
             what = self._view.chosen
             on_time = [] if self._is_flat() else [_ON_TIME.format(what=what)]
             on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
             yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
-            if _RUN.search(self._lasting()):
-                yield _RUNS
+        if is_own and _RUN.search(self._lasting()):
+            yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 
     def _standings(self) -> Iterator[str]:
@@ -232,7 +231,9 @@ class Questions:
             return
         named = listed([f"sample {s.number}" for s in ranked[:_NAMED]])
         if self._is_flat():
-            yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations, named=named)
+            yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
+            if len({self._reached.rank(s.progress) for s in ranked}) > 1:
+                yield f"By what the recorded signals did, these got furthest: {named}."
         else:
             yield f"Lowest robustness so far: {named}."
         if self._climb.is_told:

@@ -8,7 +8,7 @@ import numpy as np
 from falsifier.analyses.coverage import labels_of
 from falsifier.core.arguments import instance
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import with_unit
+from falsifier.core.words import readable, with_unit
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -129,7 +129,7 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
 
 
 def _decided(verdict: Verdict) -> list[str]:
-    by, at = verdict.predicate, f"{verdict.critical_time:.5g} s"
+    by, at = verdict.predicate, f"{readable(verdict.critical_time)} s"
     decided = f"robustness {signed(verdict.robustness)}, decided by {by} at {at}"
     if verdict.breach is not None:
         return [*verdict.breach.lines, decided]

@@ -22,7 +22,7 @@ from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.panels import Panel, panels
 from falsifier.views.text import Labels
 
-Status = Literal["violated", "no violation found", "not finished", "failed"]
+Status = Literal["violated", "no violation found", "no violation confirmed", "not finished", "failed"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -42,6 +42,8 @@ class Shown:
     @property
     def what(self) -> str:
         """What it is, in words."""
+        if self._is_doubtful:
+            return "violation that was not confirmed"
         if not self.run.falsified:
             return "simulation nearest to a violation"
         if self.is_shrunk and in_one_line(self.candidate) == in_one_line(_recorded(self.run)):
@@ -53,9 +55,13 @@ class Shown:
         """What ``falsifier explain`` has found out; empty if nobody asked, or if the run went on since."""
         file = beside(self.run.counterexample_file, EXPLANATION)
         journal = self.run.directory / JOURNAL
-        if not file.is_file() or file.stat().st_mtime < journal.stat().st_mtime:
-            return ""
+        if self._is_doubtful or not file.is_file() or file.stat().st_mtime < journal.stat().st_mtime:
+            return ""  # of a run without a counterexample it is about the nearest miss
         return file.read_text(encoding="utf-8").strip()
+
+    @property
+    def _is_doubtful(self) -> bool:
+        return not self.run.falsified and self.verdict is not None and self.verdict.violated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +89,9 @@ class Section:
             return "violated"
         if all(run.status == "failed" for run in runs):
             return "failed"
-        return "no violation found" if any(run.finished for run in runs) else "not finished"
+        if not any(run.finished for run in runs):
+            return "not finished"
+        return "no violation confirmed" if any(run.unconfirmed for run in runs) else "no violation found"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -148,7 +148,7 @@ def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
     runs = [el("a", text, href=f"?run={name}") if name in places else text for name, text in told.items()]
     return el(
         "details",
-        el("summary", f"All {counted(len(rows or places), 'run')}"),
+        el("summary", f"{len(told)} of {counted(len(rows or places), 'run')}"),
         el("ul", *(el("li", run) for run in runs)),
         open="",
     )

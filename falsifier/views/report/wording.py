@@ -66,8 +66,8 @@ def result_text(section: Section) -> str:
         return f"failed: {failed[0].reason}"
     count = counted(spent_on(runs).simulations, "simulation")
     if not any(run.finished for run in runs):
-        return f"not finished: no violation in {count} so far"
-    return f"no violation found in {count}{untested(f for run in runs for f in run.findings)}"
+        return f"not finished: no violation confirmed in {count} so far"
+    return f"{section.status} in {count}{untested(f for run in runs for f in run.findings)}"
 
 
 def limit_facts(shown: Shown) -> list[Fact]:

@@ -45,8 +45,10 @@ def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) 
     problem = euler_problem("G[1,1] (x <= 0.65)")
     result = falsify(problem, make_engine("corners", problem, seed=0), budget=2, directory=tmp_path)
     assert result.fragile and result.counterexample is None
+    (tmp_path / "explanation.txt").write_text("Of the nearest miss.\n")
     for text in (markdown_report(tmp_path), html_report(tmp_path)):
-        assert "was violated" in text
+        assert "was violated" in text and "Of the nearest miss." not in text
+        assert "no violation confirmed in 2 simulations" in text.lower() and "violation found" not in text
         assert "-0.00132156 (violated by this margin)" in text.replace("\\", "").replace("−", "-")
 
 

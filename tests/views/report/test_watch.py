@@ -112,7 +112,7 @@ def test_what_is_written_later_is_seen(tmp_path: Path) -> None:
 def test_of_a_campaign_each_run_can_be_chosen(campaign: Path) -> None:
     watch = Watch(campaign)
     text, _ = watch.look()
-    assert "8/8 runs finished, 4 falsified" in text and "All 8 runs" in text
+    assert "8/8 runs finished, 4 falsified" in text and "8 of 8 runs" in text
     names = re.findall(r'href="\?run=([^"]*)"', text)
     assert len(names) == 8
     chosen = [watch.look(name)[0] for name in (names[-1], "../../etc", names[0])]
