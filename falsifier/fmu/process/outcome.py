@@ -110,8 +110,7 @@ def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
     """Return how far a simulation came, in words and in s, as its process says: it may be any number."""
     if not 0.0 < time < plan.stop_time * (1.0 + 1e-9):
         return "", None
-    is_last = time > plan.stop_time * (1.0 - 1e-9)
-    return f" after its last step (t = {time:g} s)" if is_last else f" at t = {time:g} s", time
+    return f" at t = {time:g} s", time
 
 
 def last_lines(log: tuple[str, ...]) -> str:

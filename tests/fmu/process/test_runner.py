@@ -233,6 +233,7 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
         ("Lag_2", "reset"),
         ("NoReset_2", "instance"),
         ("LyingReset_2", "instance"),
+        ("CrashesAtEnd_2", "process"),
         ("SavedState_2", "state"),
         ("SavedState_3", "state"),
         ("LyingState_2", "instance"),
