@@ -16,7 +16,7 @@ BEGUN, RELEASE = "begun", "release"
 
 
 def held(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Wait for the folder's file ``release`` once enough simulations have begun: a campaign is killed then."""
+    """Wait for the folder's file ``release`` once enough simulations began: a campaign is killed then."""
     if HOLD in os.environ:
         count, _, folder = os.environ[HOLD].partition(" ")
         with (Path(folder) / BEGUN).open("ab") as file:
