@@ -147,11 +147,11 @@ def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
 def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the interpolated values of a signal with two or more control points, ignoring its hold."""
     knots, values = np.asarray(signal.times), np.asarray(signal.values)
-    if signal.interpolation == "linear":
-        return np.asarray(np.interp(at, knots, values))
     if signal.interpolation == "constant":
         return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
-    return _evaluate(_pchip(signal.times, signal.values), at)
+    is_linear = signal.interpolation == "linear"
+    curve = np.interp(at, knots, values) if is_linear else _evaluate(_pchip(signal.times, signal.values), at)
+    return np.asarray(curve).clip(values.min(), values.max())  # rounding alone leaves the range
 
 
 @lru_cache(maxsize=256)
