@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import isfinite
+from math import ceil, isfinite
 from typing import Literal, get_args
 
 import numpy as np
@@ -112,6 +112,15 @@ class Signal:
     def held(self, hold: float | None) -> "Signal":
         """Return the same signal, sampled and held with this period in s; None: not held."""
         return replace(self, hold=hold)
+
+    @property
+    def stepped(self) -> "Signal":
+        """The same signal; what is constant between control points and held has them where it changes."""
+        if self.hold is None or self.interpolation != "constant":
+            return self
+        periods = (ceil((t - _TIME_ROUNDING) / self.hold) for t in self.times)
+        points = {k * self.hold: v for k, v in zip(periods, self.values, strict=True)}
+        return replace(self, times=tuple(points), values=tuple(points.values()))
 
     @property
     def switches(self) -> int:
