@@ -100,11 +100,11 @@ class Signal:
         """
         if self.hold is not None and len(self.times) > 1:
             values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
-            return _constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
+            return constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
         if self.interpolation == "pchip" and len(knots) > 1:
             return _pchip(self.times, self.values).copy()
-        table = _constant_pieces(knots, values)
+        table = constant_pieces(knots, values)
         if self.interpolation == "linear":
             table[:-1, 2] = np.diff(values) / np.diff(knots)
         return table
@@ -211,7 +211,8 @@ def end_slope(step: float, next_step: float, secant: float, next_secant: float) 
     return 3.0 * secant if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant) else slope
 
 
-def _constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the pieces (see ``Signal.pieces``) of a signal that has each value from its start on."""
     table = np.zeros((len(starts), 5))
     table[:, 0], table[:, 1] = starts, values
     return table

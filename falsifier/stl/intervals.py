@@ -132,8 +132,6 @@ def _call(function: str, operands: list[Interval]) -> Interval:
         return _largest(operands)
     if function in ("sin", "cos"):
         return Interval(-1.0, 1.0)
-    if math.isinf(first.low) or math.isinf(first.high):
-        return _ANY
     try:
         return Interval(_MONOTONE[function](first.low), _MONOTONE[function](first.high))
     except (ValueError, OverflowError):

@@ -49,7 +49,6 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
          "part 4 of 4 joined by 'and' decided: y = 2 is below 3 by 1."),
         ("x <= 1 or y <= 3 or (x <= 1 and y <= 1)",
          "part 2 of 3 joined by 'or' decided: y = 2 is below 3 by 1."),
-        ("x <= 5 or y <= 3", "the left side of 'or' decided: x = 3 is below 5 by 2."),
         ("x <= 5 -> y <= 3", "the consequence of -> decided: y = 2 is below 3 by 1."),
         ("x <= 5 -> y >= 3", "the consequence of -> failed: y = 2 is below 3 by 1."),
         ("x <= 4 -> y >= 9", "the condition of -> decided: x = 3 is below 4 by 1."),
