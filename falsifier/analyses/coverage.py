@@ -280,7 +280,7 @@ class _Seen:
     def give(self, candidate: Candidate) -> None:
         """Add the modes that one simulation was given."""
         for name, signal in candidate.signals.items():
-            self._add(name, signal.values)
+            self._add(name, signal.stepped.values)
         for name, value in candidate.parameters.items():
             self._add(name, (value,))
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import isfinite
+from math import ceil, isfinite
 from typing import Literal, get_args
 
 import numpy as np
@@ -100,11 +100,11 @@ class Signal:
         """
         if self.hold is not None and len(self.times) > 1:
             values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
-            return _constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
+            return constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
         if self.interpolation == "pchip" and len(knots) > 1:
             return _pchip(self.times, self.values).copy()
-        table = _constant_pieces(knots, values)
+        table = constant_pieces(knots, values)
         if self.interpolation == "linear":
             table[:-1, 2] = np.diff(values) / np.diff(knots)
         return table
@@ -112,6 +112,15 @@ class Signal:
     def held(self, hold: float | None) -> "Signal":
         """Return the same signal, sampled and held with this period in s; None: not held."""
         return replace(self, hold=hold)
+
+    @property
+    def stepped(self) -> "Signal":
+        """The same signal; what is constant between control points and held has them where it changes."""
+        if self.hold is None or self.interpolation != "constant":
+            return self
+        periods = (ceil((t - _TIME_ROUNDING) / self.hold) for t in self.times)
+        points = {k * self.hold: v for k, v in zip(periods, self.values, strict=True)}
+        return replace(self, times=tuple(points), values=tuple(points.values()))
 
     @property
     def switches(self) -> int:
@@ -147,11 +156,11 @@ def _held_values(signal: Signal, count: int) -> NDArray[np.float64]:
 def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the interpolated values of a signal with two or more control points, ignoring its hold."""
     knots, values = np.asarray(signal.times), np.asarray(signal.values)
-    if signal.interpolation == "linear":
-        return np.asarray(np.interp(at, knots, values))
     if signal.interpolation == "constant":
         return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
-    return _evaluate(_pchip(signal.times, signal.values), at)
+    is_linear = signal.interpolation == "linear"
+    curve = np.interp(at, knots, values) if is_linear else _evaluate(_pchip(signal.times, signal.values), at)
+    return np.asarray(curve).clip(values.min(), values.max())  # rounding alone leaves the range
 
 
 @lru_cache(maxsize=256)
@@ -202,7 +211,8 @@ def end_slope(step: float, next_step: float, secant: float, next_secant: float) 
     return 3.0 * secant if secant * next_secant <= 0.0 and abs(slope) > 3.0 * abs(secant) else slope
 
 
-def _constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+def constant_pieces(starts: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the pieces (see ``Signal.pieces``) of a signal that has each value from its start on."""
     table = np.zeros((len(starts), 5))
     table[:, 0], table[:, 1] = starts, values
     return table

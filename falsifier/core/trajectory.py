@@ -109,9 +109,7 @@ class Trajectory:
         buffer = BytesIO()
         names = np.array(self.names)
         units = np.array([self.units.get(n, "") for n in self.names])
-        stacked = (
-            np.stack([self.columns[n] for n in self.names]) if self.columns else np.empty((0, len(self)))
-        )
+        stacked = np.array([self.columns[n] for n in self.names]).reshape(-1, len(self))
         np.savez(buffer, times=self.times, names=names, units=units, columns=stacked)
         return buffer.getvalue()
 

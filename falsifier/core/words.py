@@ -33,7 +33,7 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
     units = {r.name: r.unit for r in space.ranges} if space is not None else {}
     labels = {name: with_unit(name, unit) for name, unit in units.items()}
     return [
-        *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in candidate.signals.items()),
+        *(("input", f"{labels.get(n, n)} {signal_text(s.stepped)}") for n, s in candidate.signals.items()),
         *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),
     ]
 

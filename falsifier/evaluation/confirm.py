@@ -157,11 +157,9 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
 
 
 def _same(one: Trajectory | None, other: Trajectory | None) -> bool:
-    return (
-        one is not None
-        and other is not None
-        and all(np.array_equal(one[name], other[name]) for name in one.names)
-    )
+    if one is None or other is None:
+        return False
+    return all(np.array_equal(one[name], other[name]) for name in one.names)
 
 
 @dataclass(frozen=True, slots=True)

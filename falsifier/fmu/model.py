@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import path_of
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
-from falsifier.core.signals import Signal
+from falsifier.core.signals import Signal, constant_pieces
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu.description.archive import WINDOWS, file_hash
@@ -101,10 +101,8 @@ class FmuModel(Isolated):
         if self.interface == "model-exchange":
             for variable in self.info.inputs:
                 if variable.name in signals and not variable.is_continuous:
-                    whole = variable.kind != "real"
-                    tables[variable.name] = _held_pieces(
-                        signals[variable.name], experiment.times, whole=whole
-                    )
+                    signal, whole = signals[variable.name], variable.kind != "real"
+                    tables[variable.name] = _held_pieces(signal, experiment.times, whole=whole)
         return tables
 
     def _with_hint(self, error: ModelError | SimulationError) -> ModelError | SimulationError:
@@ -127,9 +125,7 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
     values = signal.sample(times)
     values = np.rint(values) if whole else values
     changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
-    table = np.zeros((len(changes), 5))
-    table[:, 0], table[:, 1] = times[changes], values[changes]
-    return table
+    return constant_pieces(times[changes], values[changes])
 
 
 @lru_cache(maxsize=64)

@@ -196,9 +196,7 @@ class _Search:
                 left, right = operands
                 met = self._first(right.opposite, window)
                 yield from self.at(right, self._moved(spot.under(left.opposite), met))
-            case stl.Implies() if (
-                demand.wanted
-            ):  # apart from other choices, as the consequence may be negated
+            case stl.Implies() if demand.wanted:  # as a choice, a negated consequence would be a condition
                 yield from self.at(operands[1], spot.under(operands[0].opposite))
             case stl.Iff():
                 yield from self._unequal(demand, spot)
@@ -211,8 +209,6 @@ class _Search:
                 refused, choices = ([d for d in operands if d.wanted is w] for w in (False, True))
                 if choices:
                     spot = spot.under(*(d.opposite for d in refused))
-                if len(choices) != 1:  # then all conditions are told of the same sample
-                    spot = self._settled(spot)
                 for choice in choices or operands:
                     yield from self.at(choice, spot)
             case _:
@@ -266,10 +262,10 @@ class _Search:
         """The shortfall of a comparison: throughout a stretch, or within a window if that is given."""
         predicate = demand.formula
         assert isinstance(predicate, stl.Predicate)
-        (first, last), several = (window, False) if window else self._stretch(spot)
+        (first, last), several = (window, False) if window else self._stretch(demand, spot)
         margins = demand.margins(self.buffer, (first, last))
         sample = first + int(margins.argmax() if window else margins.argmin())
-        values, units = self._signals(sample), self.trajectory.units
+        values, units = self.trajectory.at(self._time(sample)), self.trajectory.units
         quantity, other = compared_sides(predicate)
         value, limit = (float(side.evaluate(values)) for side in (quantity, other))
         unit = unit_of(quantity, units) or unit_of(other, units)
@@ -300,14 +296,15 @@ class _Search:
             context=(*spot.notes, *(f"while {self._held(d, sample, now=True)}" for d in spot.held)),
         )
 
-    def _stretch(self, spot: _Spot) -> tuple[Span, bool]:
-        """The samples around one at which no demand was met down to the comparison; if there are others."""
+    def _stretch(self, demand: _Demand, spot: _Spot) -> tuple[Span, bool]:
+        """The worst samples in a row at which no demand was met down to here; whether there are others."""
         if spot.scope is None:
             return (spot.sample, spot.sample), False
         low, high = spot.scope
         met = np.any([guard.met(self.buffer, spot.scope) for guard in spot.guards], axis=0)
+        worst = low + int(np.where(met, np.inf, demand.margins(self.buffer, spot.scope)).argmin())
         good = np.flatnonzero(met) + low
-        before, after = good[good < spot.sample], good[good > spot.sample]
+        before, after = good[good < worst], good[good > worst]
         first, last = int(before.max(initial=low - 1)) + 1, int(after.min(initial=high + 1)) - 1
         return (first, last), len(good) + last - first < high - low
 
@@ -323,7 +320,7 @@ class _Search:
         """Say that a condition held, with its signals' values; ``now``: where the shortfall was."""
         names, at, read = condition.formula.signals, seconds(self._time(sample)), ""
         if len(names) <= _MOST_SIGNALS and not condition.formula.horizon(self.trajectory.step):
-            values, units = self._signals(sample), self.trajectory.units
+            values, units = self.trajectory.at(self._time(sample)), self.trajectory.units
             read = ", ".join(
                 f"{name_text(n)} = {readable(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
             )
@@ -337,9 +334,6 @@ class _Search:
 
     def _time(self, sample: int) -> float:
         return float(self.trajectory.times[sample])
-
-    def _signals(self, sample: int) -> dict[str, float]:
-        return {name: float(column[sample]) for name, column in self.trajectory.columns.items()}
 
 
 def _inner(part: CompiledPart, window: Span) -> Span:

@@ -6,6 +6,7 @@ not needed are not computed; a part that occurs twice in a formula is computed o
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -39,7 +40,7 @@ def compile_formula(formula: stl.Formula, *, step: float, samples: int, last: in
     compiler.demand(formula, 0, last)
     compiler.location(formula)
     return Program(
-        compiler.part(formula),
+        compiler.part(formula, 0, last),
         formula.signals,
         step,
         samples,
@@ -81,19 +82,23 @@ class _Compiler:
             self._fail_past_end(node, last)
         seen = self.needs.get(node, (first, last))
         self.needs[node] = (min(seen[0], first), max(seen[1], last))
-        if isinstance(node, stl.Next):
-            first, last = first + 1, last + 1
-        elif isinstance(node, stl.Temporal) and node.window is None:
-            last = self.samples - 1
+        for part, begin, end in self._below(node, first, last):
+            self.demand(part, begin, end)
+
+    def _below(self, node: stl.Node, first: int, last: int) -> Iterator[tuple[stl.Node, int, int]]:
+        """Yield what is directly below a part, with the first and last sample at which it is needed there."""
+        start = end = int(isinstance(node, stl.Next))
+        if isinstance(node, stl.Temporal) and node.window is None:
+            end = self.samples - 1 - last
         elif isinstance(node, stl.Temporal) and node.window:
             # First, so that no bound after the end of the trajectory is suggested as the nearest multiple.
             beyond = last + round(node.window.end / self.step)
             if beyond >= self.samples:
                 self._fail_past_end(node, beyond)
             start, end = window_samples(node.window, self.step)
-            first, last = first if isinstance(node, stl.Until) else first + start, last + end
-        for part in stl.parts_of(node):
-            self.demand(part, first, last)
+        for number, part in enumerate(stl.parts_of(node)):
+            is_left = isinstance(node, stl.Until) and number == 0  # needed from now on
+            yield part, first if is_left else first + start, last + end
 
     def _fail_past_end(self, node: stl.Node, last: int) -> None:
         end = (self.samples - 1) * self.step
@@ -233,13 +238,15 @@ class _Compiler:
             result = self._emit(np.minimum, first, last, before, result)
         return result
 
-    def part(self, node: stl.Formula) -> CompiledPart:
-        """Return a sub-formula with its location and all parts below it."""
+    def part(self, node: stl.Formula, first: int, last: int) -> CompiledPart:
+        """Return a sub-formula that is needed here at these samples, its location and all parts below it."""
         window: tuple[int, int | None] | None = None
         if isinstance(node, stl.Temporal):
             window = window_samples(node.window, self.step) if node.window else (0, None)
-        children = tuple(self.part(child) for child in node.children)
-        return CompiledPart(node, str(node), self.locations[node], window, self.samples, children)
+        below = self._below(node, first, last)
+        children = tuple(self.part(f, a, b) for f, a, b in below if isinstance(f, stl.Formula))
+        location = Location(self.locations[node].base, first, last)
+        return CompiledPart(node, str(node), location, window, self.samples, children)
 
 
 def _constant(node: expression.Expression) -> float:

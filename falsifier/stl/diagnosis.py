@@ -178,8 +178,8 @@ def diagnose(root: CompiledPart, buffer: Floats, trajectory: Trajectory) -> Diag
             chain = []
         steps.append(Step(formula, time, here.value, window, text))
     found = (_vacuity(part, buffer, times) for part in root.walk())
-    vacuities = {v.implication: v for v in found if v is not None}
-    return Diagnosis(path[0].value, float(times[path[-1].sample]), tuple(steps), tuple(vacuities.values()))
+    vacuities = tuple(dict.fromkeys(v for v in found if v is not None))
+    return Diagnosis(path[0].value, float(times[path[-1].sample]), tuple(steps), vacuities)
 
 
 def _vacuity(part: CompiledPart, buffer: Floats, times: Floats) -> VacuousImplication | None:

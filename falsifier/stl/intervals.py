@@ -4,9 +4,9 @@ The bounds are safe and not always tight: each occurrence of a signal is taken f
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import product
+from operator import mul, truediv
 
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
 from falsifier.stl.formula import And, Formula, Iff, Implies, Not, Or, Predicate, Until
@@ -109,17 +109,17 @@ def _arithmetic(operator: str, left: Interval, right: Interval) -> Interval:
     if operator == "*":
         return _corners(left, right)
     if operator == "/" and (right.low > 0 or right.high < 0):
-        return _corners(left, Interval(1 / right.high, 1 / right.low))
+        return _corners(left, right, truediv)
     if operator == "^" and right == Interval(2.0, 2.0):
         size = _absolute(left)
         return _corners(size, size)
     return _ANY
 
 
-def _corners(left: Interval, right: Interval) -> Interval:
-    pairs = product((left.low, left.high), (right.low, right.high))
-    found = [0.0 if 0.0 in pair else pair[0] * pair[1] for pair in pairs]
-    return Interval(min(found), max(found))
+def _corners(left: Interval, right: Interval, combine: Callable[[float, float], float] = mul) -> Interval:
+    found = [combine(a, b) for a in (left.low, left.high) for b in (right.low, right.high)]
+    known = [0.0 if math.isnan(x) else x for x in found]  # of 0 and an infinite end, or of two
+    return Interval(min(known), max(known))
 
 
 def _call(function: str, operands: list[Interval]) -> Interval:
@@ -132,8 +132,6 @@ def _call(function: str, operands: list[Interval]) -> Interval:
         return _largest(operands)
     if function in ("sin", "cos"):
         return Interval(-1.0, 1.0)
-    if math.isinf(first.low) or math.isinf(first.high):
-        return _ANY
     try:
         return Interval(_MONOTONE[function](first.low), _MONOTONE[function](first.high))
     except (ValueError, OverflowError):

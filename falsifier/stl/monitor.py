@@ -180,11 +180,11 @@ class Monitor:
             MonitorError: if the trajectory cannot be evaluated.
         """
         buffer = fill(self._program, trajectory, self._take_buffer())
-        found = {}
+        found: dict[Formula, NDArray[np.float64]] = {}
         for part in self._program.root.walk():
-            first, last = max(part.location.first, 0), part.location.last  # X has the location of its operand
-            found[part.formula] = np.full(self.samples, np.nan)
-            found[part.formula][first : last + 1] = part.over(buffer, first, last)
+            first, last = part.location.first, part.location.last
+            course = found.setdefault(part.formula, np.full(self.samples, np.nan))
+            course[first : last + 1] = part.over(buffer, first, last)
         self._spare.append(buffer)
         return found
 

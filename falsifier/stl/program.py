@@ -135,7 +135,7 @@ class CompiledPart:
 
     formula: Formula  # the sub-formula
     text: str  # its text
-    location: Location  # its samples and their offsets
+    location: Location  # the samples at which it counts here, and their offsets
     # Window of a temporal operator, in samples from the sample at which it is evaluated; an end of None is
     # the last sample of the trajectory.
     window: tuple[int, int | None] | None

@@ -84,6 +84,12 @@ def test_a_long_signal_is_cut_in_the_middle_and_says_how_lively_it_is() -> None:
     assert text.endswith("1 at 19.5 s (39 switches, shortest dwell 0.5 s)")
 
 
+def test_steps_that_are_held_are_told_when_they_take_effect() -> None:
+    held = Signal((0.0, 0.9, 1.2, 1.4), (1.0, 2.0, 3.0, 4.0), "constant", hold=0.5)
+    told = "u held: 1 at 0 s, 2 at 1 s, 4 at 1.5 s (2 switches, shortest dwell 0.5 s)"
+    assert in_one_line(Candidate({"u": held})) == told
+
+
 @pytest.mark.parametrize("value", [0.1 + 0.2, 1e-7, 120.0, -0.5, 1e300])
 def test_numbers_read_back_exactly(value: float) -> None:
     assert float(literals.shortest(value)) == value

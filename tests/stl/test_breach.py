@@ -83,6 +83,14 @@ def test_a_negated_alternative_is_a_condition(formula: str) -> None:
          "load <= 0.9 was violated several times, worst at 0 s: load = 1 kN"),
         ("G[0,4] (load >= 0.9 -> X X (error <= 3))",
          "error <= 3 was violated at 2 s: error = 5 mm; after load >= 0.9 held at 0 s (load = 1 kN)"),
+        ("G[0,6] (load >= 0.45 -> error <= 0.5)",  # not at 1 s, where the condition held most clearly
+         "error <= 0.5 was violated several times, worst at 5 s: error = 9 mm; "
+         "while load >= 0.45 held (load = 0.5 kN at 5 s)"),
+        ("G[0,6] (error >= 5 -> load >= 0.6 or load <= -1)",
+         "alternative 1 of 2: load >= 0.6 was violated from 2 to 5 s: load = -0.0259 kN at 3 s; "
+         "while error >= 5 held (error = 9.2 mm at 3 s); "
+         "alternative 2 of 2: load <= -1 was violated from 2 to 5 s: load = 0.5 kN at 5 s; "
+         "while error >= 5 held (error = 9 mm at 5 s)"),
         ("error >= load", "error >= load was violated at 0 s: error = 0 mm, load = 1 kN"),
         ("G[0,6] (3 >= error)", "3 >= error was violated from 2 to 5 s: error = 9.4 mm at 4 s"),
         ("G[0,6] (error*load <= 0.2)",

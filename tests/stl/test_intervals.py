@@ -41,7 +41,7 @@ def test_no_trajectory_in_range_is_outside_the_bounds(text: str) -> None:
     ("text", "low", "high"),
     [("x <= 1", -1, 2), ("x < 2", -ON_LIMIT, 3), ("x <= 2", ON_LIMIT, 3),
      ("abs(x) <= 5", 3, 5), ("x == 4", -5, -2), ("z <= 1", -np.inf, np.inf),
-     ("z - z <= 1", -np.inf, np.inf)],
+     ("(y + 2.5)/10 > 0.3", -ON_LIMIT, 0.55 - 0.3)],
 )  # fmt: skip
 def test_bounds_of_single_signals_are_tight(text: str, low: float, high: float) -> None:
     assert margins(parse(text), RANGES) == Interval(low, high)

@@ -86,7 +86,7 @@ def input_table(shown: Shown) -> Table:
     A cell is empty where an input has no control point; how it goes on between them stands in the header.
     """
     signals = {
-        name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal
+        name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal.stepped
         for name, signal in shown.candidate.signals.items()
     }
     header, columns = ["time [s]"], []
