@@ -54,7 +54,7 @@ def choose_grid(
         stop_time: end of the simulation in s.
         times: times in s that formulas name; those after the stop time are ignored.
         fmu_step: the FMU's default step in s, if it specifies one.
-        internal_step: step in s of its own solver, of which the interval is a multiple if no other is given.
+        internal_step: step in s of its own solver, of which the interval is a multiple if those given are.
         step_size: communication step in s, if it is stated; the interval is a multiple of it.
 
     Raises:
@@ -71,7 +71,9 @@ def choose_grid(
     if step_size and common % exact(step_size):
         fits = _fitting(stop, named)
         raise SpecError(f"{step_size:g} s does not divide {fits}; change one of these", key="model.step_size")
-    if fmu_step or step_size or not internal_step or stop_time / internal_step > MAX_STEPS:
+    is_too_short = internal_step and stop_time / internal_step > MAX_STEPS
+    # A default step that is no multiple of it contradicts it, and was chosen for the whole FMU.
+    if step_size or is_too_short or (fmu_step and internal_step and exact(fmu_step) % exact(internal_step)):
         internal_step = None
     base = step_size or internal_step
     is_multiple = base is not None and common % exact(base) == 0
@@ -85,10 +87,12 @@ def choose_grid(
             key="model.output_interval",
         )
     fits = _fitting(stop, named)
-    if internal_step and is_multiple:
-        said = f"a multiple of the FMU's internal step {internal_step:g} s; this divides {fits}"
-        return Grid(float(interval), said)
-    return Grid(float(interval), _reason(interval, fits, stop_time, fmu_step or internal_step, step_size))
+    reason = _reason(interval, fits, stop_time, fmu_step or internal_step, step_size)
+    if internal_step and not is_multiple:
+        reason += f", but the FMU may refuse it: round these times to multiples of {internal_step:g} s"
+    elif internal_step and not (fmu_step and interval == wanted):
+        reason = f"a multiple of the FMU's internal step {internal_step:g} s; this divides {fits}"
+    return Grid(float(interval), reason)
 
 
 def formula_times(formulas: Iterable[str]) -> list[float]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from math import ceil, gcd, lcm
+from math import ceil, floor, gcd, lcm
 from pathlib import Path
 from typing import get_args
 
@@ -134,6 +134,7 @@ def merged(
             variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
             slots[other], places[other] = slots[meant], places[meant]
     infos = [m.description.info for m in members]
+    internal = _internal_step(members)
     stop_times = {i.stop_time for i in infos if i.stop_time is not None}
     info = ModelInfo(
         name=name,
@@ -144,8 +145,9 @@ def merged(
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
         stop_time=frame.stop_time or (stop_times.pop() if len(stop_times) == 1 else None),
         step_size=_step(
-            [m.step for m in members], [m.description.info.step_size for m in members if not m.step]
+            [m.step for m in members], [m.description.info.step_size for m in members if not m.step], internal
         ),
+        internal_step=internal,
         tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
         variables=tuple(variables),
         components=tuple(m.name for m in members),
@@ -178,12 +180,31 @@ def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str
     return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
 
 
-def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float | None:
-    """Return the largest step that divides all of the components' own, and exceeds no default of others."""
-    exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in own if step]
+def _step(
+    own: Iterable[float | None], default: Iterable[float | None], internal: float | None
+) -> float | None:
+    """Return the largest step that divides all of the components' own, and exceeds no default of others.
+
+    It is a multiple of the internal step, if there is one, even if that exceeds a default.
+    """
+    exact, whole = _over_one_denominator(own)
     finest = min((step for step in default if step), default=None)
+    if finest is not None and internal is not None:
+        return internal * max(1, floor(finest / internal + GRID_ROUNDING))
     if not exact:
         return finest
-    whole = lcm(*(step.denominator for step in exact))
-    common = gcd(*(int(step * whole) for step in exact)) / whole
+    common = gcd(*exact) / whole
     return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING))
+
+
+def _internal_step(members: Iterable[Member]) -> float | None:
+    """Return the smallest multiple of the components' internal steps; None if steps of their own decide."""
+    exact, whole = _over_one_denominator(m.description.info.internal_step for m in members)
+    return lcm(*exact) / whole if exact and not any(m.step for m in members) else None
+
+
+def _over_one_denominator(steps: Iterable[float | None]) -> tuple[list[int], int]:
+    """Return the numerators of the steps that are stated, as fractions of one denominator, and that."""
+    exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in steps if step]
+    whole = lcm(*(step.denominator for step in exact))
+    return [int(step * whole) for step in exact], whole
