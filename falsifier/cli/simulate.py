@@ -22,6 +22,7 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.shorthand import number_in
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
@@ -43,7 +44,8 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
-    source, given = _without_numbers(problem_source(options))
+    stated = problem_source(options)
+    source, given = _without_numbers(stated)
     is_table = place is not None and place.suffix.lower() == ".csv"
     stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
@@ -71,10 +73,16 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
             )
         if out is not None:
             made_folder(out)
+        typed = {n: s.value for n, s in stated.changes.parameters.items() if isinstance(s.value, str)}
+        strings = {v.name for v in problem.info.variables if v.kind == "string"}
         evaluation = simulate_inputs(
             problem,
             signals,
-            {**stored.parameters, **{n: value for n, value in given.items() if n not in inputs}},
+            {
+                **stored.parameters,
+                **{n: value for n, value in given.items() if n not in inputs},
+                **{n: text for n, text in typed.items() if n in strings & given.keys()},
+            },
         )
     if evaluation.verdict is None:
         raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
@@ -103,7 +111,8 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, float]]:
     """Take the numbers of ``--set`` out of a source: they may lie outside of ranges."""
     stated = source.changes.parameters
-    numbers = {name: s.value for name, s in stated.items() if isinstance(s.value, float)}
+    said = {name: number_in(s.value) for name, s in stated.items() if s.value is not None}
+    numbers = {name: number for name, number in said.items() if number is not None}
     others = {name: section for name, section in stated.items() if name not in numbers}
     changes = source.changes.model_copy(update={"parameters": others})
     return source.model_copy(update={"changes": changes}), numbers

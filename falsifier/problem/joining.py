@@ -18,7 +18,7 @@ from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ModelSection, ParameterSection
-from falsifier.problem.shorthand import searching, stated_as
+from falsifier.problem.shorthand import number_in, searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 
@@ -313,6 +313,9 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                     f"{near or did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
+            if isinstance(text := section.value, str) and variable.kind != "string":
+                number = number_in(text) if variable.number_of(text) is None else None
+                stated["value"] = text if number is None else number
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:

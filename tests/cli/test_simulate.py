@@ -33,6 +33,13 @@ def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_string_gets_the_text_that_was_typed(tmp_path: Path) -> None:
+    (tmp_path / "007").write_text("2.5")
+    said = ["--stl", "G[0,1] (y <= 3)", "--set", "fileName=007", "--set", "u=1.0e0", "--json"]
+    done = falsifier("simulate", str(fixture("Table_2")), *said, cwd=tmp_path)
+    assert done.json["robustness"] == 0.5, done.err
+
+
 def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
     done = falsifier("simulate", "AT1", "--set", "throttle=100.000001", "--out", "out", cwd=tmp_path)
     assert "constant 100" in done.out, done.err
