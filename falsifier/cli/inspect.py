@@ -173,8 +173,7 @@ def _print_convergence(
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
-        share = f"{100 * moved.relative:.2g} % of its range"
-        say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({share})")
+        say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({moved.share})")
     if not any(moved.largest for moved in movements.values()):
         say("  if the model rests at its start values, this says nothing about the step")
     if advice:

@@ -90,7 +90,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
     files = _written(problem, drawn, evaluation, out) if out else []
     verdict = "violated" if evaluation.violated else "not violated"
     lines = [
-        f"{problem.name}: {verdict} by these inputs ({evaluation.seconds:.2f} s)",
+        f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)",
         f"  requirement    {problem.requirement.formula}",
         *fact_lines(evaluation_facts(drawn, evaluation)),
         *([f"  files          {', '.join(map(str, files))}"] if files else []),

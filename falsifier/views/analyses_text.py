@@ -11,6 +11,7 @@ from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import aligned, counted, listed, readable, with_unit
+from falsifier.evaluation.levels import with_trajectories
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, llm_use
 
@@ -37,7 +38,8 @@ def coverage_text(found: Coverage, name: str) -> str:
     if gaps and found.simulations:
         lines += ["never tried", *_indented(gaps)]
     if found.outputs:
-        lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
+        reached = with_trajectories(found.trajectories, "simulation", of=found.simulations)
+        lines.append(f"reached, in {reached}")
         lines += _indented(
             (with_unit(o.name, o.unit), _span(o.lows.min(), o.highs.max()))
             for o in sorted(found.outputs, key=lambda o: o.name)

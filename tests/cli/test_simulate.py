@@ -69,6 +69,8 @@ def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,throttle\n0,50\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
     assert "no values given for brake: kept at the model's start value" in done.err
+    ball = falsifier("simulate", str(fixture("Ball_2")), "--stl", "G[0,1] (h <= 5)", cwd=tmp_path)
+    assert "stl: not violated (" in ball.out, "it has no inputs"
     fmu = bundled("fmus") / "AT.fmu"
     (tmp_path / "car.toml").write_text(f"""
         model = {{ fmu = '{fmu}', interface = 'co-simulation', output_interval = 0.1 }}
