@@ -12,11 +12,13 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.regression import check
+from falsifier.counterexamples.regression import Database, check
+from falsifier.counterexamples.store import to_store
 from falsifier.testing import lag_problem
-from pytest_falsifier import UntestedError, UntestedWarning, _tell_untested
+from pytest_falsifier import UnconfirmedWarning, UntestedError, UntestedWarning, _tell_doubts
 from tests.command import ROOT, Done, forked
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.stepped import euler_problem
 
 SPEC = """
 [model]
@@ -315,6 +317,23 @@ def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
 ) -> None:
     checked = check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), engine="sobol", budget=2)
     with pytest.warns(UntestedWarning, match="The condition x >= 2 never held in 2 simulations"):
-        _tell_untested(request.node, checked, strict=False)
+        _tell_doubts(request.node, checked, strict=False)
     with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
-        _tell_untested(request.node, checked, strict=True)
+        _tell_doubts(request.node, checked, strict=True)
+
+
+def test_a_violation_that_is_not_confirmed_is_a_warning_and_with_strict_an_error(
+    request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    problem, database = euler_problem("G[1,1] (x <= 0.65)"), Database(tmp_path)
+    checked = check(problem, engine="corners", budget=2, database=database)
+    assert checked.counterexample is None and checked.result is not None
+    said = "no violation is confirmed\nfragile: .*does not violate"
+    with pytest.warns(UnconfirmedWarning, match=said):
+        _tell_doubts(request.node, checked, strict=False)
+    with pytest.raises(UntestedError, match=said):
+        _tell_doubts(request.node, checked, strict=True)
+    file = database.save(problem, to_store(checked.result.fragile[0]))
+    stored = check(problem, engine="uniform", budget=1, database=database)
+    with pytest.raises(UntestedError, match=f"{file.name}: LAG: fragile"):
+        _tell_doubts(request.node, stored, strict=True)
