@@ -7,6 +7,7 @@ from falsifier.core.literals import modelica_path, modelica_string, one_line, py
 from falsifier.core.model import INTERFACE_TAGS
 from falsifier.core.words import readable
 from falsifier.counterexamples.export.tables import text_of
+from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
@@ -37,7 +38,7 @@ from pathlib import Path
 import numpy as np
 from fmpy import simulate_fmu
 
-HERE = Path(__file__).resolve().parent
+{refusal}HERE = Path(__file__).resolve().parent
 FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
 # Columns of input.csv after the time; named here, because spreadsheets may change what stands in the file.
 INPUTS = {inputs}
@@ -122,6 +123,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
         fmu=repr(model.path.name),
+        refusal=f"sys.exit({refusal!r})\n\n" if (refusal := unplayable(problem)) else "",
         fmi_type=INTERFACE_TAGS[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
@@ -132,6 +134,24 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )
+
+
+def unplayable(problem: Problem) -> str:
+    """Say that FMPy cannot take the inputs of an FMU, and what to use; empty if it can."""
+    model, sizes = problem.model, dict[str, int]()
+    if not isinstance(model, FmuModel):
+        return ""
+    for name in dict.fromkeys(model.place(v.name)[0] for v in problem.info.inputs if v.kind != "string"):
+        elements = model.elements(name)
+        variable, size = problem.info[elements[0]], len(elements)
+        why = f"an input named {name!r}" if name == "time" else ""
+        if variable.is_continuous and sizes.setdefault(variable.type, size) != size:
+            why = f"inputs of the type {variable.type} of different sizes, such as {name!r}"
+        elif size > 1 and not variable.is_continuous:
+            why = f"arrays of discrete inputs, such as {name!r}"
+        if why:
+            return f"simulate_fmu of FMPy cannot take {why}: use falsifier replay {FILE_NAME}"
+    return ""
 
 
 def _recorded_lines(verdict: Verdict) -> str:

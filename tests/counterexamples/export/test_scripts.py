@@ -13,7 +13,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
-from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
+from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script, unplayable
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem
@@ -21,7 +21,7 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.counterexamples.export.support import AT_INPUTS, exported
-from tests.fmu.fixtures import path as fmu_path
+from tests.fmu.fixtures import altered, path as fmu_path
 
 
 def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: Path) -> None:
@@ -148,6 +148,39 @@ def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
         "offset": [10.0, 7.0],
     }
     assert (tmp_path / "input.csv").read_text().splitlines()[:2] == ['"time","u"', "0.0,1.0 0.5"]
+
+
+BIAS = '<Float64 name="bias" valueReference="77" causality="input" start="0"/></ModelVariables>'
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "why"),
+    [
+        ("Lag_2", 'name="u"', 'name="time"', "an input named 'time'"),
+        (
+            "Arrays_3",
+            "</ModelVariables>",
+            BIAS,
+            "inputs of the type Float64 of different sizes, such as 'bias'",
+        ),
+        ("Arrays_3", 'name="u"', 'name="u" variability="discrete"', "arrays of discrete inputs, such as 'u'"),
+    ],
+)
+def test_inputs_that_fmpy_cannot_take_end_the_script_with_what_can(
+    name: str, old: str, new: str, why: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "other.fmu"
+    altered(fmu_path(name), path, lambda text: text.replace(old.encode(), new.encode()), ending=".xml")
+    formula, first = ("G (y >= 0)", "time") if name == "Lag_2" else ("G (y[1] >= 0)", "u[1]")
+    problem = Problem.from_fmu(path, formula, inputs={first: (-1.0, 1.0, 2)})
+    told = f"simulate_fmu of FMPy cannot take {why}: use falsifier replay {FILE_NAME}"
+    assert unplayable(problem) == told
+    if name == "Lag_2":
+        exported(problem, evaluate(problem, somewhere(problem)), tmp_path / "out")
+        ended = subprocess.run(
+            [sys.executable, tmp_path / "out" / "replay.py"], capture_output=True, text=True
+        )
+        assert (ended.returncode, ended.stderr) == (1, f"{told}\n")
 
 
 def test_odd_names_and_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:
