@@ -44,8 +44,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
-    stated = problem_source(options)
-    source, given = _without_numbers(stated)
+    source, given = _without_numbers(stated := problem_source(options))
     is_table = place is not None and place.suffix.lower() == ".csv"
     stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
@@ -73,17 +72,11 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
             )
         if out is not None:
             made_folder(out)
-        typed = {n: s.value for n, s in stated.changes.parameters.items() if isinstance(s.value, str)}
+        numbers = {n: value for n, value in given.items() if n not in inputs}
+        typed = stated.changes.parameters
         strings = {v.name for v in problem.info.variables if v.kind == "string"}
-        evaluation = simulate_inputs(
-            problem,
-            signals,
-            {
-                **stored.parameters,
-                **{n: value for n, value in given.items() if n not in inputs},
-                **{n: text for n, text in typed.items() if n in strings & given.keys()},
-            },
-        )
+        texts = {n: t for n in strings & numbers.keys() if isinstance(t := typed[n].value, str)}
+        evaluation = simulate_inputs(problem, signals, {**stored.parameters, **numbers, **texts})
     if evaluation.verdict is None:
         raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     drawn = _with_own_ranges(problem, evaluation.candidate)
@@ -125,7 +118,7 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     if found.unused:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s; the simulation at {stop_time:g} s: --stop-time changes it")
+        warn(f"{file}: ends at {found.end:.12g} s, the run at {stop_time:.12g} s: --stop-time changes it")
     if 0.0 < found.end < stop_time:
         warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
     return dict(found.signals)

@@ -172,7 +172,8 @@ class Climb:
 
     @property
     def _all(self) -> str:
-        return with_trajectories(self.trajectories, self.noun, of=self.levels.simulations)
+        kept = "" if self.trajectories == self.levels.simulations else " with a kept trajectory"
+        return f"{counted(self.trajectories, self.noun)}{kept}"
 
     def _of(self, numbers: Sequence[int]) -> str:
         return f"{len(numbers)} of {self._all}, first in {self.noun} {numbers[0]}"
@@ -181,13 +182,3 @@ class Climb:
 def _known(predicates: Sequence[Predicate], values: Mapping[str, Any]) -> list[Predicate]:
     """Return those whose signals all have values."""
     return [p for p in predicates if values.keys() >= set(p.signals)]
-
-
-def with_trajectories(count: int, noun: str, *, of: int) -> str:
-    """Return how many simulations were looked into, and why not all.
-
-    >>> with_trajectories(1, "simulation", of=9), with_trajectories(9, "simulation", of=9)
-    ('1 simulation whose trajectory was kept', '9 simulations')
-    """
-    kept = f" whose {'trajectory was' if count == 1 else 'trajectories were'} kept"
-    return f"{counted(count, noun)}{'' if count == of else kept}"

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, gcd, lcm
+from math import ceil
 
 from falsifier.core.literals import digits
+from falsifier.core.model import common_part, exact
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
@@ -18,9 +19,6 @@ from falsifier.stl import Formula, parse
 _DEFAULT_INTERVALS = 1000
 # Maximum number of intervals that times such as 3.14159 s may cause; the FMU's own step may cause more.
 _MAX_INTERVALS = 100_000
-# Largest denominator of times like 1/30 s, which are written with many digits.
-_MAX_DENOMINATOR = 100_000
-_ROUNDING = 1e-12
 # Intervals with this many digits or more are no rounder than others.
 _MANY_DIGITS = 8
 # Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
@@ -66,7 +64,7 @@ def choose_grid(
     check_steps(stop_time, step_size, key="model.step_size")
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
-    common = _common(stop, *named)
+    common = common_part(stop, *named)
     wanted = exact(fmu_step) if fmu_step and fmu_step <= stop_time else stop / _DEFAULT_INTERVALS
     if step_size and common % exact(step_size):
         fits = _fitting(stop, named)
@@ -114,25 +112,8 @@ def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None)
         return None
 
 
-def exact(seconds: float) -> Fraction:
-    """Return a time as the fraction that was meant: 0.1 as 1/10, 0.3333333333333333 as 1/3.
-
-    >>> exact(0.1), exact(1 / 30)
-    (Fraction(1, 10), Fraction(1, 30))
-    """
-    written = Fraction(repr(float(seconds)))
-    near = written.limit_denominator(_MAX_DENOMINATOR)
-    return near if abs(near - written) <= _ROUNDING * abs(written) else written
-
-
 def _bounds(formula: Formula) -> list[float]:
     return [bound for window in formula.windows for bound in (window.start, window.end)]
-
-
-def _common(*times: Fraction) -> Fraction:
-    """Return the largest time of which all of these are multiples."""
-    denominator = lcm(*(t.denominator for t in times))
-    return Fraction(gcd(*(int(t * denominator) for t in times)), denominator)
 
 
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
@@ -171,14 +152,14 @@ def _listed(times: list[Fraction]) -> str:
 
 
 def _text(seconds: Fraction) -> str:
-    return f"{float(seconds):.6g}"
+    return f"{float(seconds):.10g}"
 
 
 def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
     """Check that a period in s makes at most MAX_STEPS steps; SpecError naming key and smallest period."""
     if period is not None and stop_time / period > MAX_STEPS:
         raise SpecError(
-            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:g} s; "
+            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:.10g} s; "
             f"the smallest value is {stop_time / MAX_STEPS:g}",
             key=key,
         )

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, floor
 from os.path import relpath
 from pathlib import Path
@@ -15,7 +16,7 @@ from falsifier.core.files import absent
 from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
-from falsifier.fmu import is_package, read_info, read_package
+from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
@@ -246,10 +247,11 @@ def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool 
 
 def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> None:
     """Change the relative paths in a spec to those from another file's folder."""
-    folder, info = subject.path.parent, subject.problem.info
+    folder = subject.path.parent
+    strings = {v.name for v in subject.problem.info.variables if v.kind == "string"}
 
     def moved(named: str) -> str:
-        if Path(named).is_absolute() or named.startswith("~"):
+        if Path(named).is_absolute():
             return named
         there = (folder / named).resolve()
         # Only with a slash a text names a folder.
@@ -260,14 +262,14 @@ def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> No
             section["fmu"] = moved(str(section["fmu"]))
     for section in _layers(document):
         if "allow" in section:
-            parts = (word.partition(":") for word in section["allow"])
-            section["allow"] = [f"{kind}:{moved(path)}" if path else kind for kind, _, path in parts]
+            words, at = section["allow"], partial(with_paths, change=lambda path: moved(str(path)))
+            section["allow"] = [word if ":~" in word else at([word])[0] for word in words]
         parameters: Any = section.get("parameters", {})
         for name, stated in list(parameters.items()):
             place: tuple[Any, str] = (stated, "value") if isinstance(stated, Mapping) else (parameters, name)
             table, key = place
             text = table.get(key)
-            if isinstance(text, str) and info[name].kind == "string" and named_file(text, folder) != text:
+            if isinstance(text, str) and name in strings and named_file(text, folder) != text:
                 table[key] = moved(text)
     context: Any = document.get("context", {})
     files = list(context.get("files", ()))

@@ -11,7 +11,6 @@ from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import aligned, counted, listed, readable, with_unit
-from falsifier.evaluation.levels import with_trajectories
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, llm_use
 
@@ -38,8 +37,7 @@ def coverage_text(found: Coverage, name: str) -> str:
     if gaps and found.simulations:
         lines += ["never tried", *_indented(gaps)]
     if found.outputs:
-        reached = with_trajectories(found.trajectories, "simulation", of=found.simulations)
-        lines.append(f"reached, in {reached}")
+        lines.append(f"reached, in {counted(found.trajectories, 'simulation')} with a kept trajectory")
         lines += _indented(
             (with_unit(o.name, o.unit), _span(o.lows.min(), o.highs.max()))
             for o in sorted(found.outputs, key=lambda o: o.name)
@@ -189,7 +187,7 @@ def _difference_lines(difference: Difference) -> Iterator[str]:
         (other, one, difference.only_second),
     ):
         if trajectory is not None:
-            yield f"only {number}, not {rest}, is satisfied by (0 to {trajectory.times[-1]:g} s)"
+            yield f"only {number}, not {rest}, is satisfied by (0 to {readable(trajectory.times[-1])} s)"
             yield from (f"   {line}" for line in trace_lines(trajectory))
 
 

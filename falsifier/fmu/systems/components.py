@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from math import ceil, floor, gcd, lcm
+from math import ceil, floor
 from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import finite, instance, one_of, positive
-from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable, common_part, exact
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
 from falsifier.fmu.description.model_description import Description
@@ -17,8 +16,6 @@ from falsifier.fmu.process.network import SYSTEM, Extrapolation, Link, Member, P
 
 # Maximum number of connections in the description that people and language models read.
 _SHOWN_LINKS = 40
-# Largest denominator of steps like 1/30 s, which are written with many digits.
-_MAX_DENOMINATOR = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,24 +184,18 @@ def _step(
 
     It is a multiple of the internal step, if there is one, even if that exceeds a default.
     """
-    exact, whole = _over_one_denominator(own)
     finest = min((step for step in default if step), default=None)
     if finest is not None and internal is not None:
         return internal * max(1, floor(finest / internal + GRID_ROUNDING))
-    if not exact:
+    stated = [exact(step) for step in own if step]
+    if not stated:
         return finest
-    common = gcd(*exact) / whole
+    common = float(common_part(*stated))
     return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING))
 
 
 def _internal_step(members: Iterable[Member]) -> float | None:
     """Return the smallest multiple of the components' internal steps; None if steps of their own decide."""
-    exact, whole = _over_one_denominator(m.description.info.internal_step for m in members)
-    return lcm(*exact) / whole if exact and not any(m.step for m in members) else None
-
-
-def _over_one_denominator(steps: Iterable[float | None]) -> tuple[list[int], int]:
-    """Return the numerators of the steps that are stated, as fractions of one denominator, and that."""
-    exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in steps if step]
-    whole = lcm(*(step.denominator for step in exact))
-    return [int(step * whole) for step in exact], whole
+    steps = [exact(step) for m in members if (step := m.description.info.internal_step)]
+    inverse = common_part(*(1 / step for step in steps)) if steps else 0
+    return float(1 / inverse) if inverse and not any(m.step for m in members) else None
