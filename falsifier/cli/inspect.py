@@ -167,13 +167,14 @@ def _print_convergence(
         movements = step_convergence(model, experiment, signals)
         advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
     say(
-        f"\n{interface}: step {experiment.step:g} s compared with half of it over {stop_time:g} s ({reason}):"
+        f"\n{interface}: step {experiment.step:g} s compared with half of it "
+        f"over {stop_time:.10g} s ({reason}):"
     )
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
-        say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({moved.share})")
+        say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({moved.share})")
     if not any(moved.largest for moved in movements.values()):
         say("  if the model rests at its start values, this says nothing about the step")
     if advice:

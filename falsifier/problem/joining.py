@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from falsifier.core.files import absent
 from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import listed
+from falsifier.core.words import listed, readable
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
 from falsifier.fmu import Rights, System, is_package, read_info, read_package, resolved
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
@@ -239,7 +239,7 @@ def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Expe
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
     for r in space.inputs:
         if r.hold is not None and r.hold < (step := experiment.step):
-            yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
+            yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 
 

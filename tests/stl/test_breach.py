@@ -97,6 +97,7 @@ def test_what_is_exactly_on_its_limit_is_told_as_such() -> None:
     assert broken("G[0,2] (x > 0)", x=[1.0, 0.0, 0.0]).text == (
         "x > 0 was violated from 1 to 2 s: x = 0 at 1 s, exactly on its limit"
     )
+    assert "x = 1000000000000041" in broken("G[0,1] x <= 1000000000000040", x=[1e15 + 41, 0.0]).text
     assert broken("F[0,1] (x != 0)", x=[0.0, 0.0]).text == (
         "x != 0 held at no time from 0 to 1 s; nearest was x = 0 at 0 s, exactly on its limit"
     )

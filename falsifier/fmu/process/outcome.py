@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 
+from falsifier.core.words import readable
 from falsifier.errors import FalsifierError, ModelError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.network import Network
@@ -68,8 +69,8 @@ def failure(
     said = text.format(
         text=reply.text,
         returned=f"returned {_status_name(reply.status)}",
-        reached=f"t = {reply.time:g} s",
-        stop=f"{plan.stop_time:g} s",
+        reached=f"t = {readable(reply.time)} s",
+        stop=f"{readable(plan.stop_time)} s",
         step=f"{plan.times[1] / plan.every:.6g}",
         remedy=_other_step(network, reply, plan.times[1] / plan.every),
         out_of_time=_out_of_time(plan),
@@ -112,7 +113,7 @@ def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
     """Return how far a simulation came, in words and in s, as its process says: it may be any number."""
     if not 0.0 < time < plan.stop_time * (1.0 + 1e-9):
         return "", None
-    return f" at t = {time:g} s", time
+    return f" at t = {readable(time)} s", time
 
 
 def last_lines(log: tuple[str, ...]) -> str:
