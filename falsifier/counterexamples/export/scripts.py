@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterable, Mapping
+from importlib.resources import files
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.core.model import INTERFACE_TAGS
@@ -26,67 +27,6 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
 {requirement}: {formula}
 {recorded}
 """
-
-_REPLAY = '''\
-{about}
-
-import csv
-import json
-import sys
-from pathlib import Path
-
-import numpy as np
-from fmpy import simulate_fmu
-
-{refusal}HERE = Path(__file__).resolve().parent
-FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
-# Columns of input.csv after the time; named here, because spreadsheets may change what stands in the file.
-INPUTS = {inputs}
-# Name of each output: the FMU's variable, and the element if that is an array.
-OUTPUTS = {outputs}
-
-
-def read_inputs():
-    """Read input.csv; cells of arrays hold all elements, separated by spaces."""
-    with (HERE / "input.csv").open(newline="", encoding="utf-8") as file:
-        rows = [[tuple(map(float, cell.split())) for cell in row] for row in list(csv.reader(file))[1:]]
-    sizes = [len(cell) for cell in rows[0]]
-    names = ["time", *INPUTS]
-    columns = [(n, float, (size,)) if size > 1 else (n, float) for n, size in zip(names, sizes)]
-    return np.array([tuple(c if len(c) > 1 else c[0] for c in row) for row in rows], columns)
-
-
-result = simulate_fmu(
-    str(FMU),
-    validate=False,
-    fmi_type="{fmi_type}",
-    start_time=0.0,
-    stop_time={stop_time!r},
-    output_interval={step!r},
-    relative_tolerance={tolerance!r},
-    record_events=False,
-    start_values=json.loads((HERE / "start_values.json").read_text(encoding="utf-8")),
-    input=read_inputs() if INPUTS else None,
-    output=sorted({{variable for variable, _ in OUTPUTS.values()}}),
-)[::{every}]
-columns = {{"time": result["time"]}}
-for name, (variable, element) in OUTPUTS.items():
-    columns[name] = result[variable].reshape(len(result), -1)[:, element]
-
-with (HERE / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
-    writer = csv.writer(file, lineterminator="\\n")
-    writer.writerow(columns)
-    writer.writerows([float(value) for value in row] for row in zip(*columns.values()))
-
-shown = {shown}
-marked = int(abs(result["time"] - {moment!r}).argmin())
-widths = [max(14, len(name) + 2) for name in shown]
-print("".join(name.rjust(width) for name, width in zip(shown, widths)))
-for k in range(max(marked - {around}, 0), min(marked + {around} + 1, len(result))):
-    values = "".join(f"{{float(columns[name][k]):{{width}}.6g}}" for name, width in zip(shown, widths))
-    print(values + ({mark} if k == marked else ""))
-print(f"all {{len(result)}} rows are in outputs.csv next to this script")
-'''
 
 _OPENMODELICA = """\
 // Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was exported from:
@@ -118,7 +58,8 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         formula=one_line(str(problem.requirement.formula)),
         recorded=_recorded_lines(verdict),
     )
-    return _REPLAY.format(
+    template = files("falsifier.counterexamples.export").joinpath("replay.template")
+    return template.read_text(encoding="utf-8").format(
         about=python_docstring(about),
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
