@@ -3,6 +3,7 @@
 import shlex
 from contextlib import closing
 from dataclasses import asdict, replace
+from math import isinf
 from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -174,7 +175,9 @@ def _print_convergence(
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
-        say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({moved.share})")
+        share = f"{100 * moved.relative:.2g} % of its range"
+        share = "constant at half of the step" if isinf(moved.relative) else share
+        say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({share})")
     if not any(moved.largest for moved in movements.values()):
         say("  if the model rests at its start values, this says nothing about the step")
     if advice:

@@ -8,7 +8,6 @@ monitored time grid stays the same too.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -178,14 +177,7 @@ class Movement:
         """Maximum distance as a share of the span; 0 for an output that is constant in both trajectories."""
         if self.span > 0.0:
             return self.largest / self.span
-        return 0.0 if self.largest == 0.0 else inf
-
-    @property
-    def share(self) -> str:
-        """The relative distance in words."""
-        if self.relative == inf:
-            return "it is constant at half of the step"
-        return f"{100 * self.relative:.2g} % of its range"
+        return 0.0 if self.largest == 0.0 else float("inf")
 
 
 def step_convergence(

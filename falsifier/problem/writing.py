@@ -265,11 +265,11 @@ def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> No
             words, at = section["allow"], partial(with_paths, change=lambda path: moved(str(path)))
             section["allow"] = [word if ":~" in word else at([word])[0] for word in words]
         parameters: Any = section.get("parameters", {})
-        for name, stated in list(parameters.items()):
-            place: tuple[Any, str] = (stated, "value") if isinstance(stated, Mapping) else (parameters, name)
-            table, key = place
-            text = table.get(key)
-            if isinstance(text, str) and name in strings and named_file(text, folder) != text:
+        for name in strings & parameters.keys():
+            found: Any = parameters[name]
+            table, key = (found, "value") if isinstance(found, dict) else (parameters, name)
+            text = str(table.get(key, ""))
+            if named_file(text, folder) != text:
                 table[key] = moved(text)
     context: Any = document.get("context", {})
     files = list(context.get("files", ()))

@@ -152,8 +152,7 @@ def test_halving_the_step_moves_outputs_by_half_the_error_of_holding() -> None:
     assert moved["x"].largest == pytest.approx(0.1 / 4 * (1 - np.exp(-2.0)), rel=0.03)
     assert moved["x"].time == pytest.approx(4.0)
     assert moved["T"] == Movement(0.0, 0.0, 0.0)
-    assert moved["T"].relative == 0.0 and moved["T"].share == "0 % of its range"
-    assert Movement(0.5, 1.0, 0.0).share == "it is constant at half of the step"
+    assert moved["T"].relative == 0.0
     finer = step_convergence(model, Experiment(4.0, 0.1, ("x",), step_size=0.01), {"u": ramp(4.0)})
     assert finer["x"].relative == pytest.approx(0.1 * moved["x"].relative, rel=0.05)
 

@@ -28,18 +28,6 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
 {recorded}
 """
 
-_OPENMODELICA = """\
-// Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was exported from:
-//     omc replay.mos
-// First set the path of the model in loadFile, and in simulate its full name if it differs from the FMU's.
-//
-// {requirement}: {formula}
-loadFile({file});
-simulate({model}, startTime=0, stopTime={stop_time!r}, numberOfIntervals={intervals},
-  outputFormat="csv", simflags={flags});
-getErrorString();
-"""
-
 
 def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str | None:
     """Python script that needs only FMPy; None if the model is not an FMU.
@@ -58,8 +46,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         formula=one_line(str(problem.requirement.formula)),
         recorded=_recorded_lines(verdict),
     )
-    template = files("falsifier.counterexamples.export").joinpath("replay.template")
-    return template.read_text(encoding="utf-8").format(
+    return _template("replay.template").format(
         about=python_docstring(about),
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
@@ -117,7 +104,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
     flags = ["-csvInput=input.csv"] if any(v.kind != "string" for v in problem.info.inputs) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name
-    return _OPENMODELICA.format(
+    return _template("openmodelica.template").format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
         file=modelica_string(f"{name.split('.')[0]}/package.mo" if "." in name else f"{name}.mo"),
@@ -126,3 +113,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         intervals=problem.experiment.samples - 1,
         flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
+
+
+def _template(name: str) -> str:
+    return files("falsifier.counterexamples.export").joinpath(name).read_text(encoding="utf-8")

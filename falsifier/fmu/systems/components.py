@@ -131,7 +131,7 @@ def merged(
             variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
             slots[other], places[other] = slots[meant], places[meant]
     infos = [m.description.info for m in members]
-    internal = _internal_step(members)
+    step_size, internal_step = _steps(members)
     stop_times = {i.stop_time for i in infos if i.stop_time is not None}
     info = ModelInfo(
         name=name,
@@ -141,10 +141,8 @@ def merged(
         platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
         stop_time=frame.stop_time or (stop_times.pop() if len(stop_times) == 1 else None),
-        step_size=_step(
-            [m.step for m in members], [m.description.info.step_size for m in members if not m.step], internal
-        ),
-        internal_step=internal,
+        step_size=step_size,
+        internal_step=internal_step,
         tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
         variables=tuple(variables),
         components=tuple(m.name for m in members),
@@ -177,25 +175,19 @@ def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str
     return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
 
 
-def _step(
-    own: Iterable[float | None], default: Iterable[float | None], internal: float | None
-) -> float | None:
-    """Return the largest step that divides all of the components' own, and exceeds no default of others.
+def _steps(members: Sequence[Member]) -> tuple[float | None, float | None]:
+    """Return the default communication step, and the internal step of which it is a multiple.
 
-    It is a multiple of the internal step, if there is one, even if that exceeds a default.
+    It is the largest that divides all of the components' own and exceeds no default of others. Only where no
+    component has a step of its own, internal steps count; they may exceed a default.
     """
-    finest = min((step for step in default if step), default=None)
-    if finest is not None and internal is not None:
-        return internal * max(1, floor(finest / internal + GRID_ROUNDING))
-    stated = [exact(step) for step in own if step]
-    if not stated:
-        return finest
-    common = float(common_part(*stated))
-    return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING))
-
-
-def _internal_step(members: Iterable[Member]) -> float | None:
-    """Return the smallest multiple of the components' internal steps; None if steps of their own decide."""
-    steps = [exact(step) for m in members if (step := m.description.info.internal_step)]
-    inverse = common_part(*(1 / step for step in steps)) if steps else 0
-    return float(1 / inverse) if inverse and not any(m.step for m in members) else None
+    own = [exact(m.step) for m in members if m.step]
+    others = [m.description.info for m in members if not m.step]
+    finest = min((i.step_size for i in others if i.step_size), default=None)
+    if own:
+        common = float(common_part(*own))
+        return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING)), None
+    if not (inverse := [1 / exact(i.internal_step) for i in others if i.internal_step]):
+        return finest, None
+    internal = float(1 / common_part(*inverse))
+    return finest and internal * max(1, floor(finest / internal + GRID_ROUNDING)), internal
