@@ -164,7 +164,7 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
             written = [Database(store).save(problem, stored)]
         else:
             written = export_counterexample(problem, stored, evaluation, directory)
-            if refusal := unplayable(problem):
+            if refusal := unplayable(problem.model):
                 warn(f"replay.py: {refusal}")
     say("\n".join(map(str, written)))
 

@@ -124,18 +124,17 @@ def test_in_another_folder_files_of_strings_and_of_rights_are_found(tmp_path: Pa
         model = {{ fmu = '{fmu_path("Table_2")}', allow = ["read:tables", "write:~", "programs"] }}
         inputs.u.control_points = 2
         parameters.fileName = "tables/gain.txt"
-        profiles.P.parameters.fileName.value = "tables/"
-        profiles.P.requirements.R.parameters.fileName = "none.txt"
-        requirements.R = {{ formula = "G (y <= 1)", allow = ["write:logs"] }}""")
+        profiles.P.requirements.R.parameters.fileName.value = "tables/"
+        requirements.R = {{ formula = "G (y <= 1)", allow = ["write:logs"], parameters.fileName = "-" }}""")
     out = tmp_path / "deeper" / "new.toml"
     out.write_text(with_requirement(subject_of(str(spec)), out, "G (y <= 2)", description="")[0])
     new = tomllib.loads(out.read_text())
     assert new["model"]["allow"] == ["read:../tables/", "write:~", "programs"]
     assert new["requirements"]["R"]["allow"] == ["write:../logs/"]
-    for profile, place in ((None, "tables/gain.txt"), ("P", "tables")):
-        ((name, text),) = load_problem(f"{out}:R1", profile=profile).experiment.strings
-        assert (name, Path(text).resolve()) == ("fileName", tmp_path / place)
-    assert new["profiles"]["P"]["requirements"]["R"]["parameters"] == {"fileName": "none.txt"}
+    assert new["requirements"]["R"]["parameters"]["fileName"] == "-"
+    assert new["profiles"]["P"]["requirements"]["R"]["parameters"]["fileName"] == {"value": "../tables/"}
+    ((name, text),) = load_problem(f"{out}:R1").experiment.strings
+    assert (name, Path(text).resolve()) == ("fileName", tmp_path / "tables" / "gain.txt")
 
 
 def test_a_spec_keeps_its_line_ends(folder: Path) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from importlib.resources import files
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
-from falsifier.core.model import INTERFACE_TAGS
+from falsifier.core.model import INTERFACE_TAGS, Model
 from falsifier.core.words import readable
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.counterexamples.store import FILE_NAME
@@ -51,7 +51,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
         fmu=repr(model.path.name),
-        refusal=f"sys.exit({refusal!r})\n\n" if (refusal := unplayable(problem)) else "",
+        refusal=f"sys.exit({refusal!r})\n\n" if (refusal := unplayable(model)) else "",
         fmi_type=INTERFACE_TAGS[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
@@ -64,14 +64,14 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     )
 
 
-def unplayable(problem: Problem) -> str:
+def unplayable(model: Model) -> str:
     """Say that FMPy cannot take the inputs of an FMU, and what to use; empty if it can."""
-    model, sizes = problem.model, dict[str, int]()
+    sizes: dict[str, int] = {}
     if not isinstance(model, FmuModel):
         return ""
-    for name in dict.fromkeys(model.place(v.name)[0] for v in problem.info.inputs if v.kind != "string"):
+    for name in dict.fromkeys(model.place(v.name)[0] for v in model.info.inputs if v.kind != "string"):
         elements = model.elements(name)
-        variable, size = problem.info[elements[0]], len(elements)
+        variable, size = model.info[elements[0]], len(elements)
         why = f"an input named {name!r}" if name == "time" else ""
         if variable.is_continuous and sizes.setdefault(variable.type, size) != size:
             why = f"inputs of the type {variable.type} of different sizes, such as {name!r}"
