@@ -24,9 +24,8 @@ def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
     >>> readable(1000000000000040.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4, "+")
     ('1000000000000040', '0.333333', '16.67', '+86399.95')
     """
-    least = min(10, len(f"{value:.0f}") + 2)
-    if float(value).is_integer():
-        least = 16 if abs(value) <= 2**53 else 10
+    whole = 16 if abs(value) <= 2**53 else 10
+    least = whole if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
     return f"{value:{sign}.{max(digits, least)}g}"
 
 
