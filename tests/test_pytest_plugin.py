@@ -127,59 +127,7 @@ def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_a
 
 
 def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
-    (repository / "tests" / "test_lag.py").write_text(
-        """
-import pytest
-from falsifier.errors import SpecError
-from falsifier.testing import lag_problem
-
-def test_holds(falsifier_check):
-    checked = falsifier_check(lag_problem("G[0,10] (x <= 2)"), budget=7)
-    assert checked.result.spent.simulations == 7
-
-@pytest.mark.falsifier(budget=3, engine="uniform")
-def test_marked(falsifier_check):
-    assert falsifier_check(lag_problem("G[0,10] (x <= 2)")).result.spent.simulations == 3
-
-def test_violated(falsifier_check):
-    falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
-
-def test_by_name(falsifier_check):
-    falsifier_check("specs/car.toml:impossible", budget=2)
-
-def test_typo(falsifier_check):
-    with pytest.raises(TypeError, match="unknown .*bugdet"):
-        falsifier_check(lag_problem(), bugdet=3)
-
-def test_no_problem(falsifier_check):
-    with pytest.raises(SpecError, match="expected a Problem, or .* got 42") as caught:
-        falsifier_check(42)
-    assert len(caught.traceback) == 2, "this line and the fixture"
-
-@pytest.mark.falsifier(strict=True, engine="sobol", database="elsewhere")
-class TestMarked:
-    @pytest.mark.falsifier(budget=2)
-    def test_strict(self, falsifier_check):
-        with pytest.raises(AssertionError, match="not all of it was tested"):
-            falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"))
-        falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), strict=False)
-        falsifier_check(lag_problem("G[0,10] (x <= 9)"))  # a wide margin was tested
-
-    @pytest.mark.falsifier(budgets=2)
-    def test_unknown(self, falsifier_check):
-        with pytest.raises(TypeError, match="unknown .*budgets; expected .* budget, engine, seed, strict"):
-            falsifier_check(lag_problem())
-
-    @pytest.mark.falsifier(5)
-    def test_without_a_name(self, falsifier_check):
-        with pytest.raises(TypeError, match="got 5 without a name; .*budget="):
-            falsifier_check(lag_problem())
-
-    def test_database(self, falsifier_check):
-        with pytest.raises(AssertionError, match="stored +elsewhere/LAG/"):
-            falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
-"""
-    )
+    shutil.copy(ROOT / "tests" / "fixtures" / "ordinary_tests.txt", repository / "tests" / "test_lag.py")
     done = run_pytest(repository, "tests")
     assert "1 failed, 9 passed" in done.out, done.out
     assert "LAG is violated by a counterexample found by a search" in done.out
