@@ -41,6 +41,10 @@ class UntestedWarning(UserWarning):
     """A requirement was not violated, but a part of it was not tested."""
 
 
+class UnconfirmedWarning(UserWarning):
+    """A requirement was violated, but no violation was confirmed."""
+
+
 class UncollectedWarning(UserWarning):
     """A TOML file may be meant as a spec and is not collected."""
 
@@ -50,7 +54,7 @@ class UnusedCounterexampleWarning(UserWarning):
 
 
 class UntestedError(AssertionError):
-    """The same where that is an error; reported by its message alone."""
+    """One of these two where that is an error; reported by its message alone."""
 
 
 class FalsifiedError(AssertionError):
@@ -82,7 +86,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--falsifier-strict",
         action="store_true",
         default=None,
-        help="fail if a part of a requirement was not tested, such as a condition that never held",
+        help="fail if a part of a requirement was not tested, such as a condition that never held, or if "
+        "a violation was found and not confirmed",
     )
     for name in _OPTIONS:
         kind: Any = "bool" if name == "strict" else None
@@ -334,20 +339,28 @@ def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: 
             raise FalsifiedError(_message(item, checked, database))
     finally:
         loaded.model.close()
-    _tell_untested(item, checked, strict=bool(options["strict"]))
+    _tell_doubts(item, checked, strict=bool(options["strict"]))
     return checked
 
 
-def _tell_untested(item: pytest.Item, checked: "Checked", *, strict: bool) -> None:
-    """Warn of parts of the requirement that no simulation tested, or fail."""
+def _tell_doubts(item: pytest.Item, checked: "Checked", *, strict: bool) -> None:
+    """Warn of parts of the requirement that were not tested and of unconfirmed violations, or fail."""
     __tracebackhide__ = True
-    found = [f.text for f in checked.result.findings if f.untested] if checked.result else []
-    text = "\n".join((f"{checked.problem.name} is not violated, but not all of it was tested", *found))
-    if found and strict:
-        raise UntestedError(text)
-    if found:
+    name, result = checked.problem.name, checked.result
+    untested = [f.text for f in result.findings if f.untested] if result else []
+    again = ((file, r) for file, r in checked.replayed.items() if r.status == "fragile")
+    unconfirmed = [f"{_short(file)}: {replayed.text}" for file, replayed in again]
+    unconfirmed += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)] if result else []
+    told: list[tuple[type[Warning], str, list[str]]] = [
+        (UnconfirmedWarning, f"{name} was violated, but no violation is confirmed", unconfirmed),
+        (UntestedWarning, f"{name} is not violated, but not all of it was tested", untested),
+    ]
+    texts = {kind: "\n".join((said, *lines)) for kind, said, lines in told if lines}
+    if texts and strict:
+        raise UntestedError("\n".join(texts.values()))
+    for kind, text in texts.items():
         _, line, _ = item.reportinfo()
-        _warn(UntestedWarning, item.path, text, (line or 0) + 1)
+        _warn(kind, item.path, text, (line or 0) + 1)
 
 
 def _setting(config: pytest.Config, name: str) -> Any:

@@ -12,11 +12,13 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.counterexamples.regression import check
+from falsifier.counterexamples.regression import Database, check
+from falsifier.counterexamples.store import to_store
 from falsifier.testing import lag_problem
-from pytest_falsifier import UntestedError, UntestedWarning, _tell_untested
+from pytest_falsifier import UnconfirmedWarning, UntestedError, UntestedWarning, _tell_doubts
 from tests.command import ROOT, Done, forked
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.stepped import euler_problem
 
 SPEC = """
 [model]
@@ -125,59 +127,7 @@ def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_a
 
 
 def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
-    (repository / "tests" / "test_lag.py").write_text(
-        """
-import pytest
-from falsifier.errors import SpecError
-from falsifier.testing import lag_problem
-
-def test_holds(falsifier_check):
-    checked = falsifier_check(lag_problem("G[0,10] (x <= 2)"), budget=7)
-    assert checked.result.spent.simulations == 7
-
-@pytest.mark.falsifier(budget=3, engine="uniform")
-def test_marked(falsifier_check):
-    assert falsifier_check(lag_problem("G[0,10] (x <= 2)")).result.spent.simulations == 3
-
-def test_violated(falsifier_check):
-    falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
-
-def test_by_name(falsifier_check):
-    falsifier_check("specs/car.toml:impossible", budget=2)
-
-def test_typo(falsifier_check):
-    with pytest.raises(TypeError, match="unknown .*bugdet"):
-        falsifier_check(lag_problem(), bugdet=3)
-
-def test_no_problem(falsifier_check):
-    with pytest.raises(SpecError, match="expected a Problem, or .* got 42") as caught:
-        falsifier_check(42)
-    assert len(caught.traceback) == 2, "this line and the fixture"
-
-@pytest.mark.falsifier(strict=True, engine="sobol", database="elsewhere")
-class TestMarked:
-    @pytest.mark.falsifier(budget=2)
-    def test_strict(self, falsifier_check):
-        with pytest.raises(AssertionError, match="not all of it was tested"):
-            falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"))
-        falsifier_check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), strict=False)
-        falsifier_check(lag_problem("G[0,10] (x <= 9)"))  # a wide margin was tested
-
-    @pytest.mark.falsifier(budgets=2)
-    def test_unknown(self, falsifier_check):
-        with pytest.raises(TypeError, match="unknown .*budgets; expected .* budget, engine, seed, strict"):
-            falsifier_check(lag_problem())
-
-    @pytest.mark.falsifier(5)
-    def test_without_a_name(self, falsifier_check):
-        with pytest.raises(TypeError, match="got 5 without a name; .*budget="):
-            falsifier_check(lag_problem())
-
-    def test_database(self, falsifier_check):
-        with pytest.raises(AssertionError, match="stored +elsewhere/LAG/"):
-            falsifier_check(lag_problem("G[0,10] (x <= 0.5)"))
-"""
-    )
+    shutil.copy(ROOT / "tests" / "fixtures" / "ordinary_tests.txt", repository / "tests" / "test_lag.py")
     done = run_pytest(repository, "tests")
     assert "1 failed, 9 passed" in done.out, done.out
     assert "LAG is violated by a counterexample found by a search" in done.out
@@ -315,6 +265,20 @@ def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
 ) -> None:
     checked = check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), engine="sobol", budget=2)
     with pytest.warns(UntestedWarning, match="The condition x >= 2 never held in 2 simulations"):
-        _tell_untested(request.node, checked, strict=False)
+        _tell_doubts(request.node, checked, strict=False)
     with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
-        _tell_untested(request.node, checked, strict=True)
+        _tell_doubts(request.node, checked, strict=True)
+
+
+def test_a_violation_that_is_not_confirmed_is_a_warning_and_with_strict_an_error(
+    request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    problem, database = euler_problem("G[1,1] (x <= 0.65)"), Database(tmp_path)
+    checked = check(problem, engine="corners", budget=2, database=database)
+    assert checked.counterexample is None and checked.result is not None
+    with pytest.warns(UnconfirmedWarning, match="no violation is confirmed\nfragile: .*does not violate"):
+        _tell_doubts(request.node, checked, strict=False)
+    file = database.save(problem, to_store(checked.result.fragile[0]))
+    stored = check(problem, engine="uniform", budget=1, database=database)
+    with pytest.raises(UntestedError, match=f"{file.name}: LAG: fragile"):
+        _tell_doubts(request.node, stored, strict=True)

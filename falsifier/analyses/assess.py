@@ -260,7 +260,7 @@ def _input_text(r: InputRange, space: SearchSpace) -> str:
     if r.control_points == 1:
         return f"{r.name} constant, uniform in {_range_text(r)}"
     spacing = space.fixed_times(r)[1]
-    held = f", held for {r.hold:g} s" if r.hold is not None else ""
+    held = f", held for {readable(r.hold)} s" if r.hold is not None else ""
     return (
         f"{r.name} with {r.control_points} control points {spacing:.4g} s apart, {r.interpolation}{held}, "
         f"each uniform in {_range_text(r)}"

@@ -147,6 +147,7 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
     RUN is a run directory or a counterexample file.
     """
     from falsifier.counterexamples.export import export_counterexample
+    from falsifier.counterexamples.export.scripts import unplayable
 
     if store is not None:
         refuse("--store writes nothing else; export to it in another command", out=out)
@@ -163,6 +164,8 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
             written = [Database(store).save(problem, stored)]
         else:
             written = export_counterexample(problem, stored, evaluation, directory)
+            if refusal := unplayable(problem.model):
+                warn(f"replay.py: {refusal}")
     say("\n".join(map(str, written)))
 
 

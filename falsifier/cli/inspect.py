@@ -3,6 +3,7 @@
 import shlex
 from contextlib import closing
 from dataclasses import asdict, replace
+from math import isinf
 from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,14 +168,16 @@ def _print_convergence(
         movements = step_convergence(model, experiment, signals)
         advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
     say(
-        f"\n{interface}: step {experiment.step:g} s compared with half of it over {stop_time:g} s ({reason}):"
+        f"\n{interface}: step {experiment.step:g} s compared with half of it "
+        f"over {stop_time:.10g} s ({reason}):"
     )
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
         most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
         share = f"{100 * moved.relative:.2g} % of its range"
-        say(f"  {name} changes by at most {most}, at {moved.time:.4g} s ({share})")
+        share = "constant at half of the step" if isinf(moved.relative) else share
+        say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({share})")
     if not any(moved.largest for moved in movements.values()):
         say("  if the model rests at its start values, this says nothing about the step")
     if advice:

@@ -22,6 +22,7 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.shorthand import number_in
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
@@ -43,7 +44,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
-    source, given = _without_numbers(problem_source(options))
+    source, given = _without_numbers(stated := problem_source(options))
     is_table = place is not None and place.suffix.lower() == ".csv"
     stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
@@ -71,18 +72,18 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
             )
         if out is not None:
             made_folder(out)
-        evaluation = simulate_inputs(
-            problem,
-            signals,
-            {**stored.parameters, **{n: value for n, value in given.items() if n not in inputs}},
-        )
+        numbers = {n: value for n, value in given.items() if n not in inputs}
+        typed = stated.changes.parameters
+        strings = {v.name for v in problem.info.variables if v.kind == "string"}
+        texts = {n: t for n in strings & numbers.keys() if isinstance(t := typed[n].value, str)}
+        evaluation = simulate_inputs(problem, signals, {**stored.parameters, **numbers, **texts})
     if evaluation.verdict is None:
         raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     drawn = _with_own_ranges(problem, evaluation.candidate)
     files = _written(problem, drawn, evaluation, out) if out else []
     verdict = "violated" if evaluation.violated else "not violated"
     lines = [
-        f"{problem.name}: {verdict} by these inputs ({evaluation.seconds:.2f} s)",
+        f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)",
         f"  requirement    {problem.requirement.formula}",
         *fact_lines(evaluation_facts(drawn, evaluation)),
         *([f"  files          {', '.join(map(str, files))}"] if files else []),
@@ -103,7 +104,8 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
 def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, float]]:
     """Take the numbers of ``--set`` out of a source: they may lie outside of ranges."""
     stated = source.changes.parameters
-    numbers = {name: s.value for name, s in stated.items() if isinstance(s.value, float)}
+    said = {name: number_in(s.value) for name, s in stated.items() if s.value is not None}
+    numbers = {name: number for name, number in said.items() if number is not None}
     others = {name: section for name, section in stated.items() if name not in numbers}
     changes = source.changes.model_copy(update={"parameters": others})
     return source.model_copy(update={"changes": changes}), numbers
@@ -116,7 +118,7 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     if found.unused:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s; the simulation at {stop_time:g} s: --stop-time changes it")
+        warn(f"{file}: ends at {found.end:.12g} s, the run at {stop_time:.12g} s: --stop-time changes it")
     if 0.0 < found.end < stop_time:
         warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
     return dict(found.signals)

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import ceil
+from fractions import Fraction
+from math import ceil, gcd, lcm
 from typing import Literal, Protocol, get_args
 
 import numpy as np
@@ -245,6 +246,26 @@ class ModelInfo:
 # Relative tolerance for one time to be an integer multiple of another: with an interval of 1/30 s, rounding
 # prevents an exact multiple.
 GRID_ROUNDING = 1e-6
+# Largest denominator of times like 1/30 s, which are written with many digits.
+_MAX_DENOMINATOR = 100_000
+_ROUNDING = 1e-12
+
+
+def exact(seconds: float) -> Fraction:
+    """Return a time as the fraction that was meant: 0.1 as 1/10, 0.3333333333333333 as 1/3.
+
+    >>> exact(0.1), exact(1 / 30)
+    (Fraction(1, 10), Fraction(1, 30))
+    """
+    written = Fraction(repr(float(seconds)))
+    near = written.limit_denominator(_MAX_DENOMINATOR)
+    return near if abs(near - written) <= _ROUNDING * abs(written) else written
+
+
+def common_part(*times: Fraction) -> Fraction:
+    """Return the largest time of which all of these are multiples."""
+    denominator = lcm(*(t.denominator for t in times))
+    return Fraction(gcd(*(int(t * denominator) for t in times)), denominator)
 
 
 def whole_steps(what: str, whole: float, part: str, period: float, *, key: str = "") -> int:
@@ -254,7 +275,7 @@ def whole_steps(what: str, whole: float, part: str, period: float, *, key: str =
         least = ceil(whole / period)
         shorter = (float(f"{whole / n:.12g}") for n in range(least, min(2 * least, least + 1000) + 1))
         raise SpecError(
-            f"{what} = {whole:g} s is not an integer multiple of {part} = {period:g} s; try {part} = "
+            f"{what} = {whole:.12g} s is not an integer multiple of {part} = {period:g} s; try {part} = "
             f"{min(shorter, key=digits):.12g}",
             key=key or part,
         )

@@ -187,12 +187,12 @@ class SearchSpace:
         periods += [(r, "free: min_interval", r.free.min_interval) for r in self.inputs if r.free]
         for r, what, period in periods:
             if period > self.stop_time:
-                end = f"the simulation of {self.stop_time:g} s"
+                end = f"the simulation of {self.stop_time:.10g} s"
                 raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
         searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in self.ranges)
-        return f"<SearchSpace: {searched}; {self.stop_time:g} s>"
+        return f"<SearchSpace: {searched}; {self.stop_time:.10g} s>"
 
     @property
     def ranges(self) -> tuple[InputRange | ParameterRange, ...]:
@@ -360,7 +360,8 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
         )
     if signal.times[-1] > stop_time * (1 + 1e-9):
         raise CandidateError(
-            f"{r.label}: the control point at {signal.times[-1]:g} s is after the stop time {stop_time:g} s"
+            f"{r.label}: the control point at {signal.times[-1]:.12g} s is after the stop time, "
+            f"{stop_time:.12g} s"
         )
 
 

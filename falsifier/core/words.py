@@ -1,6 +1,7 @@
 """Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
 from collections.abc import Collection, Iterable, Sequence
+from typing import Literal
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
@@ -15,14 +16,17 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
-def readable(value: float, digits: int = 6) -> str:
-    """Return a number with so many digits, a large one with its hundredths, a whole one with all up to ten.
+def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
+    """Return a number with so many digits, a large one with its hundredths, a whole one with all digits.
 
-    >>> readable(2147483647.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4)
-    ('2147483647', '0.333333', '16.67', '86399.95')
+    Beyond 2^53, from where on all are whole, it has ten. The sign "+" is for numbers above zero, too.
+
+    >>> readable(1000000000000040.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4, "+")
+    ('1000000000000040', '0.333333', '16.67', '+86399.95')
     """
-    least = 10 if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
-    return f"{value:.{max(digits, least)}g}"
+    whole = 16 if abs(value) <= 2**53 else 10
+    least = whole if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
+    return f"{value:{sign}.{max(digits, least)}g}"
 
 
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
@@ -73,11 +77,11 @@ def parameterization_text(r: InputRange) -> str:
     >>> parameterization_text(InputRange("u", 0.0, 1.0, control_points=5))
     '(5 control points, pchip)'
     """
-    held = "" if r.hold is None else f", each held for {r.hold:g} s"
+    held = "" if r.hold is None else f", each held for {readable(r.hold)} s"
     if r.free is None:
         return f"({counted(r.control_points, 'control point')}, {r.interpolation}{held})"
     most = counted(r.free.max_control_points, "control point")
-    return f"(free: at most {most}, at least {r.free.min_interval:g} s apart{held})"
+    return f"(free: at most {most}, at least {readable(r.free.min_interval)} s apart{held})"
 
 
 def counted(count: int, noun: str) -> str:

@@ -28,7 +28,7 @@ from falsifier.errors import (
 )
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
-from falsifier.fmu import fmu_files, resolved
+from falsifier.fmu import fmu_files, resolved, with_paths
 from falsifier.problem.loading import reloadable, source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -144,12 +144,8 @@ def save(stored: StoredCounterexample, path: Path) -> Path:
     def seen(other: str) -> str:
         return Path(relpath(other, path.parent.resolve())).as_posix()
 
-    def seen_right(word: str) -> str:
-        kind, colon, place = word.partition(":")
-        return f"{kind}:{seen(place)}" if colon else word
-
     source = stored.problem and _moved(stored.problem, lambda file: seen(str(Path(file).resolve())))
-    allow = stored.allow and tuple(map(seen_right, stored.allow))
+    allow = stored.allow and with_paths(stored.allow, lambda place: seen(str(place)))
     content = stored.model_copy(update={"problem": source, "allow": allow}).model_dump(mode="json")
     del content["sum"]
     return write_whole(path, seal(json.dumps(content, indent=2)))

@@ -172,7 +172,7 @@ class Climb:
 
     @property
     def _all(self) -> str:
-        kept = "" if self.trajectories == self.levels.simulations else " whose trajectories were kept"
+        kept = "" if self.trajectories == self.levels.simulations else " with a kept trajectory"
         return f"{counted(self.trajectories, self.noun)}{kept}"
 
     def _of(self, numbers: Sequence[int]) -> str:

@@ -9,7 +9,7 @@ from falsifier.fmu.model import (
 )
 from falsifier.fmu.process.network import Coupling as Coupling
 from falsifier.fmu.process.registry import rights_text as rights_text, stop_simulations as stop_simulations
-from falsifier.fmu.process.rights import Rights as Rights, resolved as resolved
+from falsifier.fmu.process.rights import Rights as Rights, resolved as resolved, with_paths as with_paths
 from falsifier.fmu.process.worker import watching as watching
 from falsifier.fmu.ssp.reader import is_package as is_package, read_package as read_package
 from falsifier.fmu.systems.components import Component as Component, Connection as Connection, Frame as Frame

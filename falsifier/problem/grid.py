@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
-from math import ceil, gcd, lcm
+from math import ceil
 
 from falsifier.core.literals import digits
+from falsifier.core.model import common_part, exact
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
@@ -18,9 +19,6 @@ from falsifier.stl import Formula, parse
 _DEFAULT_INTERVALS = 1000
 # Maximum number of intervals that times such as 3.14159 s may cause; the FMU's own step may cause more.
 _MAX_INTERVALS = 100_000
-# Largest denominator of times like 1/30 s, which are written with many digits.
-_MAX_DENOMINATOR = 100_000
-_ROUNDING = 1e-12
 # Intervals with this many digits or more are no rounder than others.
 _MANY_DIGITS = 8
 # Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
@@ -54,7 +52,7 @@ def choose_grid(
         stop_time: end of the simulation in s.
         times: times in s that formulas name; those after the stop time are ignored.
         fmu_step: the FMU's default step in s, if it specifies one.
-        internal_step: step in s of its own solver, of which the interval is a multiple if no other is given.
+        internal_step: step in s of its own solver, of which the interval is a multiple if those given are.
         step_size: communication step in s, if it is stated; the interval is a multiple of it.
 
     Raises:
@@ -66,12 +64,14 @@ def choose_grid(
     check_steps(stop_time, step_size, key="model.step_size")
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
-    common = _common(stop, *named)
+    common = common_part(stop, *named)
     wanted = exact(fmu_step) if fmu_step and fmu_step <= stop_time else stop / _DEFAULT_INTERVALS
     if step_size and common % exact(step_size):
         fits = _fitting(stop, named)
         raise SpecError(f"{step_size:g} s does not divide {fits}; change one of these", key="model.step_size")
-    if fmu_step or step_size or not internal_step or stop_time / internal_step > MAX_STEPS:
+    is_too_short = internal_step and stop_time / internal_step > MAX_STEPS
+    # A default step that is no multiple of it contradicts it, and was chosen for the whole FMU.
+    if step_size or is_too_short or (fmu_step and internal_step and exact(fmu_step) % exact(internal_step)):
         internal_step = None
     base = step_size or internal_step
     is_multiple = base is not None and common % exact(base) == 0
@@ -85,10 +85,12 @@ def choose_grid(
             key="model.output_interval",
         )
     fits = _fitting(stop, named)
-    if internal_step and is_multiple:
-        said = f"a multiple of the FMU's internal step {internal_step:g} s; this divides {fits}"
-        return Grid(float(interval), said)
-    return Grid(float(interval), _reason(interval, fits, stop_time, fmu_step or internal_step, step_size))
+    reason = _reason(interval, fits, stop_time, fmu_step or internal_step, step_size)
+    if internal_step and not is_multiple:
+        reason += f", but the FMU may refuse it: round these times to multiples of {internal_step:g} s"
+    elif internal_step and not (fmu_step and interval == wanted):
+        reason = f"a multiple of the FMU's internal step {internal_step:g} s; this divides {fits}"
+    return Grid(float(interval), reason)
 
 
 def formula_times(formulas: Iterable[str]) -> list[float]:
@@ -110,25 +112,8 @@ def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None)
         return None
 
 
-def exact(seconds: float) -> Fraction:
-    """Return a time as the fraction that was meant: 0.1 as 1/10, 0.3333333333333333 as 1/3.
-
-    >>> exact(0.1), exact(1 / 30)
-    (Fraction(1, 10), Fraction(1, 30))
-    """
-    written = Fraction(repr(float(seconds)))
-    near = written.limit_denominator(_MAX_DENOMINATOR)
-    return near if abs(near - written) <= _ROUNDING * abs(written) else written
-
-
 def _bounds(formula: Formula) -> list[float]:
     return [bound for window in formula.windows for bound in (window.start, window.end)]
-
-
-def _common(*times: Fraction) -> Fraction:
-    """Return the largest time of which all of these are multiples."""
-    denominator = lcm(*(t.denominator for t in times))
-    return Fraction(gcd(*(int(t * denominator) for t in times)), denominator)
 
 
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
@@ -167,14 +152,14 @@ def _listed(times: list[Fraction]) -> str:
 
 
 def _text(seconds: Fraction) -> str:
-    return f"{float(seconds):.6g}"
+    return f"{float(seconds):.10g}"
 
 
 def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
     """Check that a period in s makes at most MAX_STEPS steps; SpecError naming key and smallest period."""
     if period is not None and stop_time / period > MAX_STEPS:
         raise SpecError(
-            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:g} s; "
+            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:.10g} s; "
             f"the smallest value is {stop_time / MAX_STEPS:g}",
             key=key,
         )

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from falsifier.core.files import absent
 from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import listed
+from falsifier.core.words import listed, readable
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
 from falsifier.fmu import Rights, System, is_package, read_info, read_package, resolved
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
@@ -18,7 +18,7 @@ from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ModelSection, ParameterSection
-from falsifier.problem.shorthand import searching, stated_as
+from falsifier.problem.shorthand import number_in, searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 
@@ -239,7 +239,7 @@ def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Expe
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
     for r in space.inputs:
         if r.hold is not None and r.hold < (step := experiment.step):
-            yield f"{r.name}: hold = {r.hold:g} s is shorter than the communication step, {step:g} s"
+            yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
     yield from rights_notes(model)
 
 
@@ -313,6 +313,9 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                     f"{near or did_you_mean(name, names)}"
                 )
             stated, variable = section.model_dump(exclude_unset=True), info[name]
+            if isinstance(text := section.value, str) and variable.kind != "string":
+                number = number_in(text) if variable.number_of(text) is None else None
+                stated["value"] = text if number is None else number
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
             elif not stated.keys() <= {"range", "value"} or not stated:

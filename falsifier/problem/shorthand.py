@@ -215,13 +215,19 @@ def _value(option: str) -> tuple[str, float | str]:
     name, _, said = (part.strip() for part in option.partition("="))
     if not name or not said:
         raise SpecError(f"--set {option}: expected NAME=VALUE, for example --set mass=1200")
-    try:
-        value = float(said)
-    except ValueError:
-        return name, said
-    if not isfinite(value):
+    number = number_in(said)
+    if number is not None and not isfinite(number):
         raise SpecError(f"--set {option}: expected a finite number")
-    return name, value
+    # Of a string, the text counts: 007.
+    return name, said if number is None or shortest(number) != said else number
+
+
+def number_in(said: float | str) -> float | None:
+    """Return the number that somebody gave, or whose text somebody typed; None for other texts."""
+    try:
+        return float(said)
+    except ValueError:
+        return None
 
 
 def _range(option: str) -> tuple[str, InputChoice]:
@@ -244,10 +250,8 @@ def _range(option: str) -> tuple[str, InputChoice]:
 
 def _end(said: str) -> float | str:
     """Return an end of a range: a number, or else the name of an item."""
-    try:
-        return float(said)
-    except ValueError:
-        return said
+    number = number_in(said)
+    return said if number is None else number
 
 
 def requirement_of(text: str) -> AnyRequirement:

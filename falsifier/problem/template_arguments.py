@@ -200,14 +200,14 @@ class Template(ModelChanges):
                 f"expected [start, end] with 0 <= start <= end, got [{start:.12g}, {end:.12g}]", key="during"
             )
         if end > latest + 1e-9 * clock.stop_time:
-            cure = f"end it at {latest:g} s, " if latest >= start else ""
+            cure = f"end it at {latest:.10g} s, " if latest >= start else ""
             raise _too_long(reach + end, clock, cure=cure, key="during")
         return start, end
 
 
 def _too_long(needed: float, clock: Clock, *, cure: str = "", key: str | None = None) -> SpecError:
     return SpecError(
-        f"needs values up to {needed:g} s, but the simulation ends at {clock.stop_time:g} s: {cure}shorten "
-        "the times or simulate longer",
+        f"needs values up to {needed:.10g} s, but the simulation ends at {clock.stop_time:.10g} s: {cure}"
+        "shorten the times or simulate longer",
         key=key,
     )

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, floor
 from os.path import relpath
 from pathlib import Path
@@ -15,7 +16,7 @@ from falsifier.core.files import absent
 from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError
-from falsifier.fmu import is_package, read_info, read_package
+from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
@@ -24,6 +25,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import RequirementSection
+from falsifier.problem.shorthand import named_file
 from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
@@ -223,7 +225,7 @@ def subject_of(target: str) -> Subject:
         return Subject(problem_of_starter(text, starter), starter, text, is_new=True, free_grid=True)
     path, requirement = find_spec(target)
     free_grid = read_spec(path).model.output_interval is None
-    text = path.read_text(encoding="utf-8-sig")
+    text = path.read_bytes().decode("utf-8-sig")  # with its line ends
     problem = problem_of_starter(text, path, requirement or "", searches=False)
     return Subject(problem, path, text, is_new=False, free_grid=free_grid)
 
@@ -243,31 +245,54 @@ def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool 
     return Problem.of(join(spec, name or next(iter(others)), path=path, searches=searches))
 
 
-def _relocate(document: tomlkit.TOMLDocument, folder: Path, out: Path) -> None:
-    """Change relative paths of FMUs and context files to those from another file's folder."""
+def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> None:
+    """Change the relative paths in a spec to those from another file's folder."""
+    folder = subject.path.parent
+    strings = {v.name for v in subject.problem.info.variables if v.kind == "string"}
 
     def moved(named: str) -> str:
-        there = Path(relpath((folder / named).resolve(), out.resolve().parent)).as_posix()
-        return named if Path(named).is_absolute() else there
+        if Path(named).is_absolute():
+            return named
+        there = (folder / named).resolve()
+        # Only with a slash a text names a folder.
+        return Path(relpath(there, out.resolve().parent)).as_posix() + "/" * there.is_dir()
 
     for section in (document.get("model", {}), *document.get("components", {}).values()):
         if "fmu" in section:
             section["fmu"] = moved(str(section["fmu"]))
+    for section in _layers(document):
+        if "allow" in section:
+            words, at = section["allow"], partial(with_paths, change=lambda path: moved(str(path)))
+            section["allow"] = [word if ":~" in word else at([word])[0] for word in words]
+        parameters: Any = section.get("parameters", {})
+        for name in strings & parameters.keys():
+            found: Any = parameters[name]
+            table, key = (found, "value") if isinstance(found, dict) else (parameters, name)
+            text = str(table.get(key, ""))
+            if named_file(text, folder) != text:
+                table[key] = moved(text)
     context: Any = document.get("context", {})
     files = list(context.get("files", ()))
     for key in context.keys() & {"files", "checked"}:  # a file within an FMU is named after that
         context[key] = [moved(name) if name in files else name for name in context[key]]
 
 
+def _layers(document: Mapping[str, Any]) -> Iterator[Any]:
+    """Return all tables of a spec in which rights and parameters may stand."""
+    yield from (document, document.get("model", {}), *document.get("requirements", {}).values())
+    for profile in document.get("profiles", {}).values():
+        yield from (profile, *profile.get("requirements", {}).values())
+
+
 def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
     """Return the spec's text with one more requirement, and its name; comments are kept.
 
-    The name is the first free one of R1, R2, ... The path of the FMU becomes one from the folder of ``out``,
-    to which the text will be written.
+    The name is the first free one of R1, R2, ... Relative paths become those from the folder of ``out``, to
+    which the text will be written.
     """
     document = tomlkit.parse(subject.text)
     if subject.path.parent.resolve() != out.resolve().parent:
-        _relocate(document, subject.path.parent, out)
+        _relocate(document, subject, out)
     requirements: Any = document["requirements"]
     if subject.is_started:
         del requirements[_STARTED]
@@ -277,5 +302,7 @@ def with_requirement(subject: Subject, out: Path, formula: str, *, description: 
     table.add("description", description)
     requirements[name] = table
     text = tomlkit.dumps(document)
+    if "\r\n" in subject.text:  # what is new has other line ends
+        text = text.replace("\r\n", "\n").replace("\n", "\r\n")
     parse_spec(tomllib.loads(text), file=str(out))
     return text, name

@@ -107,7 +107,8 @@ class Vacuity:
         always = [part for part in self._parts if isinstance(part.formula, Or) and part.lowest.margin > 0]
         said = {predicate for part in never for predicate in part.part.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
-        predicates = [part for part in self._parts if isinstance(part.formula, Predicate) and not constant]
+        moving = [part for part in self._parts if part.formula.signals and not constant]
+        predicates = [part for part in moving if isinstance(part.formula, Predicate)]
         # Those that kept one truth, by much more than they moved.
         kept = [part for part in predicates if part.distance > _FAR * part.range]
         far = [part for part in kept if not is_on_limit(part.distance) and part.formula not in said]

@@ -279,10 +279,14 @@ class _Search:
         reading += ", exactly on its limit" if value == limit else ""
         over = _over(self._time(first), self._time(last))
         if window and first != last:
-            what = f"{demand.text} held at no time {over}" + ("" if is_truth else f"; nearest was {reading}")
+            is_told = not is_truth and not isinstance(quantity, Number)
+            what = f"{demand.text} held at no time {over}" + (f"; nearest was {reading}" if is_told else "")
         else:
             when = f"several times, worst {over}" if several else over
-            what = f"{demand.text} was violated {when}: {reading}"
+            # Of numbers alone, the comparison says it all.
+            what = f"{demand.text} was violated {when}" + (
+                "" if isinstance(quantity, Number) else f": {reading}"
+            )
         return Shortfall(
             part=demand.text,
             quantity=str(quantity),

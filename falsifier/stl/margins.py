@@ -2,6 +2,7 @@
 
 from math import copysign
 
+from falsifier.core.words import readable
 from falsifier.stl.formula import Comparison, Predicate
 from falsifier.stl.parser import parse
 
@@ -24,15 +25,18 @@ def is_on_limit(robustness: float) -> bool:
     return abs(robustness) < 10 * ON_LIMIT  # also a difference of two such margins
 
 
-def signed(robustness: float | None, digits: int = 6) -> str:
+def signed(robustness: float | None, digits: int | None = None) -> str:
     """Return a robustness with its sign, as it is shown; exactly on the limit it is -0 or +0.
 
-    Without a robustness, as of a simulation that failed, it is unknown.
+    Without a robustness, as of a simulation that failed, it is unknown. It has as many digits as ``readable``
+    shows, or no more than are stated.
 
-    >>> signed(0.41874, 3), signed(-12.0), signed(on_limit("<"))
-    ('+0.419', '-12', '-0')
+    >>> signed(0.41874, 3), signed(-12.0), signed(on_limit("<")), signed(-86399.95)
+    ('+0.419', '-12', '-0', '-86399.95')
     """
-    return "unknown" if robustness is None else f"{shown(robustness):+.{digits}g}"
+    if robustness is None:
+        return "unknown"
+    return f"{shown(robustness):+.{digits}g}" if digits else readable(shown(robustness), sign="+")
 
 
 def shown(robustness: float) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import TIME_TOLERANCE, Trajectory
-from falsifier.core.words import counted
+from falsifier.core.words import counted, readable
 from falsifier.errors import MonitorError, did_you_mean
 from falsifier.stl.formula import Formula, Predicate
 
@@ -184,8 +184,8 @@ def fill(program: Program, trajectory: Trajectory, buffer: Floats) -> Floats:
     last = float(trajectory.times[-1])
     if len(trajectory) != n or abs(last - end) > TIME_TOLERANCE * program.step:
         raise MonitorError(
-            f"the trajectory has {counted(len(trajectory), 'recorded time')} up to {last:g} s, expected {n} "
-            f"up to {end:g} s, one every {program.step:g} s"
+            f"the trajectory has {counted(len(trajectory), 'recorded time')} up to {readable(last)} s, "
+            f"expected {n} up to {readable(end)} s, one every {program.step:g} s"
         )
     start = 0
     for name in program.signals:
@@ -230,7 +230,7 @@ def _run(program: Program, buffer: Floats, signals: int) -> str:
     if not np.isfinite(buffer[:signals]).all():
         bad = int(np.flatnonzero(~np.isfinite(buffer[:signals]))[0]) if buffer.ndim == 1 else 0
         signal, sample = divmod(bad, program.samples)
-        return f"signal {program.signals[signal]!r} is {buffer[bad]} at {sample * program.step:g} s"
+        return f"signal {program.signals[signal]!r} is {buffer[bad]} at {readable(sample * program.step)} s"
     with np.errstate(all="ignore"):  # what is not finite is found by the checks
         for number, step in enumerate(program.steps):
             if step(buffer):
@@ -247,6 +247,6 @@ def _problem(program: Program, buffer: Floats, predicate: Predicate, location: L
     sides = [side for side in predicate.sides if side.signals]
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)
     return (
-        f"{predicate} has no finite value at {sample * program.step:g} s, where {values}; "
+        f"{predicate} has no finite value at {readable(sample * program.step)} s, where {values}; "
         "the operands of /, sqrt, log, exp and ^ must stay in their domain"
     )

@@ -44,7 +44,7 @@ def robustness(formula: stl.Formula, trajectory: Trajectory) -> float:
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
     # In samples, as each bound may be off its sample by a little, and their sum by more.
     if round(needed / (trajectory.step or 1.0)) >= len(trajectory):
-        raise MonitorError(f"the formula needs {needed:g} s, but the trajectory ends at {end:g} s")
+        raise MonitorError(f"the formula needs {needed:.10g} s, the trajectory ends at {end:.10g} s")
     found = _evaluate(formula, _Translation(trajectory))
     if found == 0:  # on the limit, it depends on the comparisons: rtamt evaluates their truth, 1 or -1
         return copysign(ON_LIMIT, _evaluate(formula, _Translation(trajectory, of_truth=True)))

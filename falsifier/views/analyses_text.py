@@ -37,7 +37,7 @@ def coverage_text(found: Coverage, name: str) -> str:
     if gaps and found.simulations:
         lines += ["never tried", *_indented(gaps)]
     if found.outputs:
-        lines.append(f"reached, in {counted(found.trajectories, 'simulation')} whose trajectories were kept")
+        lines.append(f"reached, in {counted(found.trajectories, 'simulation')} with a kept trajectory")
         lines += _indented(
             (with_unit(o.name, o.unit), _span(o.lows.min(), o.highs.max()))
             for o in sorted(found.outputs, key=lambda o: o.name)
@@ -187,7 +187,7 @@ def _difference_lines(difference: Difference) -> Iterator[str]:
         (other, one, difference.only_second),
     ):
         if trajectory is not None:
-            yield f"only {number}, not {rest}, is satisfied by (0 to {trajectory.times[-1]:g} s)"
+            yield f"only {number}, not {rest}, is satisfied by (0 to {readable(trajectory.times[-1])} s)"
             yield from (f"   {line}" for line in trace_lines(trajectory))
 
 

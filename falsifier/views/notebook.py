@@ -52,7 +52,7 @@ def problem_html(problem: Problem) -> str:
         ("requirement", el("code", str(requirement.formula))),
         ("in words", requirement.description or in_words(requirement.formula)),
         ("model", ": ".join(part for part in (problem.info.name, problem.info.description) if part)),
-        ("simulated", f"for {experiment.stop_time:g} s, recorded every {experiment.output_interval:g} s"),
+        ("simulated", f"for {experiment.stop_time:.10g} s, recorded every {experiment.output_interval:g} s"),
         *((f"fixed {name}", f"{value:g}") for name, value in problem.parameters.items()),
     ]
     header = ("searched", "unit", "range", "control points", "description")
@@ -87,7 +87,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
         for name, c in trajectory.columns.items()
     ]
     end = trajectory.times[-1]
-    about = f"{counted(len(trajectory), 'sample')} from 0 to {end:g} s, every {trajectory.step:g} s"
+    about = f"{counted(len(trajectory), 'sample')} from 0 to {end:.10g} s, every {trajectory.step:g} s"
     parts = [el("p", about), table(header, rows)]
     if trajectory.names:
         drawn = plot_trajectory(trajectory, trajectory.names[:_DRAWN_SIGNALS])

@@ -44,7 +44,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
             line = _Line(lambda line: update(f"{line.title}: {line.text}"), line_writer(console))
 
             def tell(_name: str, reached: float, stop_time: float) -> None:
-                update(f"{line.title}: simulated {reached:.4g} of {stop_time:g} s")
+                update(f"{line.title}: simulated {reached:.4g} of {readable(stop_time)} s")
 
             with watching(tell):
                 yield unbroken(line)

@@ -88,7 +88,7 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert done.out == ""
 
 
-@pytest.mark.parametrize("command", [["run", "AT1"], ["run", "AT"], ["bench", "AT1"]])
+@pytest.mark.parametrize("command", [["run", "AT1"], ["run", "AT"], ["bench", "AT1"], ["simulate", "AT1"]])
 def test_a_folder_with_files_is_kept(command: list[str], tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine").write_text("kept")

@@ -91,7 +91,7 @@ def test_what_was_computed_is_shown_if_it_cannot_be_written(
     assert _carried_out(["explain", "run", "--shrink", "--out", "full.json", "--quiet"]) == 3
     told = capsys.readouterr()
     assert "full.json cannot be written: No space left on device" in told.err
-    assert "AT1: not shrunk with " in told.out and "throttle [%]" in told.out
+    assert "AT1: not shrunk with " in told.out and "; no simpler one found nearby" in told.out
     assert _carried_out(["simulate", "AT1", "--set", "throttle=50", "--out", "full"]) == 3
     told = capsys.readouterr()
     assert "full/trajectory.csv cannot be written" in told.err
@@ -227,35 +227,6 @@ def test_what_is_of_another_model_is_said_and_does_not_stand_for_the_run(changea
         assert done.code == 2
         assert "rw/counterexample.json: does not fit what is searched now: input 'throttle'" in done.err
         assert "undo what has changed in the spec, or search again" in done.err
-
-
-@pytest.fixture(scope="module")
-def together(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with one search for two requirements that both fell."""
-    folder = tmp_path_factory.mktemp("together")
-    shutil.copy(bundled("fmus") / "AT.fmu", folder / "AT.fmu")
-    spec = (bundled("specs") / "AT.toml").read_text().replace("../fmus/", "")
-    (folder / "my.toml").write_text(spec.partition("# AT5i")[0])
-    done = run(folder, "run", "my.toml", "--engine", "corners", "--quiet", "--out", "run")
-    assert done.code == 1, done.err
-    assert "2 of 2 falsified" in done.out
-    return folder
-
-
-def test_what_cannot_be_shrunk_is_not_called_shrunk(tmp_path: Path) -> None:
-    assert run(tmp_path, "run", "AT1", "--engine", "corners", "--quiet", "--out", "run").code == 1
-    done = run(tmp_path, "explain", "run", "--shrink")  # the corner has been full throttle and no brake
-    assert "AT1: not shrunk with " in done.out and "; no simpler one found nearby" in done.out
-    text = run(tmp_path, "report", "run", "--markdown").out
-    assert "The counterexample, of which no simpler one was found nearby:" in text
-    assert "To explain it: `falsifier explain run`" in text
-
-
-def test_each_counterexample_has_its_own_files_beside_it(together: Path) -> None:
-    for name in ("AT1", "AT2"):
-        assert run(together, "export", f"run/counterexample-{name}.json").code == 0
-        exported = json.loads((together / f"run/export-{name}/counterexample.json").read_text())
-        assert exported["requirement"] == name
 
 
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:

@@ -124,14 +124,6 @@ def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     assert f"after {kept + 2} simulations" in resumed.out
 
 
-def test_limits_of_a_campaign_are_refused_for_a_run(tmp_path: Path) -> None:
-    falsify("AT1", "corners", budget=1, directory=tmp_path / "run")
-    for option in (("--total", "simulations=8"), ("--jobs", "2")):
-        refused = falsifier("resume", "run", *option, cwd=tmp_path)
-        assert refused.code == 2
-        assert "applies to campaigns only" in refused.err
-
-
 def test_a_run_in_which_most_simulations_fail_ends_with_three(tmp_path: Path) -> None:
     search = ("--search", "u=4.9:10:1", "--budget", "8", "--engine", "uniform")
     arguments = ("--stl", "G[0,10] (y <= 100)", *search)
@@ -173,6 +165,9 @@ def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
         assert "campaign is a folder of runs; give one of them: campaign/runs/A, camp" in refused.err
         assert refused.err.strip().endswith("campaign/runs/C and 1 more")
     assert falsifier("resume", "runs", "--budget", "2", "--quiet", cwd=work).code == 0
+    for option in (("--total", "simulations=8"), ("--jobs", "2")):
+        refused = falsifier("resume", "runs/A", *option, cwd=work)
+        assert (refused.code, "applies to campaigns only" in refused.err) == (2, True)
     falsify("AT1", "corners", budget=1, directory=work / "other")
     shutil.copytree(work / "runs" / "A", work / "A")
     refused = falsifier("resume", ".", cwd=work)

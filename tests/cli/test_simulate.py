@@ -33,22 +33,18 @@ def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_string_gets_the_text_that_was_typed(tmp_path: Path) -> None:
+    (tmp_path / "007").write_text("2.5")
+    said = ["--stl", "G[0,1] (y <= 3)", "--set", "fileName=007", "--set", "u=1.0e0", "--json"]
+    done = falsifier("simulate", str(fixture("Table_2")), *said, cwd=tmp_path)
+    assert done.json["robustness"] == 0.5, done.err
+
+
 def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
     done = falsifier("simulate", "AT1", "--set", "throttle=100.000001", "--out", "out", cwd=tmp_path)
     assert "constant 100" in done.out, done.err
     assert "throttle: 100.000001 exceeds the model's limits for 'throttle', [0, 100]" in done.err
     assert (tmp_path / "out" / "trajectory.png").is_file()
-
-
-def test_files_in_the_directory_are_kept(tmp_path: Path) -> None:
-    own = tmp_path / "input.csv"
-    own.write_text("time,u\n0,1\n10,1\n")
-    assert falsifier("simulate", EASY, "--inputs", "input.csv", "--out", "p", cwd=tmp_path).code == 1
-    (tmp_path / "p" / "input.csv").write_text("edited")
-    for out in (".", "p"):
-        done = falsifier("simulate", EASY, "--inputs", "input.csv", "--out", out, cwd=tmp_path)
-        assert (done.code, f"{out} has files, which are kept" in done.err) == (2, True), done.err
-    assert own.read_text().startswith("time,u") and (tmp_path / "p" / "input.csv").read_text() == "edited"
 
 
 def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
@@ -62,6 +58,8 @@ def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,throttle\n0,50\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
     assert "no values given for brake: kept at the model's start value" in done.err
+    ball = falsifier("simulate", str(fixture("Ball_2")), "--stl", "G[0,1] (h <= 5)", cwd=tmp_path)
+    assert "stl: not violated (" in ball.out, "it has no inputs"
     fmu = bundled("fmus") / "AT.fmu"
     (tmp_path / "car.toml").write_text(f"""
         model = {{ fmu = '{fmu}', interface = 'co-simulation', output_interval = 0.1 }}
@@ -100,6 +98,7 @@ def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     [
         ([EASY, "--set", "u=high"], "options cannot change"),
         ([EASY, "--set", "w=1"], "no parameter 'w'"),
+        (["AT1", "--set", "throtle=100"], "did you mean 'throttle'?"),
         ([EASY, "--inputs", "none.csv"], "none.csv"),
         ([EASY, "--inputs", __file__], "expected a CSV file of inputs"),
         (["python:tests.problems:unusable", "--set", "u=1"], "out of order"),
@@ -133,8 +132,3 @@ def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) ->
     assert resumed.code == 0, resumed.err
     assert resumed.json["best"] == done.json["best"]
     assert falsifier("run", target, "--inputs", "run", *start[2:], cwd=tmp_path).code == 0
-
-
-def test_a_misspelt_input_is_recognised_among_the_parameters(tmp_path: Path) -> None:
-    done = falsifier("simulate", "AT1", "--set", "throtle=100", cwd=tmp_path)
-    assert (done.code, "did you mean 'throttle'?" in done.err) == (2, True)

@@ -6,6 +6,7 @@ from falsifier.context import sources
 from falsifier.context.excerpts import Readable, of_source, of_text
 from falsifier.context.sources import Source, read_source
 from falsifier.context.thresholds import thresholds, tokens_of
+from tests.command import ROOT
 
 MODEL = """model M
  parameter Real p = 3;
@@ -111,27 +112,7 @@ def test_levels_are_those_of_a_variable_that_is_compared_with_a_number(
     )
 
 
-C = """
-#define ENTER 9.5 /* K */
-#define SQUARE(x) ((x) * (x))
-static const double LEAVE = 0.2;
-double limit(double x) { return x > 100 ? 100 : x; }
-static void control(const Model *m) {
-  double e = m->wanted - m->temperature; // "quoted
-  if (m->disagreement > ENTER) {
-    m->limp = 1;
-  } else if (m->limp && m->disagreement < LEAVE)
-    m->limp = 0;
-  switch (m->limp) {
-    case 1:
-      m->power = limit(30);
-      break;
-    default:
-      m->power = e > 5;
-  }
-  for (int i = 0; i < 3; i++) m->buf[i] = 0;
-}
-"""
+C = (ROOT / "tests" / "fixtures" / "control.c").read_text()
 
 
 def test_comparisons_of_c_with_their_lines() -> None:

@@ -25,6 +25,8 @@ from tests.problem.support import echo
         (10.0, [], None, 0.004, 0.008),  # a multiple, not 0.01 s
         (2.0, [1.1], None, 0.25, 0.002),
         (10.0, [], 0.1, 0.3, 0.1),  # the default experiment decides
+        (10.5, [], 0.5, 0.25, 0.5),
+        (10.0, [1.75], 1.0, 0.25, 0.25),  # also where that does not fit: 0.05 s would be refused
         (10.0, [], None, 1e-9, 0.01),
     ],
 )
@@ -44,7 +46,8 @@ def test_the_reason_names_what_did_not_fit() -> None:
         "the FMU's step 0.1 s does not divide the stop time 10 s and the formula's times 0.25 s; this does"
     )
     assert "a multiple of the FMU's internal step 0.1 s;" in choose_grid(1e3, internal_step=0.1).reason
-    assert "step 0.25 s does not divide" in choose_grid(2.0, times=[1.1], internal_step=0.25).reason
+    unfit = choose_grid(2.0, times=[1.1], internal_step=0.25).reason
+    assert "step 0.25 s does not divide" in unfit and "round these times to multiples of 0.25 s" in unfit
 
 
 def test_the_grid_is_a_multiple_of_a_stated_communication_step() -> None:
@@ -59,8 +62,8 @@ def test_the_grid_is_a_multiple_of_a_stated_communication_step() -> None:
 def test_times_that_fit_no_reasonable_grid_are_an_error() -> None:
     with pytest.raises(SpecError, match=r"no grid of at most 100000 intervals .* round these times"):
         choose_grid(10.0, times=[3.14159265, 2.71828183])
-    with pytest.raises(SpecError, match=r"times 1\.0000001 s"):
-        choose_grid(10.0, times=[1.0000001])
+    with pytest.raises(SpecError, match=r"stop time 86399\.95 s and the formula's times 1\.0000001 s"):
+        choose_grid(86399.95, times=[1.0000001])
 
 
 @pytest.mark.parametrize(("fmu_step", "step_size"), [(3e-7, None), (3e-7, 0.1), (None, 7e-9)])

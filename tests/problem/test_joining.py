@@ -16,7 +16,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import search_space
 from falsifier.problem.requirement import parse_requirement
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
-from falsifier.problem.shorthand import changes_from_options
+from falsifier.problem.shorthand import changes_from_options, options_from
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import altered, path as fixture
 
@@ -261,3 +261,11 @@ def test_strings_are_no_numbers() -> None:
     changes = placed(changes_from_options(values=["in=boom"]), info)
     with pytest.raises(SpecError, match=r"^inputs\.in: this input is a string"):
         search_space(changes.inputs, {}, info, 1.0, changes)
+
+
+def test_a_string_keeps_the_text_that_was_typed_and_a_number_may_be_typed_in_any_form() -> None:
+    variables = Variable("label", "string", "parameter", settable=True), Variable("mass", settable=True)
+    changes = changes_from_options(values=["label=007", "mass=1.50e3"])
+    found = placed(changes, ModelInfo("m", variables=variables)).parameters
+    assert (found["label"].value, found["mass"].value) == ("007", 1500.0)
+    assert options_from(changes) == [("--set", "label=007"), ("--set", "mass=1.50e3")]

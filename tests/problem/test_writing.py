@@ -115,6 +115,35 @@ def test_in_another_folder_the_fmu_and_context_files_are_found(folder: Path) -> 
     assert read_spec(out).context.files == read_spec(out).context.checked == ("../notes.md",)
 
 
+def test_in_another_folder_files_of_strings_and_of_rights_are_found(tmp_path: Path) -> None:
+    for name in ("deeper", "tables", "logs"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "tables" / "gain.txt").write_text("2.5")
+    spec = tmp_path / "my.toml"
+    spec.write_text(f"""
+        model = {{ fmu = '{fmu_path("Table_2")}', allow = ["read:tables", "write:~", "programs"] }}
+        inputs.u.control_points = 2
+        parameters.fileName = "tables/gain.txt"
+        profiles.P.requirements.R.parameters.fileName.value = "tables/"
+        requirements.R = {{ formula = "G (y <= 1)", allow = ["write:logs"], parameters.fileName = "-" }}""")
+    out = tmp_path / "deeper" / "new.toml"
+    out.write_text(with_requirement(subject_of(str(spec)), out, "G (y <= 2)", description="")[0])
+    new = tomllib.loads(out.read_text())
+    assert new["model"]["allow"] == ["read:../tables/", "write:~", "programs"]
+    assert new["requirements"]["R"]["allow"] == ["write:../logs/"]
+    assert new["requirements"]["R"]["parameters"]["fileName"] == "-"
+    assert new["profiles"]["P"]["requirements"]["R"]["parameters"]["fileName"] == {"value": "../tables/"}
+    ((name, text),) = load_problem(f"{out}:R1").experiment.strings
+    assert (name, Path(text).resolve()) == ("fileName", tmp_path / "tables" / "gain.txt")
+
+
+def test_a_spec_keeps_its_line_ends(folder: Path) -> None:
+    path = Path(spec(folder, GOOD))
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    text, _ = with_requirement(subject_of(str(path)), path, "G (rpm <= 1)", description="")
+    assert text.count("\r\n") == text.count("\n") and "\r\r" not in text
+
+
 def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder(tmp_path: Path) -> None:
     fmu = Path(shutil.copy(AT, tmp_path / "car.fmu"))
     path = tmp_path / "car.toml"

@@ -67,6 +67,7 @@ def test_a_predicate_far_from_its_threshold_is_told() -> None:
     assert (found.kind, found.part) == ("threshold", "x <= 50")
     assert "was never near its threshold in 5 simulations" in found.text
     assert not findings(lag_problem("G[0,10] (x <= 1.5)"))
+    assert not findings(lag_problem("1 <= 20")), "no simulation could come nearer"
 
 
 def dead(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

@@ -105,16 +105,19 @@ def test_what_is_exactly_on_its_limit_is_told_as_such() -> None:
     assert broken("G[0,2] (x > 0)", x=[1.0, 0.0, 0.0]).text == (
         "x > 0 was violated from 1 to 2 s: x = 0 at 1 s, exactly on its limit"
     )
+    assert "x = 1000000000000041" in broken("G[0,1] x <= 1000000000000040", x=[1e15 + 41, 0.0]).text
     assert broken("F[0,1] (x != 0)", x=[0.0, 0.0]).text == (
         "x != 0 held at no time from 0 to 1 s; nearest was x = 0 at 0 s, exactly on its limit"
     )
 
 
-def test_a_boolean_signal_is_true_or_false() -> None:
+def test_truths_and_numbers_alone_have_no_values() -> None:
     assert broken("G[0,3] not b", b=[0.0, 0.0, 1.0, 1.0]).text == (
         "not b was violated from 2 to 3 s: b was true at 2 s"
     )
     assert broken("F[0,1] b", b=[0.0, 0.0]).text == "b held at no time from 0 to 1 s"
+    assert broken("G[0,2] 1 >= 2").text == "1 >= 2 was violated from 0 to 2 s"
+    assert broken("F[0,2] 1 >= 2").text == "1 >= 2 held at no time from 0 to 2 s"
     assert broken("load", load=[0.0]).text == "load was violated at 0 s: load = 0 kN", "a unit: no Boolean"
 
 

@@ -6,22 +6,14 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FormulaError, MonitorError
 from falsifier.stl import Monitor, parse, second_monitor
-from tests.stl.randoms import STEP, random_case, random_formula, random_trajectory
+from tests.stl.randoms import STEP, random_formula, random_trajectory
 
 
-@pytest.mark.parametrize("block", range(5))
+@pytest.mark.parametrize("block", range(7))
 def test_random_formulas_agree_with_rtamt(block: int) -> None:
     for seed in range(10_000 + block * 300, 10_000 + (block + 1) * 300):
-        formula, t = random_case(seed, depth=3)
-        ours = Monitor(formula, STEP, len(t)).evaluate(t).robustness
-        assert second_monitor.robustness(formula, t) == ours, (seed, str(formula))
-
-
-@pytest.mark.parametrize("block", range(2))
-def test_without_windows_rtamt_agrees_too(block: int) -> None:
-    for seed in range(50_000 + block * 150, 50_000 + (block + 1) * 150):
         rng = random.Random(seed)
-        formula = random_formula(rng, 3, windows=False)
+        formula = random_formula(rng, rng.randint(0, 3), windows=block < 5)
         t = random_trajectory(rng, rng.randint(1, 9) + round(formula.horizon(STEP) / STEP))
         ours = Monitor(formula, STEP, len(t)).evaluate(t).robustness
         assert second_monitor.robustness(formula, t) == ours, (seed, str(formula))

@@ -1,49 +1,14 @@
 """Which parameters of a block carry meaning; the others say how it is drawn or generated."""
 
+import tomllib
 from collections.abc import Mapping
+from importlib.resources import files
 
 from falsifier.core.words import shortened
 
 _SATURATION = ("LimitOutput", "UpperSaturationLimit", "LowerSaturationLimit")
-# Of these types of blocks, only the parameters below count.
-_BLOCKS = """
-    Abs Assertion Backlash BusCreator BusSelector Constant DataStoreMemory DataStoreRead DataStoreWrite
-    DataTypeConversion DeadZone Delay Demux Derivative DiscreteFilter DiscreteIntegrator
-    DiscretePulseGenerator DiscreteStateSpace DiscreteTransferFcn DiscreteZeroPole EnablePort Fcn From
-    Gain Goto Ground HitCross If InitialCondition Inport Integrator Logic Lookup Lookup2D Lookup_n-D
-    Math Memory Merge MinMax MultiPortSwitch Mux Outport Product Quantizer RateLimiter RateTransition
-    RelationalOperator Relay Rounding Saturate Saturation Scope Selector SignalConversion Signum Sin
-    StateSpace Step SubSystem Sum Switch Terminator ToWorkspace TransferFcn TransportDelay TriggerPort
-    Trigonometry UnitDelay VariableTransportDelay ZeroOrderHold ZeroPole
-"""
-# Parameters that count, by the names that the format gives them; the sample time is added to all.
-_NAMES = """
-    A After Amplitude B BacklashWidth Before Bias BreakpointsForDimension1 BreakpointsForDimension2
-    BreakpointsForDimension3 BreakpointsForDimension4 BreakpointsForDimension5 C ColumnIndex Criteria D
-    DataPortIndices DataStoreName DelayLength DelayTime Denominator ElseIfExpressions Expr ExternalReset
-    ExtrapMethod FallingSlewLimit Frequency Function Gain GotoTag HitCrossingDirection HitCrossingOffset
-    IfExpression IndexOptions Indices InitialCondition InitialOutput InitialStates InitialValue
-    InputValues Inputs IntegratorMethod InterpMethod LimitOutput LowerLimit LowerSaturationLimit
-    LowerValue MaximumDelay Numerator OffOutputValue OffSwitchValue OnOutputValue OnSwitchValue Operator
-    OutMax OutMin OutPortSampleTime OutputSignals OutputValues Outputs Period Phase PhaseDelay Poles
-    PulseWidth QuantizationInterval RisingSlewLimit RowIndex StatesWhenEnabling Table TagVisibility
-    Threshold Time TriggerType UpperLimit UpperSaturationLimit UpperValue Value VariableName X0 Zeros
-    fallingSlewLimit gainval risingSlewLimit
-"""
-_LISTED, _MEANINGFUL = frozenset(_BLOCKS.split()), frozenset(_NAMES.split())
-# Of blocks that are not listed (masks, references, S-functions), everything counts but these.
-_DRAWN_NAMES = """
-    BlockType Name SID Position ZOrder Ports FontName FontSize FontWeight FontAngle ForegroundColor
-    BackgroundColor DropShadow ShowName NamePlacement BlockRotation BlockMirror Orientation Tag
-    LibraryVersion SourceBlock SourceType ContentPreviewEnabled UserDataPersistent UserData
-    Description LinkData AttributesFormatString Priority RequestExecContextInheritance
-    HideAutomaticName IconDisplay MaskDisplay MaskIconFrame MaskIconOpaque MaskIconRotate
-    MaskIconUnits MaskSelfModifiable SystemSampleTime ShowPortLabels SourceProductName
-    SourceProductBaseCode MultiThreadCoSim OutDataTypeStr InputSameDT SaturateOnIntegerOverflow
-    RndMeth LockScale SampleTime Commented Port ModelNameDialog ModelFile ModelName
-    ReferencedSubsystem PreCopyFcn CopyFcn OpenFcn LoadFcn
-"""
-_DRAWN = frozenset(_DRAWN_NAMES.split())
+_NAMES = tomllib.loads(files(__package__).joinpath("names.toml").read_text(encoding="utf-8"))
+_LISTED, _MEANINGFUL, _DRAWN = (frozenset(_NAMES[key].split()) for key in ("blocks", "meaningful", "drawn"))
 _TYPES = ("DataTypeStr", "DataType", "DataTypeName", "ParamMin", "ParamMax")
 # Values that say nothing: inherited sample times, no limits, off.
 _EMPTY = frozenset(("", "[]", "-1", "off", "none"))

@@ -2,11 +2,13 @@
 
 import shlex
 from collections.abc import Iterable, Mapping
+from importlib.resources import files
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
-from falsifier.core.model import INTERFACE_TAGS
+from falsifier.core.model import INTERFACE_TAGS, Model
 from falsifier.core.words import readable
 from falsifier.counterexamples.export.tables import text_of
+from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
@@ -24,79 +26,6 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
 
 {requirement}: {formula}
 {recorded}
-"""
-
-_REPLAY = '''\
-{about}
-
-import csv
-import json
-import sys
-from pathlib import Path
-
-import numpy as np
-from fmpy import simulate_fmu
-
-HERE = Path(__file__).resolve().parent
-FMU = Path(sys.argv[1]) if len(sys.argv) > 1 else HERE / {fmu}
-# Columns of input.csv after the time; named here, because spreadsheets may change what stands in the file.
-INPUTS = {inputs}
-# Name of each output: the FMU's variable, and the element if that is an array.
-OUTPUTS = {outputs}
-
-
-def read_inputs():
-    """Read input.csv; cells of arrays hold all elements, separated by spaces."""
-    with (HERE / "input.csv").open(newline="", encoding="utf-8") as file:
-        rows = [[tuple(map(float, cell.split())) for cell in row] for row in list(csv.reader(file))[1:]]
-    sizes = [len(cell) for cell in rows[0]]
-    names = ["time", *INPUTS]
-    columns = [(n, float, (size,)) if size > 1 else (n, float) for n, size in zip(names, sizes)]
-    return np.array([tuple(c if len(c) > 1 else c[0] for c in row) for row in rows], columns)
-
-
-result = simulate_fmu(
-    str(FMU),
-    validate=False,
-    fmi_type="{fmi_type}",
-    start_time=0.0,
-    stop_time={stop_time!r},
-    output_interval={step!r},
-    relative_tolerance={tolerance!r},
-    record_events=False,
-    start_values=json.loads((HERE / "start_values.json").read_text(encoding="utf-8")),
-    input=read_inputs() if INPUTS else None,
-    output=sorted({{variable for variable, _ in OUTPUTS.values()}}),
-)[::{every}]
-columns = {{"time": result["time"]}}
-for name, (variable, element) in OUTPUTS.items():
-    columns[name] = result[variable].reshape(len(result), -1)[:, element]
-
-with (HERE / "outputs.csv").open("w", newline="", encoding="utf-8") as file:
-    writer = csv.writer(file, lineterminator="\\n")
-    writer.writerow(columns)
-    writer.writerows([float(value) for value in row] for row in zip(*columns.values()))
-
-shown = {shown}
-marked = int(abs(result["time"] - {moment!r}).argmin())
-widths = [max(14, len(name) + 2) for name in shown]
-print("".join(name.rjust(width) for name, width in zip(shown, widths)))
-for k in range(max(marked - {around}, 0), min(marked + {around} + 1, len(result))):
-    values = "".join(f"{{float(columns[name][k]):{{width}}.6g}}" for name, width in zip(shown, widths))
-    print(values + ({mark} if k == marked else ""))
-print(f"all {{len(result)}} rows are in outputs.csv next to this script")
-'''
-
-_OPENMODELICA = """\
-// Simulates a counterexample in OpenModelica, from the Modelica model that the FMU was exported from:
-//     omc replay.mos
-// First set the path of the model in loadFile, and in simulate its full name if it differs from the FMU's.
-//
-// {requirement}: {formula}
-loadFile({file});
-simulate({model}, startTime=0, stopTime={stop_time!r}, numberOfIntervals={intervals},
-  outputFormat="csv", simflags={flags});
-getErrorString();
 """
 
 
@@ -117,11 +46,12 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         formula=one_line(str(problem.requirement.formula)),
         recorded=_recorded_lines(verdict),
     )
-    return _REPLAY.format(
+    return _template("replay.template").format(
         about=python_docstring(about),
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
         fmu=repr(model.path.name),
+        refusal=f"sys.exit({refusal!r})\n\n" if (refusal := unplayable(model)) else "",
         fmi_type=INTERFACE_TAGS[model.interface],
         stop_time=experiment.stop_time,
         step=experiment.stop_time / round(experiment.stop_time / step),
@@ -132,6 +62,24 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )
+
+
+def unplayable(model: Model) -> str:
+    """Say that FMPy cannot take the inputs of an FMU, and what to use; empty if it can."""
+    sizes: dict[str, int] = {}
+    if not isinstance(model, FmuModel):
+        return ""
+    for name in dict.fromkeys(model.place(v.name)[0] for v in model.info.inputs if v.kind != "string"):
+        elements = model.elements(name)
+        variable, size = model.info[elements[0]], len(elements)
+        why = f"an input named {name!r}" if name == "time" else ""
+        if variable.is_continuous and sizes.setdefault(variable.type, size) != size:
+            why = f"inputs of the type {variable.type} of different sizes, such as {name!r}"
+        elif size > 1 and not variable.is_continuous:
+            why = f"arrays of discrete inputs, such as {name!r}"
+        if why:
+            return f"simulate_fmu of FMPy cannot take {why}: use falsifier replay {FILE_NAME}"
+    return ""
 
 
 def _recorded_lines(verdict: Verdict) -> str:
@@ -156,7 +104,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
     flags = ["-csvInput=input.csv"] if any(v.kind != "string" for v in problem.info.inputs) else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name
-    return _OPENMODELICA.format(
+    return _template("openmodelica.template").format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
         file=modelica_string(f"{name.split('.')[0]}/package.mo" if "." in name else f"{name}.mo"),
@@ -165,3 +113,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         intervals=problem.experiment.samples - 1,
         flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
+
+
+def _template(name: str) -> str:
+    return files("falsifier.counterexamples.export").joinpath(name).read_text(encoding="utf-8")

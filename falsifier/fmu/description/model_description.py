@@ -4,7 +4,8 @@ Element and attribute names are those of the FMI standards 1.0.1, 2.0.5 and 3.0.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import isfinite
@@ -141,7 +142,7 @@ def _parse(root: Element, version: str) -> Description:
         internal_step=_positive(interfaces.get("co-simulation", {}), "fixedInternalStepSize"),
         tolerance=_positive(experiment, "tolerance"),
         variables=tuple(map(_without_impossible_limits, variables)),
-        notes=_notes(root, variables, experiment, tool=tool, needs_tool=needs_tool),
+        notes=_notes(root, variables, slots, experiment, tool=tool, needs_tool=needs_tool),
     )
     return Description(
         info=info,
@@ -187,6 +188,7 @@ def _positive(experiment: Mapping[str, str], name: str) -> float | None:
 def _notes(
     root: Element,
     variables: Sequence[Variable],
+    slots: Mapping[str, Slot],
     experiment: Mapping[str, str],
     *,
     tool: str,
@@ -212,9 +214,23 @@ def _notes(
         said.append(f"binary variables are ignored: {_listed(binary)}")
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
         said.append(f"two names of one input: {_listed(aliases)}; use the second")
-    if doubtful := [text for v in variables if (text := _doubt(v))]:
+    if doubtful := [*_surplus(root, slots), *(text for v in variables if (text := _doubt(v)))]:
         said.append(f"the description contradicts itself: {_listed(doubtful)}")
     return tuple(said)
+
+
+def _surplus(root: Element, slots: Mapping[str, Slot]) -> Iterator[str]:
+    """Say what there is more of than can be used: items of one name, and start values of an array."""
+    for definition in root.iterfind("TypeDefinitions//*"):
+        count = Counter(item.attrib["name"] for item in definition.findall("Item"))
+        for name in (name for name, times in count.items() if times > 1):
+            yield f"an enumeration has {count[name]} items named {name!r}, of which the last counts"
+    sizes = {slot.declared: slot.size for slot in slots.values()}
+    for element in root.iterfind("ModelVariables/*[Dimension]"):
+        size = sizes.get(name := element.attrib["name"], 0)
+        given = len(element.get("start", "").split()) or len(element.findall("Start"))
+        if given > size > 0:
+            yield f"{name!r} has {given} start values for {size} elements, so the last ones are ignored"
 
 
 def _without_impossible_limits(v: Variable) -> Variable:
@@ -225,13 +241,15 @@ def _doubt(v: Variable) -> str:
     """Say what of a variable's limits and start value cannot be meant; empty if nothing is wrong."""
     if v.low is not None and v.high is not None and v.low > v.high:
         return f"min = {v.low:g} of {v.name!r} is greater than max = {v.high:g}, so both are ignored"
-    # Integers that are no exact doubles follow the standard, but cannot be compared here.
-    if (start := v.start_number) is None or (v.kind == "integer" and v.expected(start)):
+    if (start := v.start_number) is None:
         return ""
     if not isfinite(start):
         return f"start of {v.name!r} is {start}"
-    excess = v.excess(start, start)
-    return excess and f"start = {start:g} {excess}"
+    # Integers that are no exact doubles follow the standard, but cannot be compared here.
+    excess, expected = v.excess(start, start), v.expected(start)
+    if v.kind == "integer" and expected:
+        return ""
+    return f"start = {start:g} {excess}" if excess else expected and f"start = {start:g}: {expected}"
 
 
 def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:

@@ -210,7 +210,9 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
                 raise ValueError(
                     f"array {element.get('name')!r} has {count} elements, not 0 to {_MAX_ELEMENTS}"
                 )
-            starts = starts * count if len(starts) == 1 else starts
+            if 1 < len(starts) < count:
+                raise ValueError(f"start has {len(starts)} values for {count} elements")
+            starts = starts * count if len(starts) == 1 else starts[:count]
             if shape and kind != "string":
                 arrays[reference] = tuple(float(s or 0.0) for s in starts) if starts else (0.0,) * count
             variable = _variable(

@@ -116,8 +116,8 @@ def own_steps(member: Member, step: float, stop_time: float, *, stated_as: str =
         return 1
     if own > stop_time * (1.0 + GRID_ROUNDING):
         raise SpecError(
-            f"{own:g} s is longer than the simulation, which stops at {stop_time:g} s; the component would "
-            "never step; shorten its step",
+            f"{own:g} s is longer than the simulation, which stops at {stop_time:.10g} s; the component "
+            "would never step; shorten its step",
             key=key,
         )
     return whole_steps("step", own, stated_as, step, key=key)

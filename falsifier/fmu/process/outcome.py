@@ -3,17 +3,19 @@
 import re
 from collections.abc import Mapping, Sequence
 
-from falsifier.errors import FalsifierError, ModelError, SimulationError
+from falsifier.core.words import readable
+from falsifier.errors import FalsifierError, ModelError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.network import Network
 from falsifier.fmu.process.plan import Plan
 
-_STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
+_STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal")
+_PENDING = 5
 # What the system as a whole fails in, not the component that was looked at last.
 _OF_ALL = (Where.UNSETTLED, Where.NOT_CONVERGED, Where.TIMEOUT)
 _BEFORE = "at {reached}, before the stop time {stop}"
 _EVENT = f"the event iteration {{returned}} {_BEFORE}"
-_FIRST_STEP = "the first step, of {step} s, {returned}; an FMU of one step only needs it as step_size"
+_FIRST_STEP = "the first step, of {step} s, {returned}; {remedy}"
 _TEXTS: Mapping[int, str] = {
     Where.SETTING: f"setting the inputs {{returned}} {_BEFORE}",
     Where.STEPPING: f"the step {{returned}} {_BEFORE}",
@@ -62,14 +64,15 @@ def failure(
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
     text = _TEXTS.get(reply.where, _EVENT)
-    if reply.where == Where.STEPPING and reply.time == 0.0:
+    if reply.where == Where.STEPPING and reply.time == 0.0 and reply.status != _PENDING:
         text = _FIRST_STEP
     said = text.format(
         text=reply.text,
         returned=f"returned {_status_name(reply.status)}",
-        reached=f"t = {reply.time:g} s",
-        stop=f"{plan.stop_time:g} s",
+        reached=f"t = {readable(reply.time)} s",
+        stop=f"{readable(plan.stop_time)} s",
         step=f"{plan.times[1] / plan.every:.6g}",
+        remedy=_other_step(network, reply, plan.times[1] / plan.every),
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),
@@ -110,7 +113,7 @@ def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
     """Return how far a simulation came, in words and in s, as its process says: it may be any number."""
     if not 0.0 < time < plan.stop_time * (1.0 + 1e-9):
         return "", None
-    return f" at t = {time:g} s", time
+    return f" at t = {readable(time)} s", time
 
 
 def last_lines(log: tuple[str, ...]) -> str:
@@ -121,7 +124,21 @@ def last_lines(log: tuple[str, ...]) -> str:
     return f"; its last message: {lines[0]}" if lines else ""
 
 
+def _other_step(network: Network, reply: Reply, step: float) -> str:
+    """Say which communication step to state for an FMU that refuses the one that it was asked for."""
+    option = written("--output-interval, or as step_size in a spec", "step_size")
+    internal = network.members[_member(network, reply)].description.info.internal_step
+    if internal is None or abs(step / internal - max(1, round(step / internal))) < 1e-9:
+        return f"an FMU of one step only needs it as {option}"
+    return (
+        f"the FMU's internal step is {internal:g} s: state a multiple of it as {option}, and round the times "
+        "in formulas to multiples of that"
+    )
+
+
 def _status_name(status: int) -> str:
+    if status == _PENDING:
+        return "pending (steps that go on in the background are not supported)"
     if status < len(_STATUS_NAMES):
         return _STATUS_NAMES[status]
     return f"status {status - (1 << 32) if status >> 31 else status}"
@@ -150,11 +167,15 @@ def _titles(network: Network, positions: Sequence[str]) -> list[str]:
 
 def _string(network: Network, plan: Plan, reply: Reply) -> str:
     """Name the string parameter of a component at the position that a worker tells, and its value."""
-    member = network.order[reply.component] if 0 <= reply.component < len(network.order) else 0
-    strings = network.of_member(member, plan.strings)
+    strings = network.of_member(_member(network, reply), plan.strings)
     known = _is_position(reply.text) and int(reply.text) < len(strings)
     name, value = strings[int(reply.text)] if known else ("a string", "a text")
     return f"{name!r} to {value!r}"
+
+
+def _member(network: Network, reply: Reply) -> int:
+    """Return the position among the components of the one that a worker tells; of the first if of none."""
+    return network.order[reply.component] if 0 <= reply.component < len(network.order) else 0
 
 
 def _is_position(text: str) -> bool:

@@ -1,7 +1,7 @@
 """What FMUs may do: what users allow and deny, what that means on this machine, and what was refused."""
 
 import os
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
@@ -96,11 +96,13 @@ def resolved(allow: Iterable[str], folder: Path) -> tuple[str, ...]:
     >>> resolved(["programs", "write:/data/logs"], Path("/spec"))
     ('programs', 'write:/data/logs')
     """
-    found = []
-    for word in allow:
-        kind, path = _kind_and_path(word)
-        found.append(word if path is None else f"{kind}:{(folder / path).absolute()}")
-    return tuple(found)
+    return with_paths(allow, lambda path: str((folder / path).absolute()))
+
+
+def with_paths(allow: Iterable[str], change: Callable[[Path], str]) -> tuple[str, ...]:
+    """Return what is allowed with other paths."""
+    parts = ((word, *_kind_and_path(word)) for word in allow)
+    return tuple(word if path is None else f"{kind}:{change(path)}" for word, kind, path in parts)
 
 
 def _advice(word: str) -> str:

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from math import ceil, gcd, lcm
+from math import ceil, floor
 from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import finite, instance, one_of, positive
-from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable
+from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable, common_part, exact
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
 from falsifier.fmu.description.model_description import Description
@@ -17,8 +16,6 @@ from falsifier.fmu.process.network import SYSTEM, Extrapolation, Link, Member, P
 
 # Maximum number of connections in the description that people and language models read.
 _SHOWN_LINKS = 40
-# Largest denominator of steps like 1/30 s, which are written with many digits.
-_MAX_DENOMINATOR = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +131,7 @@ def merged(
             variables.append(replace(variable, name=other, causality="local", settable=False, alias_of=meant))
             slots[other], places[other] = slots[meant], places[meant]
     infos = [m.description.info for m in members]
+    step_size, internal_step = _steps(members)
     stop_times = {i.stop_time for i in infos if i.stop_time is not None}
     info = ModelInfo(
         name=name,
@@ -143,9 +141,8 @@ def merged(
         platforms=tuple(p for p in infos[0].platforms if all(p in i.platforms for i in infos)),
         tool=", ".join(dict.fromkeys(i.tool for i in infos if i.tool)),
         stop_time=frame.stop_time or (stop_times.pop() if len(stop_times) == 1 else None),
-        step_size=_step(
-            [m.step for m in members], [m.description.info.step_size for m in members if not m.step]
-        ),
+        step_size=step_size,
+        internal_step=internal_step,
         tolerance=min((i.tolerance for i in infos if i.tolerance is not None), default=None),
         variables=tuple(variables),
         components=tuple(m.name for m in members),
@@ -178,12 +175,19 @@ def _titles(members: Sequence[Member], links: Iterable[Link]) -> tuple[tuple[str
     return tuple((full_name(members, link.source), full_name(members, link.target)) for link in links)
 
 
-def _step(own: Iterable[float | None], default: Iterable[float | None]) -> float | None:
-    """Return the largest step that divides all of the components' own, and exceeds no default of others."""
-    exact = [Fraction(step).limit_denominator(_MAX_DENOMINATOR) for step in own if step]
-    finest = min((step for step in default if step), default=None)
-    if not exact:
-        return finest
-    whole = lcm(*(step.denominator for step in exact))
-    common = gcd(*(int(step * whole) for step in exact)) / whole
-    return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING))
+def _steps(members: Sequence[Member]) -> tuple[float | None, float | None]:
+    """Return the default communication step, and the internal step of which it is a multiple.
+
+    It is the largest that divides all of the components' own and exceeds no default of others. Only where no
+    component has a step of its own, internal steps count; they may exceed a default.
+    """
+    own = [exact(m.step) for m in members if m.step]
+    others = [m.description.info for m in members if not m.step]
+    finest = min((i.step_size for i in others if i.step_size), default=None)
+    if own:
+        common = float(common_part(*own))
+        return common if finest is None else common / max(1, ceil(common / finest - GRID_ROUNDING)), None
+    if not (inverse := [1 / exact(i.internal_step) for i in others if i.internal_step]):
+        return finest, None
+    internal = float(1 / common_part(*inverse))
+    return finest and internal * max(1, floor(finest / internal + GRID_ROUNDING)), internal

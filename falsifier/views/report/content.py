@@ -1,7 +1,7 @@
 """The content of a report, gathered from directories before any layout: a verdict per requirement first."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -176,7 +176,7 @@ def shown_of(run: Run, candidate: Candidate) -> Shown:
     name = None if run.shown is None else run.trajectories.get(run.shown)
     trajectory = recorded_trajectory(run.directory, name)
     is_lost = trajectory is None and name is not None
-    return _drawn(run, candidate, trajectory, run.verdict, run.reason, is_lost=is_lost)
+    return replace(_drawn(run, candidate, trajectory, run.verdict, run.reason), is_lost=is_lost)
 
 
 def _shrunk(run: Run) -> Shown | None:
@@ -197,18 +197,11 @@ def _shrunk(run: Run) -> Shown | None:
     verdict = Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
     if stored.origin != run.manifest.origin or not verdict.violated:
         return None
-    return _drawn(run, candidate, trajectory, verdict, stored.reason, is_shrunk=True)
+    return replace(_drawn(run, candidate, trajectory, verdict, stored.reason), is_shrunk=True)
 
 
 def _drawn(
-    run: Run,
-    candidate: Candidate,
-    trajectory: Trajectory | None,
-    verdict: Verdict | None,
-    confirmed: str,
-    *,
-    is_shrunk: bool = False,
-    is_lost: bool = False,
+    run: Run, candidate: Candidate, trajectory: Trajectory | None, verdict: Verdict | None, confirmed: str
 ) -> Shown:
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
@@ -226,6 +219,4 @@ def _drawn(
         labels=labels,
         panels=drawn,
         confirmed=confirmed if run.falsified else "",
-        is_shrunk=is_shrunk,
-        is_lost=is_lost,
     )

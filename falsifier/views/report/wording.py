@@ -9,7 +9,7 @@ import numpy as np
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed, with_unit
+from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from
@@ -102,7 +102,8 @@ def _course(signal: Signal) -> str:
     """How an input goes on between its control points."""
     if len(signal.times) == 1:
         return "constant"
-    held = f", sampled every {signal.hold:g} s" if signal.hold and signal.interpolation != "constant" else ""
+    is_held = signal.hold and signal.interpolation != "constant"
+    held = f", sampled every {readable(signal.hold)} s" if signal.hold and is_held else ""
     return f"{_BETWEEN[signal.interpolation]}{held}"
 
 

@@ -13,15 +13,16 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
-from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
+from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script, unplayable
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import evaluate
+from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.counterexamples.export.support import AT_INPUTS, exported
-from tests.fmu.fixtures import path as fmu_path
+from tests.fmu.fixtures import altered, path as fmu_path
 
 
 def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: Path) -> None:
@@ -148,6 +149,31 @@ def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
         "offset": [10.0, 7.0],
     }
     assert (tmp_path / "input.csv").read_text().splitlines()[:2] == ['"time","u"', "0.0,1.0 0.5"]
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "why"),
+    [
+        ("Lag_2", b'name="u"', b'name="time"', "an input named 'time'"),
+        ("Arrays_3", b'parameter" variability="fixed', b"input", "inputs of the type Float64 of different"),
+        (
+            "Arrays_3",
+            b'name="u"',
+            b'name="u" variability="discrete"',
+            "arrays of discrete inputs, such as 'u'",
+        ),
+    ],
+)
+def test_inputs_that_fmpy_cannot_take_end_the_script(
+    name: str, old: bytes, new: bytes, why: str, tmp_path: Path
+) -> None:
+    fmu = altered(fmu_path(name), tmp_path / "a.fmu", lambda text: text.replace(old, new), ending=".xml")
+    told = unplayable(FmuModel(fmu))
+    assert told.startswith(f"simulate_fmu of FMPy cannot take {why}") and FILE_NAME in told
+    if name == "Lag_2":
+        problem = Problem.from_fmu(fmu, "G (y <= 1)", inputs={"time": (0.0, 1.0)})
+        script = replay_script(problem, evaluate(problem, somewhere(problem)), ["time"])
+        assert script is not None and f"\nsys.exit({told!r})\n" in script
 
 
 def test_odd_names_and_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:

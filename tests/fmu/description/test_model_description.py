@@ -102,6 +102,26 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     assert description.info.internal_step == 0.25 and not description.info.notes
 
 
+def test_start_values_and_items_that_cannot_all_be_used_are_noted() -> None:
+    text = """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="g">
+        <CoSimulation modelIdentifier="M"/><TypeDefinitions><EnumerationType name="E">
+        <Item name="a" value="3"/><Item name="b" value="-7"/><Item name="b" value="100"/>
+        </EnumerationType></TypeDefinitions><ModelVariables>
+        <Float64 name="x" valueReference="1" causality="parameter" variability="fixed" start="7 8 9">
+          <Dimension start="2"/></Float64>
+        <Enumeration name="e" valueReference="2" causality="input" declaredType="E" start="5"/>
+        </ModelVariables><ModelStructure/></fmiModelDescription>"""
+    description = described(text)
+    assert description.arrays[1] == (7.0, 8.0)
+    assert description.info.notes == (
+        "the description contradicts itself: an enumeration has 2 items named 'b', of which the last counts, "
+        "'x' has 3 start values for 2 elements, so the last ones are ignored, "
+        "start = 5: expected one of 3 = a, 100 = b for 'e'",
+    )
+    with pytest.raises(ModelError, match="'x': start has 3 values for 4 elements"):
+        described(text.replace('Dimension start="2"', 'Dimension start="4"'))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

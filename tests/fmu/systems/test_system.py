@@ -7,7 +7,7 @@ from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Component, Coupling, System
-from tests.fmu.fixtures import path
+from tests.fmu.fixtures import altered, path
 from tests.fmu.small_systems import LOOP, component, loop, pids, run, sampled_loop, system
 
 
@@ -83,6 +83,19 @@ def test_the_default_step_is_no_longer_than_that_of_an_fmu_without_a_step_of_its
     fmus = Path(__file__).resolve().parents[3] / "fmus"
     parts = {"car": Component(fmus / "ATCar.fmu"), "shift": Component(fmus / "ATShift.fmu", 0.04)}
     assert System(parts).info.step_size == pytest.approx(0.01)
+
+
+def test_the_steps_of_a_system_are_multiples_of_the_internal_steps_of_its_components(tmp_path: Path) -> None:
+    def with_step(name: str, step: bytes) -> Path:
+        stated = b'<CoSimulation fixedInternalStepSize="' + step + b'"'
+        target = tmp_path / f"{name}.fmu"
+        return altered(path("Echo_3"), target, lambda text: text.replace(b"<CoSimulation", stated))
+
+    fmus = {"a": with_step("a", b"0.02"), "b": with_step("b", b"0.05")}
+    info = System({**fmus, "c": path("Plant_2")}, {}).info
+    assert info.internal_step == pytest.approx(0.1) and info.step_size == pytest.approx(0.1)
+    own = System({"a": Component(fmus["a"], 0.02), "b": fmus["b"]}, {}).info
+    assert own.internal_step is None, "what somebody stated decides"
 
 
 @pytest.mark.parametrize(

@@ -193,3 +193,10 @@ def test_a_refused_first_step_tells_its_size() -> None:
     assert "the first step, of " in str(error) and "needs it as step_size" in str(error)
     later = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.5, component=0), "", ())
     assert "the step returned error at t = 0.5 s" in str(later)
+    pending = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 5, time=0.0, component=0), "", ())
+    assert "in the background are not supported" in str(pending) and "step_size" not in str(pending)
+
+
+def test_a_refused_first_step_names_the_option_that_there_is(at_the_command_line: None) -> None:
+    error = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", ())
+    assert "needs it as --output-interval, or as step_size in a spec" in str(error)

@@ -8,29 +8,14 @@ from typing import Any
 import pytest
 
 from falsifier.views.report import html_report
+from tests.command import ROOT
 from tests.views.chromium import attribute, chromium, needs_chromium
 
 pytestmark = needs_chromium
 
 # Runs in the browser when the page is loaded: what a person would see and could reach. It is added to the
 # page's policy, which forbids scripts.
-PROBE = """
-addEventListener('load', () => {
-const visible = selector => [...document.querySelectorAll(selector)].filter(e => e.checkVisibility());
-const focusable = visible('a[href], summary, [tabindex="0"]');
-const reached = focusable.filter(e => { e.focus(); return document.activeElement === e; });
-const pictures = visible('.picture');
-const style = selector => getComputedStyle(document.querySelector(selector));
-document.documentElement.setAttribute('data-probe', JSON.stringify({
-  focusable: focusable.length, reached: reached.length,
-  pictures: pictures.length, drawn: pictures.filter(e => e.naturalWidth > 300 && e.height > 100).length,
-  sideways: document.documentElement.scrollWidth - document.documentElement.clientWidth,
-  ink: style('body').color, page: style('body').backgroundColor,
-  edges: visible('.card').map(e => getComputedStyle(e).borderLeftColor),
-  resources: performance.getEntriesByType('resource').filter(e => !e.name.startsWith('data:')).length,
-}));
-});
-"""
+PROBE = (ROOT / "tests" / "fixtures" / "probe.js").read_text()
 
 
 def probe(page: Path, folder: Path, *flags: str) -> Any:
