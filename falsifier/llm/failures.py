@@ -47,6 +47,11 @@ _LONGER = (
 )
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
+# How long to wait, as OpenAI and Groq ("try again in 1m7.5s"), Azure ("retry after 6 seconds") and Gemini
+# ("retry in 34.07s", "retryDelay": "34s") say it beside a header or in place of one.
+_DURATION = r"(\d+(?:\.\d+)?) ?(ms|[hms])(?:ec\w*|in\w*|our\w*)?"
+_WAIT = re.compile(rf"(?:try (?:again )?(?:in|after) |retrydelay\W+)((?:{_DURATION} ?)+)\b", re.IGNORECASE)
+_SECONDS = {"h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3}
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
@@ -150,6 +155,7 @@ def classify(
     if isinstance(error, BrokenReplyError) and error.status_code is None:
         return TransientChatError(where + said, patience=error.patience)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
+    wait = _retry_after(error)
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
     filled = {
@@ -159,6 +165,9 @@ def classify(
         "option": refused,
         "detail": _detail(text, status),
     }
+    if status == 429 and (spoken := _wait_in_words(text)) is not None:
+        # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
+        return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
     for statuses, words, kind, cure in _CURES:
         fits = not words or any(word in lowered for word in words)
         is_possible = bool(refused) or kind is not _RefusedOptionError
@@ -166,7 +175,7 @@ def classify(
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
-        return TransientChatError(where + filled["detail"], retry_after=_retry_after(error))
+        return TransientChatError(where + filled["detail"], retry_after=wait)
     return ChatError(where + filled["detail"])
 
 
@@ -212,6 +221,14 @@ def _retry_after(error: Exception) -> float | None:
         if stated is not None and (seconds := _seconds_until(str(stated), headers)) is not None:
             return max(0.0, seconds)
     return None
+
+
+def _wait_in_words(text: str) -> float | None:
+    """Seconds that a text asks to wait; None if it does not."""
+    if (found := _WAIT.search(text)) is None:
+        return None
+    parts = re.finditer(_DURATION, found[1], re.IGNORECASE)
+    return sum(float(part[1]) * _SECONDS[part[2].lower()] for part in parts)
 
 
 def _seconds_until(stated: str, headers: Mapping[str, Any]) -> float | None:

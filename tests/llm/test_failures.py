@@ -71,6 +71,21 @@ def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str)
     assert str(error).endswith(f"The server says: {said}")
 
 
+@pytest.mark.parametrize(
+    ("said", "seconds"),
+    [
+        ("Rate limit reached. Please try again in 1m7.5s. Visit https://host.", 67.5),
+        ("You exceeded your current quota, check your billing details. Please retry in 34.07s.", 34.07),
+        ("You exceeded your current quota, please check your plan and billing details.", None),
+    ],
+)
+def test_a_wait_that_is_told_in_words_is_kept_also_for_a_quota(said: str, seconds: float | None) -> None:
+    with serving(Step(status=429, message=said)) as server, pytest.raises(ChatError) as caught:
+        LiteLLMChat("hosted_vllm/m", api_base=server.url).send(REQUEST)
+    assert getattr(caught.value, "retry_after", None) == seconds
+    assert ("no quota left" in str(caught.value)) == (seconds is None)
+
+
 def free_port() -> int:
     """Port of this machine on which nothing listens."""
     with socket.socket() as probe:
