@@ -38,12 +38,29 @@ _UNREADABLE_WORDS = (
     "failed to generate json",
     "failed to validate json",
 )
+# litellm's class, then what llama.cpp, LM Studio, vLLM (in three versions), OpenAI, Groq and Anthropic say.
+_CONTEXT_WORDS = (
+    "contextwindow",
+    "context size",
+    "exceed_context",
+    "context length",
+    "maximum model length",
+    "too long to fit",
+    "context_length",
+    "context window",
+    "length of the messages",
+    "prompt is too long",
+)
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
 _TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
 _LONGER = (
     "start its server with a longer context (llama.cpp: --ctx-size 32768; vLLM: --max-model-len 32768), or "
+)
+_TOO_LARGE = (
+    "the request is larger than the server, a proxy before it, or the account's limit per minute allows; use "
+    "a plainer prompt variant, or raise that limit. {detail}"
 )
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
@@ -90,13 +107,9 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         "the account behind {keys} may not use this LLM: have it allowed for the organisation or project of "
         "the key, or take another LLM or key. {detail}",
     ),
-    (
-        (413,),
-        (),
-        ContextExceededError,
-        "the request is larger than the server, or a proxy before it, takes; use a plainer prompt "
-        "variant, or raise its limit. {detail}",
-    ),
+    ((413,), (), ContextExceededError, _TOO_LARGE),
+    # OpenAI and Groq, of a limit of tokens per minute: no wait helps.
+    ((429,), ("request too large",), ContextExceededError, _TOO_LARGE),
     ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
     # Of litellm and of OpenAI's client, before anything is sent.
     ((), ("_api_key is not set",), ChatError, "{detail}"),
@@ -118,7 +131,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
     ),
     (
         (),
-        ("contextwindow", "context_length", "maximum context", "context size", "exceed_context"),
+        _CONTEXT_WORDS,
         ContextExceededError,
         "the prompt is too long for this LLM; {longer}use a plainer prompt variant or another LLM. "
         "The server says: {detail}",

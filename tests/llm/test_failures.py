@@ -51,7 +51,6 @@ def test_the_servers_words_come_without_classes_and_full_stop() -> None:
     assert str(told("still loading ...")).endswith("still loading ...")
     assert str(told('{"error": {"message": "not\\n now."}}')).endswith("not now")
     assert "neutral names" in str(told("content_policy_violation"))
-    assert "too long" in str(told("this model's maximum context length is 8192 tokens"))
 
 
 @pytest.mark.parametrize(
@@ -69,6 +68,23 @@ def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str)
     assert "llama.cpp: --ctx-size" in str(error)
     said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
     assert str(error).endswith(f"The server says: {said}")
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "This model's maximum context length is 8192 tokens",
+        "The prompt (total length 5000) is longer than the maximum model length of 4096",
+        "The prompt (total length 5000) is too long to fit into the model (total max length 4096)",
+        "The number of tokens to keep from the initial prompt is greater than the context length",
+        "Your input exceeds the context window of this model",
+        "Please reduce the length of the messages or completion",
+        "prompt is too long: 210000 tokens > 200000 maximum",
+    ],
+)
+def test_a_context_that_is_too_short_is_known_by_the_words_of_each_server(said: str) -> None:
+    with serving(Step(status=400, message=said)) as server, pytest.raises(ContextExceededError):
+        LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
 
 
 @pytest.mark.parametrize(
@@ -127,6 +143,7 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
     ("step", "cure"),
     [
         (Step(status=413, message="Payload Too Large"), "use a plainer prompt variant"),
+        (Step(status=429, message="Request too large for m: Limit 8"), "use a plainer prompt variant"),
         (
             Step(status=400, message="Unrecognized request argument supplied: top_k"),
             "refuses the option top_k; drop it",
