@@ -120,8 +120,7 @@ _CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...
         (404,),
         (),
         ChatError,
-        "no such LLM or address; check the LLM's name, the server's address, and whether the account behind "
-        "{keys} may use it. {detail}",
+        "no such LLM or address; check the LLM's name and the server's address{account}. {detail}",
     ),
     (
         (),
@@ -171,9 +170,11 @@ def classify(
     wait = _retry_after(error)
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
+    keys = " or ".join(provider.keys)
     filled = {
-        "keys": " or ".join(provider.keys) or "the API key",
+        "keys": keys or "the API key",
         "unset": unset_key(llm),
+        "account": f", and whether the account behind {keys} may use it" if keys else "",
         "longer": _LONGER if api_base is not None or provider.local else "",
         "option": refused,
         "detail": _detail(text, status),
@@ -199,7 +200,8 @@ def _detail(text: str, status: int | None) -> str:
     """
     said = own_words(text)
     try:
-        told = json.loads(said)["error"]["message"]
+        stated = json.loads(said)["error"]
+        told = stated if isinstance(stated, str) else stated["message"]
     except (ValueError, TypeError, KeyError, RecursionError):
         told = said
     if title := _TITLE.search(said):

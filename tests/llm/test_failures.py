@@ -125,6 +125,13 @@ def test_where_nothing_listens_on_this_machine_little_patience_helps(
         assert "'ollama serve'" in str(caught.value)
 
 
+def test_where_there_is_no_account_none_is_to_be_checked() -> None:
+    missing = Step(status=404, raw='{"error": "model \'m\' not found"}')
+    with serving(missing) as server, pytest.raises(ChatError) as caught:
+        LiteLLMChat("ollama_chat/m", api_base=server.root).send(REQUEST)
+    assert str(caught.value).endswith("check the LLM's name and the server's address. model 'm' not found")
+
+
 REFUSED = ConnectionRefusedError(111, "Connection refused")
 
 
