@@ -280,6 +280,7 @@ class _Limited(httpx.SyncByteStream):
                     self._call.refuse(_TOO_LONG)
         body = bytes(received)
         if self._is_success:
+            body = _without_half_an_answer(body)
             self._call.fault = _unreadable(body)
             if self._call.fault.status_code is None:
                 self._call.fault.patience = _MOST_MALFORMED
@@ -331,7 +332,8 @@ def _unreadable(body: bytes) -> BrokenReplyError:
             "/v1, and its log; a proxy or a page for signing in may answer in its place"
         )
     if isinstance(sent, dict) and (error := sent.get("error")):
-        return _reported(error)
+        # What was answered until an error is paid for.
+        return _reported(error, BrokenReplyError if "choices" not in sent else UnusableReplyError)
     if isinstance(sent, dict) and sent.get("choices") == []:
         return UnusableReplyError(
             "the server answers without any choice; its log, or the provider's page on the state of the "
@@ -344,13 +346,22 @@ def _unreadable(body: bytes) -> BrokenReplyError:
     )
 
 
-def _reported(error: Any) -> BrokenReplyError:
+def _reported(error: Any, kind: type[BrokenReplyError]) -> BrokenReplyError:
     """What a server reports in place of an answer; without a status it is taken for a temporary failure."""
     stated = error if isinstance(error, dict) else {"message": error}
     told, code = stated.get("message") or error, str(stated.get("code"))
-    fault = BrokenReplyError(f"the server reports: {told if isinstance(told, str) else json.dumps(told)}")
+    fault = kind(f"the server reports: {told if isinstance(told, str) else json.dumps(told)}")
     fault.status_code = int(code) if re.fullmatch("[45][0-9][0-9]", code) else 503
     return fault
+
+
+def _without_half_an_answer(body: bytes) -> bytes:
+    """The error alone that OpenRouter puts beside what a provider had answered until it failed."""
+    try:
+        error = json.loads(body)["choices"][0]["error"]
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return body
+    return json.dumps({"choices": [], "error": error}).encode() if error else body
 
 
 def _mended(body: bytes) -> bytes:
@@ -369,9 +380,11 @@ def _mended(body: bytes) -> bytes:
 
 
 def _with_one_text(choice: Any) -> Any:
-    """A choice whose content is one text; some servers send it as a list of parts."""
+    """A choice whose content is one text; some servers send a list of parts, or the object itself."""
     message = choice.get("message") if isinstance(choice, dict) else None
-    if not isinstance(message, dict) or not isinstance(parts := message.get("content"), list):
+    content = message.get("content") if isinstance(message, dict) else None
+    parts = [json.dumps(content)] if isinstance(content, dict) else content
+    if not isinstance(message, dict) or not isinstance(parts, list):
         return choice
     # Other parts, such as what was thought before, have no text of their own.
     texts = [part.get("text") if isinstance(part, dict) else part for part in parts]

@@ -208,18 +208,19 @@ def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> No
     assert reply.text == '{"rationale": ""}' and reply.finish_reason == "call of the tool 'json'"
 
 
-def test_a_text_in_parts_is_read_as_one() -> None:
+def test_a_text_in_parts_or_as_an_object_is_read_as_one() -> None:
     parts = [
         {"type": "thinking", "thinking": []},
         {"type": "text", "text": '{"ration'},
         {"type": "text", "text": 'ale": ""}'},
     ]
-    with serving(Step(None, extra={"content": parts}), Step(None, extra={"content": [7]})) as server:
+    steps = [Step(None, extra={"content": content}) for content in (parts, {"rationale": ""}, [7])]
+    with serving(*steps) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
-        reply = chat.send(REQUEST)
+        replies = [chat.send(REQUEST) for _ in range(2)]
         with pytest.raises(TransientChatError, match="does not have the form"):
             chat.send(REQUEST)
-    assert (reply.text, reply.usage.prompt_tokens) == ('{"rationale": ""}', 100)
+    assert [(r.text, r.usage.prompt_tokens) for r in replies] == [('{"rationale": ""}', 100)] * 2
 
 
 _TEXTS = [message.content for message in REQUEST.messages]
@@ -253,6 +254,7 @@ def test_counts_of_a_wrong_form_are_counted_here(counts: Any, sent: int | None, 
     [
         *(('{"choices": []}', 1), ('{"id": "1"}', 1), ('{"error": "x"}', 0), ("<p>x</p>", 0)),
         ('{"choices": [', 1),
+        ('{"choices": [{"error": {"code": 502}, "message": {"content": "{"}}]}', 1),
     ],
 )
 def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:

@@ -166,6 +166,10 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
             Step(raw='{"error": {"message": "no", "code": 401}}'),
             "check OPENAI_API_KEY. the server reports: no",
         ),
+        (
+            Step(raw='{"choices": [{"error": {"message": "it died", "code": 502}, "message": {}}]}'),
+            "/v1: the server reports: it died",
+        ),
         (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
