@@ -345,7 +345,7 @@ def test_nothing_else_is_reached_printed_or_read(tmp_path: Path) -> None:
     """No price list, no telemetry, no .env: only the server that was named hears of us."""
     (tmp_path / ".env").write_text("FROM_DOTENV=read\n")
     (tmp_path / "quiet.py").write_text(_QUIET)
-    with serving(Step("a"), Step("b"), Step("c")) as server:
+    with serving(Step("a"), Step("b"), Step("c", finish="load")) as server:
         models = ["openai/gpt-5-mini", server.url, "anthropic/claude-sonnet-4-5", server.root]
         models += ["ollama_chat/qwen3", server.root]
         root = str(Path(falsifier.__file__).parent.parent)
