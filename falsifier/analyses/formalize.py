@@ -7,12 +7,12 @@ from itertools import combinations
 from falsifier.analyses.lint import ranges_of, static_findings
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import FalsifierError, SpecError
+from falsifier.errors import ChatError, FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
 from falsifier.llm import formalizing
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.formalizing import ReadingReply
-from falsifier.llm.messages import Chat, ChatRequest, Exchange
+from falsifier.llm.messages import Chat, ChatRequest, Exchange, Usage
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.unit_check import defined_units, factor_and_offset
@@ -75,7 +75,7 @@ class Formalized:
         subject: the model, and the spec to write to.
         readings: one to three formulas, the most probable first.
         differences: how each two of them differ.
-        rejected: why other readings were rejected, in the order of the replies.
+        rejected: why other readings were rejected, in the order of the replies; why a reply is missing.
         spent: calls, tokens and cost of the language model.
     """
 
@@ -112,6 +112,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     exchanges: list[Exchange] = []
     readings: list[Reading] = []
     rejected: list[str] = []
+    lost = Usage(cost=0.0)
 
     def read(text: str) -> None:
         """Keep a reply's readings if they are as many as before; RejectedReplyError says what is wrong."""
@@ -133,10 +134,14 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     request = ChatRequest(messages=messages, reply_schema=formalizing.readings_schema())
     try:
         converse(chat, request, read, exchanges.append)
-    except (NoValidReplyError, SpecError):  # also one that takes back what was valid
+    except (ChatError, SpecError) as error:  # also one that takes back what was valid
         if not readings:
             raise
-    spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())
+        if isinstance(error, ChatError) and not isinstance(error, NoValidReplyError):
+            rejected.append(f"no better answer came: {error}")
+            lost = error.lost or lost
+    in_vain = Spent.on_requests(lost.without_reply, lost)
+    spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), in_vain)
     readings = _judged(subject, readings)
     differences = tuple(
         _difference(i, j, readings[i - 1], readings[j - 1])
