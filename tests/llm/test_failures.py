@@ -53,21 +53,13 @@ def test_the_servers_words_come_without_classes_and_full_stop() -> None:
     assert "neutral names" in str(told("content_policy_violation"))
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "litellm.BadRequestError: ContextWindowExceededError: OpenAIException - request (9 tokens) exceeds "
-        "the available context size (8 tokens), try increasing it",
-        'litellm.BadRequestError: Hosted_vllmException - {"error":{"code":400,"message":"request '
-        '(9 tokens) exceeds the available context size (8 tokens), try increasing it","n_ctx":8}}',
-    ],
-)
-def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str) -> None:
-    error = told(text, api_base="http://x")
-    assert isinstance(error, ContextExceededError)
-    assert "llama.cpp: --ctx-size" in str(error)
+def test_a_context_that_is_too_short_is_told_in_the_servers_own_words() -> None:
     said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
-    assert str(error).endswith(f"The server says: {said}")
+    error = told(
+        f"litellm.BadRequestError: ContextWindowExceededError: OpenAIException - {said}", "m", "http://x"
+    )
+    assert isinstance(error, ContextExceededError)
+    assert "llama.cpp: --ctx-size" in str(error) and str(error).endswith(f"The server says: {said}")
 
 
 @pytest.mark.parametrize(
@@ -85,21 +77,6 @@ def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str)
 def test_a_context_that_is_too_short_is_known_by_the_words_of_each_server(said: str) -> None:
     with serving(Step(status=400, message=said)) as server, pytest.raises(ContextExceededError):
         LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
-
-
-@pytest.mark.parametrize(
-    ("said", "seconds"),
-    [
-        ("Rate limit reached. Please try again in 1m7.5s. Visit https://host.", 67.5),
-        ("You exceeded your current quota, check your billing details. Please retry in 34.07s.", 34.07),
-        ("You exceeded your current quota, please check your plan and billing details.", None),
-    ],
-)
-def test_a_wait_that_is_told_in_words_is_kept_also_for_a_quota(said: str, seconds: float | None) -> None:
-    with serving(Step(status=429, message=said)) as server, pytest.raises(ChatError) as caught:
-        LiteLLMChat("hosted_vllm/m", api_base=server.url).send(REQUEST)
-    assert getattr(caught.value, "retry_after", None) == seconds
-    assert ("no quota left" in str(caught.value)) == (seconds is None)
 
 
 def free_port() -> int:
@@ -159,8 +136,6 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
             Step(status=403, message="Your organization must be verified to use o3"),
             "allowed for the organisation",
         ),
-        (Step(raw='{"choices": [], "object": "chat.completion"}'), "without any choice"),
-        (Step(raw='{"error": "model not loaded"}'), "/v1: the server reports: model not loaded"),
         (Step(raw='{"error": {"message": "overloaded"}}'), "/v1: the server reports: overloaded"),
         (
             Step(raw='{"error": {"message": "no", "code": 401}}'),
