@@ -19,37 +19,20 @@ from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
-_FORMAT_WORDS = (
-    "response_format",
-    "json_schema",
-    "json_object",
-    "structured output",
-    "grammar",
-    "schema",
-    "json mode",
-    "response mime type",
-    "failed to initialize samplers",  # llama.cpp, if it cannot constrain this LLM in this way
+_FORMAT = (
+    "response_format|json_object|structured output|grammar|schema|json mode|response mime type"
+    "|failed to initialize samplers"  # llama.cpp, if it cannot constrain this LLM in this way
 )
 # Some servers parse what the LLM wrote, and fail if it does not have the required form: two versions of
 # llama.cpp, and Groq.
-_UNREADABLE_WORDS = (
-    "the model produced output that does not match",
-    "failed to parse input at pos",
-    "failed to generate json",
-    "failed to validate json",
+_UNREADABLE = (
+    "the model produced output that does not match|failed to parse input at pos"
+    "|failed to generate json|failed to validate json"
 )
-# litellm's class, then what llama.cpp, LM Studio, vLLM (in three versions), OpenAI, Groq and Anthropic say.
-_CONTEXT_WORDS = (
-    "contextwindow",
-    "context size",
-    "exceed_context",
-    "context length",
-    "maximum model length",
-    "too long to fit",
-    "context_length",
-    "context window",
-    "length of the messages",
-    "prompt is too long",
+# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq; Anthropic.
+_CONTEXT = (
+    "context[ _]?(?:window|size|length)|maximum model length|too long to fit|length of the messages"
+    "|prompt is too long"
 )
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
@@ -95,53 +78,53 @@ class _RefusedOptionError(ChatError):
     """The server does not take an option of the user."""
 
 
-# What a failure may be: its HTTP statuses (none listed: any, or none), words of which it says at least one
-# (none listed: whatever it says), the class of the error, and cause and cure, with the server's own words as
-# ``{detail}``. The first one that fits counts.
-_CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...] = (
+# What a failure may be: its HTTP statuses (none listed: any, or none), a pattern of its words (empty:
+# whatever it says), the class of the error, and cause and cure, with the server's own words as ``{detail}``.
+# The first one that fits counts.
+_CURES: tuple[tuple[tuple[int, ...], str, type[ChatError], str], ...] = (
     (
         (403,),
         # A key that is right may belong to an account that is not.
-        ("organization", "organisation", "project", "verif", "not have access", "region", "country"),
+        "organi[sz]ation|project|verif|not have access|region|country",
         ChatError,
         "the account behind {keys} may not use this LLM: have it allowed for the organisation or project of "
         "the key, or take another LLM or key. {detail}",
     ),
-    ((413,), (), ContextExceededError, _TOO_LARGE),
+    ((413,), "", ContextExceededError, _TOO_LARGE),
     # OpenAI and Groq, of a limit of tokens per minute: no wait helps.
-    ((429,), ("request too large",), ContextExceededError, _TOO_LARGE),
-    ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
+    ((429,), "request too large", ContextExceededError, _TOO_LARGE),
+    ((401, 403), "", ChatError, "the provider rejected the key; check {keys}. {detail}"),
     # Of litellm and of OpenAI's client, before anything is sent.
-    ((), ("_api_key is not set",), ChatError, "{detail}"),
-    ((), ("missing credentials. please pass",), ChatError, "no API key: {unset}"),
-    ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
-    ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
+    ((), "_api_key is not set", ChatError, "{detail}"),
+    ((), "missing credentials. please pass", ChatError, "no API key: {unset}"),
+    ((400, 422, 500), _UNREADABLE, UnreadableReplyError, "{detail}"),
+    ((400, 422), "", _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
         (404,),
-        (),
+        "",
         ChatError,
         "no such LLM or address; check the LLM's name and the server's address{account}. {detail}",
     ),
     (
         (),
-        ("contentpolicy", "content_policy", "content management policy"),
+        "content_?policy|content management policy",
         ChatError,
         "the provider's content filter rejected the prompt; try another LLM, or neutral names. {detail}",
     ),
     (
         (),
-        _CONTEXT_WORDS,
+        _CONTEXT,
         ContextExceededError,
         "the prompt is too long for this LLM; {longer}use a plainer prompt variant or another LLM. "
         "The server says: {detail}",
     ),
     (
         (429,),
-        ("insufficient_quota", "exceeded your current quota", "billing"),
+        "insufficient_quota|exceeded your current quota|billing",
         ChatError,
         "the account behind {keys} has no quota left. {detail}",
     ),
-    ((400, 422, 501), _FORMAT_WORDS, FormatUnsupportedError, "{detail}"),
+    ((400, 422, 501), _FORMAT, FormatUnsupportedError, "{detail}"),
 )
 
 
@@ -183,9 +166,8 @@ def classify(
         # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
         return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
     for statuses, words, kind, cure in _CURES:
-        fits = not words or any(word in lowered for word in words)
         is_possible = bool(refused) or kind is not _RefusedOptionError
-        if fits and (status in statuses or not statuses) and is_possible:
+        if re.search(words, lowered) and (status in statuses or not statuses) and is_possible:
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
