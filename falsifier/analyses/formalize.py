@@ -12,7 +12,7 @@ from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
 from falsifier.llm import formalizing
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
 from falsifier.llm.formalizing import ReadingReply
-from falsifier.llm.messages import Chat, ChatRequest, Exchange, Usage
+from falsifier.llm.messages import Chat, ChatRequest, Exchange
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.problem import Problem
 from falsifier.problem.unit_check import defined_units, factor_and_offset
@@ -112,7 +112,6 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     exchanges: list[Exchange] = []
     readings: list[Reading] = []
     rejected: list[str] = []
-    lost = Usage(cost=0.0)
 
     def read(text: str) -> None:
         """Keep a reply's readings if they are as many as before; RejectedReplyError says what is wrong."""
@@ -139,9 +138,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
             raise
         if isinstance(error, ChatError) and not isinstance(error, NoValidReplyError):
             rejected.append(f"no better answer came: {error}")
-            lost = error.lost or lost
-    in_vain = Spent.on_requests(lost.without_reply, lost)
-    spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), in_vain)
+    spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())
     readings = _judged(subject, readings)
     differences = tuple(
         _difference(i, j, readings[i - 1], readings[j - 1])

@@ -109,11 +109,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     found = ask(target, sentence, settings)
     say(formalized_text(found))
     if choose is None:
-        # A rejected reply is not kept, so that the question is asked, and paid for, again.
-        spent = found.spent
-        is_kept = settings.cache and not found.rejected and spent.questions - spent.without_reply == 1
-        again = "; the reply is kept" if is_kept else ", which asks again"
-        say(f"to write one of them into the spec, repeat the command with --choose N{again}")
+        say("to write one of them into the spec, repeat the command with --choose N")
     else:
         file, name = _write(found, choose, out)
         say(f"{file}: requirement {name} written; to search: falsifier run {shlex.quote(f'{file}:{name}')}")

@@ -29,11 +29,8 @@ _UNREADABLE = (
     "the model produced output that does not match|failed to parse input at pos"
     "|failed to generate json|failed to validate json"
 )
-# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq; Anthropic.
-_CONTEXT = (
-    "context[ _]?(?:window|size|length)|maximum model length|too long to fit|length of the messages"
-    "|prompt is too long"
-)
+# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq.
+_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|length of the messages"
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
@@ -47,11 +44,8 @@ _TOO_LARGE = (
 )
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
-# How long to wait, as OpenAI and Groq ("try again in 1m7.5s"), Azure ("retry after 6 seconds") and Gemini
-# ("retry in 34.07s", "retryDelay": "34s") say it beside a header or in place of one.
-_DURATION = r"(\d+(?:\.\d+)?) ?(ms|[hms])(?:ec\w*|in\w*|our\w*)?"
-_WAIT = re.compile(rf"(?:try (?:again )?(?:in|after) |retrydelay\W+)((?:{_DURATION} ?)+)\b", re.IGNORECASE)
-_SECONDS = {"h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3}
+# How long to wait, as OpenAI and Groq ("try again in 1m7.5s") and Gemini ("retry in 34.07s") say it.
+_WAIT = re.compile(r"try (?:again )?(?:in|after) (?:(\d+)m)?(\d+(?:\.\d+)?) ?s", re.IGNORECASE)
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
@@ -74,10 +68,6 @@ class UnreadableReplyError(ChatError):
     """The LLM answered, but its server could not parse that in the form that was asked for."""
 
 
-class _RefusedOptionError(ChatError):
-    """The server does not take an option of the user."""
-
-
 # What a failure may be: its HTTP statuses (none listed: any, or none), a pattern of its words (empty:
 # whatever it says), the class of the error, and cause and cure, with the server's own words as ``{detail}``.
 # The first one that fits counts.
@@ -98,7 +88,6 @@ _CURES: tuple[tuple[tuple[int, ...], str, type[ChatError], str], ...] = (
     ((), "_api_key is not set", ChatError, "{detail}"),
     ((), "missing credentials. please pass", ChatError, "no API key: {unset}"),
     ((400, 422, 500), _UNREADABLE, UnreadableReplyError, "{detail}"),
-    ((400, 422), "", _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
     (
         (404,),
         "",
@@ -159,15 +148,16 @@ def classify(
         "unset": unset_key(llm),
         "account": f", and whether the account behind {keys} may use it" if keys else "",
         "longer": _LONGER if api_base is not None or provider.local else "",
-        "option": refused,
         "detail": _detail(text, status),
     }
-    if status == 429 and (spoken := _wait_in_words(text)) is not None:
+    if status == 429 and (found := _WAIT.search(text)):
         # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
+        spoken = 60 * int(found[1] or 0) + float(found[2])
         return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
+    if status in (400, 422) and refused:
+        return ChatError(f"{where}the server refuses the option {refused}; drop it. {filled['detail']}")
     for statuses, words, kind, cure in _CURES:
-        is_possible = bool(refused) or kind is not _RefusedOptionError
-        if re.search(words, lowered) and (status in statuses or not statuses) and is_possible:
+        if re.search(words, lowered) and (status in statuses or not statuses):
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
@@ -218,14 +208,6 @@ def _retry_after(error: Exception) -> float | None:
         if stated is not None and (seconds := _seconds_until(str(stated), headers)) is not None:
             return max(0.0, seconds)
     return None
-
-
-def _wait_in_words(text: str) -> float | None:
-    """Seconds that a text asks to wait; None if it does not."""
-    if (found := _WAIT.search(text)) is None:
-        return None
-    parts = re.finditer(_DURATION, found[1], re.IGNORECASE)
-    return sum(float(part[1]) * _SECONDS[part[2].lower()] for part in parts)
 
 
 def _seconds_until(stated: str, headers: Mapping[str, Any]) -> float | None:

@@ -280,7 +280,6 @@ class _Limited(httpx.SyncByteStream):
                     self._call.refuse(_TOO_LONG)
         body = bytes(received)
         if self._is_success:
-            body = _without_half_an_answer(body)
             self._call.fault = _unreadable(body)
             if self._call.fault.status_code is None:
                 self._call.fault.patience = _MOST_MALFORMED
@@ -330,8 +329,7 @@ def _unreadable(body: bytes) -> BrokenReplyError:
             "/v1, and its log; a proxy or a page for signing in may answer in its place"
         )
     if isinstance(sent, dict) and (error := sent.get("error")):
-        # What was answered until an error is paid for.
-        return _reported(error, BrokenReplyError if "choices" not in sent else UnusableReplyError)
+        return _reported(error)
     if isinstance(sent, dict) and sent.get("choices") == []:
         return UnusableReplyError(
             "the server answers without any choice; its log, or the provider's page on the state of the "
@@ -344,22 +342,13 @@ def _unreadable(body: bytes) -> BrokenReplyError:
     )
 
 
-def _reported(error: Any, kind: type[BrokenReplyError]) -> BrokenReplyError:
+def _reported(error: Any) -> BrokenReplyError:
     """What a server reports in place of an answer; without a status it is taken for a temporary failure."""
     stated = error if isinstance(error, dict) else {"message": error}
     told, code = stated.get("message") or error, str(stated.get("code"))
-    fault = kind(f"the server reports: {told if isinstance(told, str) else json.dumps(told)}")
+    fault = BrokenReplyError(f"the server reports: {told if isinstance(told, str) else json.dumps(told)}")
     fault.status_code = int(code) if re.fullmatch("[45][0-9][0-9]", code) else 503
     return fault
-
-
-def _without_half_an_answer(body: bytes) -> bytes:
-    """The error alone that OpenRouter puts beside what a provider had answered until it failed."""
-    try:
-        error = json.loads(body)["choices"][0]["error"]
-    except (ValueError, TypeError, LookupError, RecursionError):
-        return body
-    return json.dumps({"choices": [], "error": error}).encode() if error else body
 
 
 def _mended(body: bytes) -> bytes:
@@ -369,12 +358,11 @@ def _mended(body: bytes) -> bytes:
     """
     sent = json.loads(body.decode(errors="replace"))
     usage, choices = sent.get("usage"), sent.get("choices")
-    mended = dict(sent)
     if "usage" in sent:
-        mended["usage"] = _possible(usage) if isinstance(usage, dict) else None
+        sent["usage"] = _possible(usage) if isinstance(usage, dict) else None
     if isinstance(choices, list):
-        mended["choices"] = list(map(_with_one_text, choices))
-    return json.dumps(mended).encode()
+        sent["choices"] = list(map(_with_one_text, choices))
+    return json.dumps(sent).encode()
 
 
 def _with_one_text(choice: Any) -> Any:

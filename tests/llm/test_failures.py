@@ -71,7 +71,6 @@ def test_a_context_that_is_too_short_is_told_in_the_servers_own_words() -> None:
         "The number of tokens to keep from the initial prompt is greater than the context length",
         "Your input exceeds the context window of this model",
         "Please reduce the length of the messages or completion",
-        "prompt is too long: 210000 tokens > 200000 maximum",
     ],
 )
 def test_a_context_that_is_too_short_is_known_by_the_words_of_each_server(said: str) -> None:
@@ -140,10 +139,6 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
         (
             Step(raw='{"error": {"message": "no", "code": 401}}'),
             "check OPENAI_API_KEY. the server reports: no",
-        ),
-        (
-            Step(raw='{"choices": [{"error": {"message": "it died", "code": 502}, "message": {}}]}'),
-            "/v1: the server reports: it died",
         ),
         (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
