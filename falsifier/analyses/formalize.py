@@ -7,7 +7,7 @@ from itertools import combinations
 from falsifier.analyses.lint import ranges_of, static_findings
 from falsifier.core.space import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import FalsifierError, SpecError
+from falsifier.errors import ChatError, FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, compiled, simulate
 from falsifier.llm import formalizing
 from falsifier.llm.conversation import NoValidReplyError, RejectedReplyError, converse
@@ -75,7 +75,7 @@ class Formalized:
         subject: the model, and the spec to write to.
         readings: one to three formulas, the most probable first.
         differences: how each two of them differ.
-        rejected: why other readings were rejected, in the order of the replies.
+        rejected: why other readings were rejected, in the order of the replies; why a reply is missing.
         spent: calls, tokens and cost of the language model.
     """
 
@@ -133,9 +133,11 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
     request = ChatRequest(messages=messages, reply_schema=formalizing.readings_schema())
     try:
         converse(chat, request, read, exchanges.append)
-    except (NoValidReplyError, SpecError):  # also one that takes back what was valid
+    except (ChatError, SpecError) as error:  # also one that takes back what was valid
         if not readings:
             raise
+        if isinstance(error, ChatError) and not isinstance(error, NoValidReplyError):
+            rejected.append(f"no better answer came: {error}")
     spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())
     readings = _judged(subject, readings)
     differences = tuple(

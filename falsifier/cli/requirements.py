@@ -109,7 +109,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     found = ask(target, sentence, settings)
     say(formalized_text(found))
     if choose is None:
-        say("to write one of them into the spec, repeat the command with --choose N; valid replies are kept")
+        say("to write one of them into the spec, repeat the command with --choose N")
     else:
         file, name = _write(found, choose, out)
         say(f"{file}: requirement {name} written; to search: falsifier run {shlex.quote(f'{file}:{name}')}")

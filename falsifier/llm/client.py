@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from random import uniform
 from time import perf_counter, sleep
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import ValidationError
 
@@ -23,7 +23,7 @@ from falsifier.core.files import write_whole
 from falsifier.core.secrets import redact_held, secrets_in, without_credentials, without_secrets
 from falsifier.core.words import counted
 from falsifier.errors import ChatError, ChatSetupError, setting
-from falsifier.llm import litellm_adapter
+from falsifier.llm import Effort, litellm_adapter
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError, UnreadableReplyError, classify
 from falsifier.llm.json_text import without_limits
 from falsifier.llm.messages import (
@@ -347,6 +347,9 @@ def preflight(llm: str, *, api_base: str | None = None, options: Mapping[str, An
         if api_base is not None:
             raise ChatSetupError(f"{llm}: a model file has a server of its own; drop {setting('api_base')}")
         return
+    name, _, effort = llm.rpartition("@")
+    if name and effort in get_args(Effort):  # servers with one model take any name, without the effort
+        raise ChatSetupError(f"{llm!r}: state the effort beside the name: {name!r}, effort={effort!r}")
     litellm_adapter.check_name(llm)
     check_address(llm, api_base)
     server_address(llm, api_base)

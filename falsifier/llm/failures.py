@@ -19,25 +19,18 @@ from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
-_FORMAT_WORDS = (
-    "response_format",
-    "json_schema",
-    "json_object",
-    "structured output",
-    "grammar",
-    "schema",
-    "json mode",
-    "response mime type",
-    "failed to initialize samplers",  # llama.cpp, if it cannot constrain this LLM in this way
+_FORMAT = (
+    "response_format|json_object|structured output|grammar|schema|json mode|response mime type"
+    "|failed to initialize samplers"  # llama.cpp, if it cannot constrain this LLM in this way
 )
 # Some servers parse what the LLM wrote, and fail if it does not have the required form: two versions of
 # llama.cpp, and Groq.
-_UNREADABLE_WORDS = (
-    "the model produced output that does not match",
-    "failed to parse input at pos",
-    "failed to generate json",
-    "failed to validate json",
+_UNREADABLE = (
+    "the model produced output that does not match|failed to parse input at pos"
+    "|failed to generate json|failed to validate json"
 )
+# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq.
+_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|length of the messages"
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
@@ -45,8 +38,14 @@ _TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
 _LONGER = (
     "start its server with a longer context (llama.cpp: --ctx-size 32768; vLLM: --max-model-len 32768), or "
 )
+_TOO_LARGE = (
+    "the request is larger than the server, a proxy before it, or the account's limit per minute allows; use "
+    "a plainer prompt variant, or raise that limit. {detail}"
+)
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
+# How long to wait, as OpenAI and Groq ("try again in 1m7.5s") and Gemini ("retry in 34.07s") say it.
+_WAIT = re.compile(r"try (?:again )?(?:in|after) (?:(\d+)m)?(\d+(?:\.\d+)?) ?s", re.IGNORECASE)
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
@@ -69,62 +68,52 @@ class UnreadableReplyError(ChatError):
     """The LLM answered, but its server could not parse that in the form that was asked for."""
 
 
-class _RefusedOptionError(ChatError):
-    """The server does not take an option of the user."""
-
-
-# What a failure may be: its HTTP statuses (none listed: any, or none), words of which it says at least one
-# (none listed: whatever it says), the class of the error, and cause and cure, with the server's own words as
-# ``{detail}``. The first one that fits counts.
-_CURES: tuple[tuple[tuple[int, ...], tuple[str, ...], type[ChatError], str], ...] = (
+# What a failure may be: its HTTP statuses (none listed: any, or none), a pattern of its words (empty:
+# whatever it says), the class of the error, and cause and cure, with the server's own words as ``{detail}``.
+# The first one that fits counts.
+_CURES: tuple[tuple[tuple[int, ...], str, type[ChatError], str], ...] = (
     (
         (403,),
         # A key that is right may belong to an account that is not.
-        ("organization", "organisation", "project", "verif", "not have access", "region", "country"),
+        "organi[sz]ation|project|verif|not have access|region|country",
         ChatError,
         "the account behind {keys} may not use this LLM: have it allowed for the organisation or project of "
         "the key, or take another LLM or key. {detail}",
     ),
-    (
-        (413,),
-        (),
-        ContextExceededError,
-        "the request is larger than the server, or a proxy before it, takes; use a plainer prompt "
-        "variant, or raise its limit. {detail}",
-    ),
-    ((401, 403), (), ChatError, "the provider rejected the key; check {keys}. {detail}"),
+    ((413,), "", ContextExceededError, _TOO_LARGE),
+    # OpenAI and Groq, of a limit of tokens per minute: no wait helps.
+    ((429,), "request too large", ContextExceededError, _TOO_LARGE),
+    ((401, 403), "", ChatError, "the provider rejected the key; check {keys}. {detail}"),
     # Of litellm and of OpenAI's client, before anything is sent.
-    ((), ("_api_key is not set",), ChatError, "{detail}"),
-    ((), ("missing credentials. please pass",), ChatError, "no API key: {unset}"),
-    ((400, 422, 500), _UNREADABLE_WORDS, UnreadableReplyError, "{detail}"),
-    ((400, 422), (), _RefusedOptionError, "the server refuses the option {option}; drop it. {detail}"),
+    ((), "_api_key is not set", ChatError, "{detail}"),
+    ((), "missing credentials. please pass", ChatError, "no API key: {unset}"),
+    ((400, 422, 500), _UNREADABLE, UnreadableReplyError, "{detail}"),
     (
         (404,),
-        (),
+        "",
         ChatError,
-        "no such LLM or address; check the LLM's name, the server's address, and whether the account behind "
-        "{keys} may use it. {detail}",
+        "no such LLM or address; check the LLM's name and the server's address{account}. {detail}",
     ),
     (
         (),
-        ("contentpolicy", "content_policy", "content management policy"),
+        "content_?policy|content management policy",
         ChatError,
         "the provider's content filter rejected the prompt; try another LLM, or neutral names. {detail}",
     ),
     (
         (),
-        ("contextwindow", "context_length", "maximum context", "context size", "exceed_context"),
+        _CONTEXT,
         ContextExceededError,
         "the prompt is too long for this LLM; {longer}use a plainer prompt variant or another LLM. "
         "The server says: {detail}",
     ),
     (
         (429,),
-        ("insufficient_quota", "exceeded your current quota", "billing"),
+        "insufficient_quota|exceeded your current quota|billing",
         ChatError,
         "the account behind {keys} has no quota left. {detail}",
     ),
-    ((400, 422, 501), _FORMAT_WORDS, FormatUnsupportedError, "{detail}"),
+    ((400, 422, 501), _FORMAT, FormatUnsupportedError, "{detail}"),
 )
 
 
@@ -150,23 +139,29 @@ def classify(
     if isinstance(error, BrokenReplyError) and error.status_code is None:
         return TransientChatError(where + said, patience=error.patience)
     status, text = _status(error), without_trace(f"{type(error).__name__}: {said}")
+    wait = _retry_after(error)
     lowered = shortened(text, _LONGEST_DETAIL).lower()
     refused = next((o for o in options if re.search(rf"\b{re.escape(o.lower())}\b", lowered)), "")
+    keys = " or ".join(provider.keys)
     filled = {
-        "keys": " or ".join(provider.keys) or "the API key",
+        "keys": keys or "the API key",
         "unset": unset_key(llm),
+        "account": f", and whether the account behind {keys} may use it" if keys else "",
         "longer": _LONGER if api_base is not None or provider.local else "",
-        "option": refused,
         "detail": _detail(text, status),
     }
+    if status == 429 and (found := _WAIT.search(text)):
+        # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
+        spoken = 60 * int(found[1] or 0) + float(found[2])
+        return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
+    if status in (400, 422) and refused:
+        return ChatError(f"{where}the server refuses the option {refused}; drop it. {filled['detail']}")
     for statuses, words, kind, cure in _CURES:
-        fits = not words or any(word in lowered for word in words)
-        is_possible = bool(refused) or kind is not _RefusedOptionError
-        if fits and (status in statuses or not statuses) and is_possible:
+        if re.search(words, lowered) and (status in statuses or not statuses):
             return kind(where + cure.format(**filled))
     is_connection = isinstance(error, ConnectionError | TimeoutError)
     if status in _TRANSIENT_STATUS or (status or 0) >= 500 or is_connection:
-        return TransientChatError(where + filled["detail"], retry_after=_retry_after(error))
+        return TransientChatError(where + filled["detail"], retry_after=wait)
     return ChatError(where + filled["detail"])
 
 
@@ -177,7 +172,8 @@ def _detail(text: str, status: int | None) -> str:
     """
     said = own_words(text)
     try:
-        told = json.loads(said)["error"]["message"]
+        stated = json.loads(said)["error"]
+        told = stated if isinstance(stated, str) else stated["message"]
     except (ValueError, TypeError, KeyError, RecursionError):
         told = said
     if title := _TITLE.search(said):

@@ -4,7 +4,7 @@ What works around it stands here, each with the version in which it was seen and
 github.com/BerriAI/litellm that tells of it:
 
 - On import it reads a .env file (1.106.2, #12576) and fetches lists from the network (1.106.2, #2677):
-  ``_ENVIRONMENT`` prevents both.
+  ``_ENVIRONMENT`` prevents both, and warnings of finish reasons that it does not know (1.106.2, no issue).
 - It makes pydantic warn of its own types (1.83, #37949) and of replies in another form than its own
   (1.106.2, #11759): ``_WARNINGS`` are not shown.
 - It takes an HTTP client for OpenAI's library only (1.106.2, #13049): ``_guard`` lets its handler make one.
@@ -43,6 +43,7 @@ _ENVIRONMENT = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",
     "LITELLM_LOCAL_ANTHROPIC_BETA_HEADERS": "True",
     "LITELLM_MODE": "PRODUCTION",
+    "LITELLM_LOG": "CRITICAL",
 }
 _WARNINGS = (".*`?ReadOnly`? qualifier", "Pydantic serializer warnings")
 _CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")

@@ -320,9 +320,7 @@ def _unreadable(body: bytes) -> BrokenReplyError:
     begins = body.decode(errors="replace")[:_LONGEST_BEGINNING].strip()
     found = f"it begins with {begins!r}" if begins else "it is empty"
     try:
-        sent = json.loads(body.decode())
-    except UnicodeDecodeError:
-        return BrokenReplyError(f"the reply is not text in UTF-8: {_NO_LLM}")
+        sent = json.loads(body.decode(errors="replace"))
     except RecursionError:
         return BrokenReplyError(f"the reply is nested too deeply to be read: {_NO_LLM}")
     except ValueError:
@@ -356,22 +354,23 @@ def _reported(error: Any) -> BrokenReplyError:
 def _mended(body: bytes) -> bytes:
     """The body without what the client library would reject all of it for, but what can be read.
 
-    These are counts of tokens that cannot be true, and texts in parts.
+    These are counts of tokens that cannot be true, texts in parts, and bytes that are no UTF-8.
     """
-    sent = json.loads(body)
+    sent = json.loads(body.decode(errors="replace"))
     usage, choices = sent.get("usage"), sent.get("choices")
-    mended = dict(sent)
     if "usage" in sent:
-        mended["usage"] = _possible(usage) if isinstance(usage, dict) else None
+        sent["usage"] = _possible(usage) if isinstance(usage, dict) else None
     if isinstance(choices, list):
-        mended["choices"] = list(map(_with_one_text, choices))
-    return body if mended == sent else json.dumps(mended).encode()
+        sent["choices"] = list(map(_with_one_text, choices))
+    return json.dumps(sent).encode()
 
 
 def _with_one_text(choice: Any) -> Any:
-    """A choice whose content is one text; some servers send it as a list of parts."""
+    """A choice whose content is one text; some servers send a list of parts, or the object itself."""
     message = choice.get("message") if isinstance(choice, dict) else None
-    if not isinstance(message, dict) or not isinstance(parts := message.get("content"), list):
+    content = message.get("content") if isinstance(message, dict) else None
+    parts = [json.dumps(content)] if isinstance(content, dict) else content
+    if not isinstance(message, dict) or not isinstance(parts, list):
         return choice
     # Other parts, such as what was thought before, have no text of their own.
     texts = [part.get("text") if isinstance(part, dict) else part for part in parts]

@@ -209,6 +209,8 @@ def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, targ
     assert len(found.rejected) == 3
     cannot = Step(json.dumps({"readings": [], "cannot": "No."}))
     assert len(ask(server, target, replying(good, bad), cannot).readings) == 1
+    found = ask(server, target, replying(good, bad), Step(status=401, message="wrong key"))
+    assert len(found.readings) == 1 and "no better answer came" in found.rejected[-1]
     with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
         ask(server, target, *[replying(bad)] * 3)
 

@@ -176,10 +176,9 @@ BROKEN: dict[str, tuple[Behaviour, str]] = {
     "half a JSON": (sends(response(b'{"id": ')), "not JSON (it begins with '{\"id\":')"),
     "a page": (sends(response(b"<html><body>Sign in</body></html>")), "not JSON (it begins with '<html>"),
     "nothing": (sends(response(b"")), "not JSON (it is empty)"),
-    "no UTF-8": (sends(response(b'{"id": "\xff\xfe"}')), "not text in UTF-8"),
+    "no text": (sends(response(b"\xff\xfe\x00")), "not JSON (it begins with"),
     "depth": (sends(response(b"[" * 100_000)), "nested too deeply"),
     "no choices": (sends(response(b'{"id": "1", "choices": []}')), "without any choice"),
-    "a list": (sends(response(b"[]")), "does not have the form"),
     "an error as text": (sends(response(b'{"error": "model not loaded"}')), "model not loaded"),
     "a page of a proxy": (
         sends(response(b"<html>\n<title>502 Bad Gateway</title>\n</html>", status="502 x")),
@@ -201,6 +200,12 @@ def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: 
     assert "<class" not in told and "bytearray" not in told and not told.endswith("Connection error")
     if "502" not in cause and "loaded" not in cause:
         assert "check" in told or "its log" in told
+
+
+def test_a_reply_with_bytes_that_are_no_characters_is_read() -> None:
+    with misbehaving(sends(response(completion("QQ").replace(b"QQ", b"10 \xb0C")))) as server:
+        reply = LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
+    assert reply.text == "10 \N{REPLACEMENT CHARACTER}C"
 
 
 def test_https_to_a_server_without_tls_is_told() -> None:

@@ -34,18 +34,9 @@ def test_a_model_that_does_it_all() -> None:
     assert usage.tokens == 240
 
 
-@pytest.mark.parametrize(
-    ("step", "said"),
-    [
-        (Step(None), "empty"),
-        (Step("", finish="length"), "cut off at the token limit"),
-        (Step("I am ready."), "not the JSON that was asked for"),
-        (Step(None, extra={"refusal": "no counterexamples"}), "refuses the task: no counterexamples"),
-    ],
-)
-def test_no_usable_answer(step: Step, said: str) -> None:
-    answer = checked(step, CUT)[0]["answer"]
-    assert not answer.works and said in answer.said
+def test_no_usable_answer() -> None:
+    answer = checked(Step("I am ready."), CUT)[0]["answer"]
+    assert not answer.works and "not the JSON that was asked for" in answer.said
 
 
 @pytest.mark.parametrize(

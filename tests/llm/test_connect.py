@@ -74,6 +74,11 @@ def test_a_name_of_no_provider_or_no_model_is_refused_with_the_form(llm: str) ->
     assert ("did you mean 'openai'" in str(caught.value)) == (llm == "opnai/gpt-5-mini")
 
 
+def test_an_effort_in_a_name_would_be_lost() -> None:
+    with pytest.raises(ChatSetupError, match=r"beside the name: 'ollama_chat/x', effort='high'"):
+        connect("ollama_chat/x@high")
+
+
 @pytest.mark.parametrize("llm", ["openai/gpt-5-mini", "anthropic/claude-sonnet-4-5"])
 def test_an_option_that_the_provider_does_not_have_is_refused(
     llm: str, monkeypatch: pytest.MonkeyPatch

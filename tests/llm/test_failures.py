@@ -51,24 +51,31 @@ def test_the_servers_words_come_without_classes_and_full_stop() -> None:
     assert str(told("still loading ...")).endswith("still loading ...")
     assert str(told('{"error": {"message": "not\\n now."}}')).endswith("not now")
     assert "neutral names" in str(told("content_policy_violation"))
-    assert "too long" in str(told("this model's maximum context length is 8192 tokens"))
+
+
+def test_a_context_that_is_too_short_is_told_in_the_servers_own_words() -> None:
+    said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
+    error = told(
+        f"litellm.BadRequestError: ContextWindowExceededError: OpenAIException - {said}", "m", "http://x"
+    )
+    assert isinstance(error, ContextExceededError)
+    assert "llama.cpp: --ctx-size" in str(error) and str(error).endswith(f"The server says: {said}")
 
 
 @pytest.mark.parametrize(
-    "text",
+    "said",
     [
-        "litellm.BadRequestError: ContextWindowExceededError: OpenAIException - request (9 tokens) exceeds "
-        "the available context size (8 tokens), try increasing it",
-        'litellm.BadRequestError: Hosted_vllmException - {"error":{"code":400,"message":"request '
-        '(9 tokens) exceeds the available context size (8 tokens), try increasing it","n_ctx":8}}',
+        "This model's maximum context length is 8192 tokens",
+        "The prompt (total length 5000) is longer than the maximum model length of 4096",
+        "The prompt (total length 5000) is too long to fit into the model (total max length 4096)",
+        "The number of tokens to keep from the initial prompt is greater than the context length",
+        "Your input exceeds the context window of this model",
+        "Please reduce the length of the messages or completion",
     ],
 )
-def test_a_context_that_is_too_short_is_told_in_the_servers_own_words(text: str) -> None:
-    error = told(text, api_base="http://x")
-    assert isinstance(error, ContextExceededError)
-    assert "llama.cpp: --ctx-size" in str(error)
-    said = "request (9 tokens) exceeds the available context size (8 tokens), try increasing it"
-    assert str(error).endswith(f"The server says: {said}")
+def test_a_context_that_is_too_short_is_known_by_the_words_of_each_server(said: str) -> None:
+    with serving(Step(status=400, message=said)) as server, pytest.raises(ContextExceededError):
+        LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
 
 
 def free_port() -> int:
@@ -94,6 +101,13 @@ def test_where_nothing_listens_on_this_machine_little_patience_helps(
         assert "'ollama serve'" in str(caught.value)
 
 
+def test_where_there_is_no_account_none_is_to_be_checked() -> None:
+    missing = Step(status=404, raw='{"error": "model \'m\' not found"}')
+    with serving(missing) as server, pytest.raises(ChatError) as caught:
+        LiteLLMChat("ollama_chat/m", api_base=server.root).send(REQUEST)
+    assert str(caught.value).endswith("check the LLM's name and the server's address. model 'm' not found")
+
+
 REFUSED = ConnectionRefusedError(111, "Connection refused")
 
 
@@ -112,6 +126,7 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
     ("step", "cure"),
     [
         (Step(status=413, message="Payload Too Large"), "use a plainer prompt variant"),
+        (Step(status=429, message="Request too large for m: Limit 8"), "use a plainer prompt variant"),
         (
             Step(status=400, message="Unrecognized request argument supplied: top_k"),
             "refuses the option top_k; drop it",
@@ -120,8 +135,6 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
             Step(status=403, message="Your organization must be verified to use o3"),
             "allowed for the organisation",
         ),
-        (Step(raw='{"choices": [], "object": "chat.completion"}'), "without any choice"),
-        (Step(raw='{"error": "model not loaded"}'), "/v1: the server reports: model not loaded"),
         (Step(raw='{"error": {"message": "overloaded"}}'), "/v1: the server reports: overloaded"),
         (
             Step(raw='{"error": {"message": "no", "code": 401}}'),

@@ -2,7 +2,7 @@
 
 import pytest
 
-from falsifier.llm.messages import LONGEST_REPLY, ChatReply, Exchange, Message, cleaned
+from falsifier.llm.messages import ChatReply, Exchange, Message, cleaned
 
 
 def test_exchanges_come_back_whole_and_an_empty_field_of_few_messages_is_not_written() -> None:
@@ -34,7 +34,3 @@ def test_escape_sequences_are_removed_from_what_is_shown() -> None:
 def test_an_ordinary_reply_stays_as_it_is() -> None:
     plain = reply_with('{"rationale": "sk-learn and pk-values", "signals": []}')
     assert cleaned(plain, ["", "short"]) == plain
-
-
-def test_a_long_reply_is_cut() -> None:
-    assert len(cleaned(ChatReply(text="x" * (LONGEST_REPLY + 5))).text) == LONGEST_REPLY
