@@ -21,8 +21,7 @@ _LAGS = 6
 _RIDGE = 1e-2
 # Predicted outputs are limited to the range of the simulated ones, widened by this share of it on both sides.
 _WIDENING = 0.5
-# Largest predicted deviation, in units of the spread: an unstable fit must not overflow, and deviations this
-# large mean nothing anyway.
+# Largest predicted deviation, in spreads: an unstable fit must not overflow, and so far off it means nothing.
 _FAR = 30.0
 # An input that has hardly varied so far would otherwise become a huge deviation as soon as it does.
 _LEAST_INPUT_UNIT = 0.05

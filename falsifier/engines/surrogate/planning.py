@@ -21,8 +21,7 @@ _SAME_POINT = 1e-3
 _MOST_TRIES = 3
 # Survivors of each generation.
 _PARENTS = 30
-# Number of inputs, parameters and outputs up to which a plan has all of its candidates; with more, fewer, so
-# that its time does not grow.
+# Number of inputs, parameters and outputs up to which a plan has all candidates; with more, in the same time.
 _MOST_SIGNALS = 8
 # Number of blocks of coordinates by which a gradient is taken; more take longer.
 _DIRECTIONS = 60
