@@ -102,12 +102,15 @@ def formula_times(formulas: Iterable[str]) -> list[float]:
     return found
 
 
-def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None) -> float | None:
+def fitting_interval(
+    formula: Formula, stop_time: float, fmu_step: float | None, internal_step: float | None = None
+) -> float | None:
     """Return the step in s of a grid on which the formula can be evaluated; None if there is none."""
     if exact(formula.horizon()) > exact(stop_time):
         return None
+    steps = {"fmu_step": fmu_step, "internal_step": internal_step}
     try:
-        return choose_grid(stop_time, times=_bounds(formula), fmu_step=fmu_step).interval
+        return choose_grid(stop_time, times=_bounds(formula), **steps).interval
     except SpecError:
         return None
 
