@@ -159,7 +159,7 @@ def assess(
         simulation with a verdict, KeyboardInterrupt is raised.
 
     Raises:
-        SpecError: if a number is out of range, there is nothing to vary, or a range exceeds the model's.
+        SpecError: if a number or range exceeds what is allowed, or there is nothing to vary.
         SimulationError: if every simulation failed.
         ModelError: if the model cannot be used at all.
     """

@@ -233,7 +233,7 @@ def _judged(subject: Subject, readings: Sequence[Reading]) -> list[Reading]:
 def _difference(first: int, second: int, one: Reading, other: Reading) -> Difference:
     stop = one.problem.experiment.stop_time
     finest = min(reading.problem.experiment.output_interval for reading in (one, other))
-    step = fitting_interval(And(one.formula, other.formula), stop, finest)
+    step = fitting_interval(And(one.formula, other.formula), stop, fmu_step=finest)
     if step is None:  # no grid of a reasonable size fits the windows of both
         return Difference(first, second, None, None)
 

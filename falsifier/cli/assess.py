@@ -116,7 +116,7 @@ def margin(
 
 
 def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
-    """Load the problem of a target or a run; of a run, which is as it was, return what it evaluated, too."""
+    """Load the problem of a target, or of a run that has not changed since, with what that evaluated."""
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)

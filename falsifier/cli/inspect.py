@@ -146,10 +146,7 @@ def _print_convergence(
     interval, reason = stated.output_interval, "as the spec states"
     if interval is None:
         grid = choose_grid(
-            stop_time,
-            fmu_step=found.step_size,
-            internal_step=found.internal_step,
-            step_size=stated.step_size,
+            stop_time, fmu_step=found.step_size, internal_step=found.internal_step, step_size=stated.step_size
         )
         interval, reason = grid.interval, grid.reason
     settings = (stated.step_size, stated.tolerance, stated.time_limit)
@@ -167,10 +164,8 @@ def _print_convergence(
     with closing(model):
         movements = step_convergence(model, experiment, signals)
         advice = _step_advice(model, experiment, signals) if isinstance(model, System) else ""
-    say(
-        f"\n{interface}: step {experiment.step:g} s compared with half of it "
-        f"over {stop_time:.10g} s ({reason}):"
-    )
+    over = f"over {stop_time:.10g} s ({reason})"
+    say(f"\n{interface}: step {experiment.step:g} s compared with half of it {over}:")
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():

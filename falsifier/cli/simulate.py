@@ -118,7 +118,7 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     if found.unused:
         warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
     if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s, the run at {stop_time:.12g} s: --stop-time changes it")
+        warn(f"{file}: ends at {found.end:.12g} s, the simulation at {stop_time:.12g} s: see --stop-time")
     if 0.0 < found.end < stop_time:
         warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
     return dict(found.signals)

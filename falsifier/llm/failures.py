@@ -30,7 +30,7 @@ _UNREADABLE = (
     "|failed to generate json|failed to validate json"
 )
 # litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq.
-_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|length of the messages"
+_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|reduce the length of"
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
@@ -44,8 +44,8 @@ _TOO_LARGE = (
 )
 # Requests to a local server that refuses connections: enough for one that is just starting.
 _LOCAL_PATIENCE = 3
-# How long to wait, as OpenAI and Groq ("try again in 1m7.5s") and Gemini ("retry in 34.07s") say it.
-_WAIT = re.compile(r"try (?:again )?(?:in|after) (?:(\d+)m)?(\d+(?:\.\d+)?) ?s", re.IGNORECASE)
+# How long to wait, as OpenAI and Groq ("try again in 1m7.5s", "450ms") and Gemini ("retry in 34.07s") say it.
+_WAIT = re.compile(r"(?i)try (?:again )?(?:in|after) (?:(\d+)h)?(?:(\d+)m)?(\d+(?:\.\d+)?) ?(m?)s")
 _THIS_MACHINE = ("localhost", "127.0.0.1", "::1", "0.0.0.0")
 
 
@@ -152,9 +152,10 @@ def classify(
     }
     if status == 429 and (found := _WAIT.search(text)):
         # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
-        spoken = 60 * int(found[1] or 0) + float(found[2])
+        hours, minutes, number, milli = found.groups(default="0")
+        spoken = 3600 * int(hours) + 60 * int(minutes) + float(number) / (1000 if milli == "m" else 1)
         return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
-    if status in (400, 422) and refused:
+    if status in (400, 422) and refused and not re.search(_UNREADABLE, lowered):
         return ChatError(f"{where}the server refuses the option {refused}; drop it. {filled['detail']}")
     for statuses, words, kind, cure in _CURES:
         if re.search(words, lowered) and (status in statuses or not statuses):

@@ -102,12 +102,12 @@ def formula_times(formulas: Iterable[str]) -> list[float]:
     return found
 
 
-def fitting_interval(formula: Formula, stop_time: float, fmu_step: float | None) -> float | None:
-    """Return the step in s of a grid on which the formula can be evaluated; None if there is none."""
+def fitting_interval(formula: Formula, stop_time: float, **steps: float | None) -> float | None:
+    """Return the step in s of a grid for the formula and the FMU's ``steps``; None if there is none."""
     if exact(formula.horizon()) > exact(stop_time):
         return None
     try:
-        return choose_grid(stop_time, times=_bounds(formula), fmu_step=fmu_step).interval
+        return choose_grid(stop_time, times=_bounds(formula), **steps).interval
     except SpecError:
         return None
 

@@ -107,7 +107,7 @@ class Problem:
                 smaller one that fits the stop time and the formula's times.
             step_size: communication step or maximum solver step in s; default: the output interval.
             tolerance: relative tolerance of the solver; default: the FMU's.
-            time_limit: maximum wall-clock time of one simulation in s; default: 60 for each tenth of the run.
+            time_limit: maximum wall-clock time of a simulation in s; default: 60 per tenth of simulated time.
             interface: interface of the FMU; default: co-simulation if the FMU offers it. The components of a
                 system have interfaces of their own.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.

@@ -201,8 +201,9 @@ class Subject:
         """
         problem, experiment = self.problem, self.problem.experiment
         if self.free_grid:
+            steps = {"fmu_step": experiment.output_interval, "internal_step": problem.info.internal_step}
             try:
-                fits = fitting_interval(parse(text), experiment.stop_time, experiment.output_interval)
+                fits = fitting_interval(parse(text), experiment.stop_time, **steps)
             except FormulaError as error:
                 raise SpecError(str(error)) from None
             experiment = replace(experiment, output_interval=fits or experiment.output_interval)

@@ -284,9 +284,8 @@ class _Search:
         else:
             when = f"several times, worst {over}" if several else over
             # Of numbers alone, the comparison says it all.
-            what = f"{demand.text} was violated {when}" + (
-                "" if isinstance(quantity, Number) else f": {reading}"
-            )
+            told = "" if isinstance(quantity, Number) else f": {reading}"
+            what = f"{demand.text} was violated {when}{told}"
         return Shortfall(
             part=demand.text,
             quantity=str(quantity),

@@ -275,6 +275,7 @@ def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
 FAILURES: list[tuple[Step, type[ChatError] | None, str]] = [
     (Step(status=429, headers={"Retry-After": "7"}), TransientChatError, ""),
     (Step(status=429, message="exceeded your current quota. Retry in 0m7.0s."), TransientChatError, ""),
+    (Step(status=429, message="Please try again in 7000ms. See settings/billing"), TransientChatError, ""),
     (Step(status=503), TransientChatError, ""),
     (Step(hang_up=True), TransientChatError, ""),
     (Step(raw="<html>Bad gateway</html>"), TransientChatError, "Bad gateway"),

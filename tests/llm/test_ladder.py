@@ -20,14 +20,14 @@ def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
 UNPARSED = [
     Step(status=500, message="The model produced output that does not match the expected peg-native format"),
     Step(status=500, message="Failed to parse input at pos 12: <tool_call>{"),
-    Step(status=400, message="Failed to generate JSON. Please adjust your prompt."),
+    Step(status=400, message='Failed to generate JSON. See {"failed_generation": {"top_k": 1}}'),
 ]
 
 
 @pytest.mark.parametrize("unparsed", UNPARSED, ids=lambda step: step.message)
 def test_what_a_server_cannot_parse_twice_is_asked_for_more_plainly(unparsed: Step) -> None:
     with serving(unparsed, Step("one"), unparsed, unparsed, Step("two")) as server:
-        chat = LiteLLMChat("openai/m", api_base=server.url)
+        chat = LiteLLMChat("openai/m", api_base=server.url, options={"top_k": 3})  # which it may write of
         texts = [chat.complete(REQUEST).text for _ in range(5)]
     assert texts == ["", "one", "", "", "two"]
     kinds = [r.body["response_format"]["type"] for r in server.received]

@@ -3,8 +3,9 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
-from falsifier.problem.grid import check_steps, choose_grid, default_freedom, formula_times
+from falsifier.problem.grid import check_steps, choose_grid, default_freedom, fitting_interval, formula_times
 from falsifier.problem.problem import Problem
+from falsifier.stl import parse
 from tests.fmu.fixtures import path as fmu_path
 from tests.problem.support import echo
 
@@ -79,6 +80,7 @@ def test_times_of_formulas_are_the_bounds_of_their_windows() -> None:
 
 
 def test_a_stated_interval_that_does_not_fit_names_one_that_does() -> None:
+    assert fitting_interval(parse("G[0,1.75] (x <= 1)"), 10.0, fmu_step=1.0, internal_step=0.25) == 0.25
     with pytest.raises(SpecError, match=r"output_interval=0\.25 fits all times"):
         Problem.from_fmu(
             fmu_path("Lag_2"), "G[0,0.75] (y <= 10)", inputs={"u": (-1.0, 1.0)}, output_interval=0.5

@@ -22,6 +22,7 @@ _MAX_REPEATS = 3
 # Longest wait for a trial of a way to start, in s and as a multiple of the first simulation's duration: one
 # trial makes an instance and two simulations, on a machine that may be busy.
 _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
+_ENDING_SECONDS = 1.0  # longest wait for an FMU to end the last simulation of its process: it may write
 
 
 class Runner:
@@ -158,6 +159,7 @@ class Runner:
         if worker.simulations == 1:
             self._seconds = max(self._seconds, time.perf_counter() - worker.started)
         if reply.leaving:
+            worker.program.ends_within(_ENDING_SECONDS)
             self._drop()
         return outputs, log
 
