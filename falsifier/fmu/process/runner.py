@@ -22,7 +22,6 @@ _MAX_REPEATS = 3
 # Longest wait for a trial of a way to start, in s and as a multiple of the first simulation's duration: one
 # trial makes an instance and two simulations, on a machine that may be busy.
 _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
-_ENDING_SECONDS = 1.0  # longest wait for an FMU to end the last simulation of its process: it may write
 
 
 class Runner:
@@ -146,11 +145,17 @@ class Runner:
         self._check_wanted()  # it may have been stopped while the worker was being started
         try:
             reply = worker.simulate(plan, given)
-        except TimeoutError:
-            during = worker.during + worker.refusals
-            raise outcome.overdue(plan, worker.reached, during, worker.output.take()) from None
-        except ConnectionError as error:
-            raise outcome.crash(plan, worker.reached, *worker.crash(error)) from None
+        except (ConnectionError, TimeoutError) as error:
+            outputs = worker.outputs(plan) if worker.is_complete else None
+            if isinstance(error, TimeoutError):
+                during = worker.during + worker.refusals
+                failure = outcome.overdue(plan, worker.reached, during, worker.output.take())
+            else:
+                failure = outcome.crash(plan, worker.reached, *worker.crash(error))
+            if outputs is None or worker.is_cut:
+                raise failure from None
+            self._drop()  # the FMU crashes or hangs when a simulation ends: all that it has to give is there
+            return outputs, failure.log
         if not reply.is_done:
             log, refusals = worker.output.take(), worker.refusals
             raise outcome.failure(self._order.network, plan, reply, refusals, log)
@@ -159,7 +164,6 @@ class Runner:
         if worker.simulations == 1:
             self._seconds = max(self._seconds, time.perf_counter() - worker.started)
         if reply.leaving:
-            worker.program.ends_within(_ENDING_SECONDS)
             self._drop()
         return outputs, log
 

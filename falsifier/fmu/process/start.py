@@ -19,7 +19,7 @@ from falsifier.fmu.process.workplace import Workplace, worker_environment
 # Share of the machine's memory that one worker may allocate; beyond it, allocations fail inside the FMU.
 _MEMORY_SHARE = 0.8
 # Positions in the header of the memory, as in ``enum header`` of worker.h.
-RUNNING, SIMULATED = 0, 1
+RUNNING, SIMULATED, COMPLETE = 0, 1, 2
 _MOST_BYTES = 1 << 20
 # The end of long output says most about what went wrong.
 _SHOWN_BYTES = 64 << 10

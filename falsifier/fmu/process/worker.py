@@ -18,7 +18,7 @@ from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
 from falsifier.fmu.process.plan import HEADER, Plan
 from falsifier.fmu.process.rights import Told, read_told
-from falsifier.fmu.process.start import RUNNING, SIMULATED, Started
+from falsifier.fmu.process.start import COMPLETE, RUNNING, SIMULATED, Started
 from falsifier.fmu.process.workplace import Workplace
 
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
@@ -98,6 +98,7 @@ class Worker(Started):
         logging: whether it asks the FMU for messages.
         awaits_test: whether it is finding out how simulations can start.
         simulations: number of simulations that it has completed.
+        is_cut: whether the FMU has disturbed or cut the connection.
         started: when it was started, by time.perf_counter().
 
     Raises:
@@ -123,6 +124,7 @@ class Worker(Started):
         self.logging = logging
         self.awaits_test = False
         self.simulations = 0
+        self.is_cut = False
         self.started = time.perf_counter()
         self._is_quick = False
 
@@ -158,6 +160,7 @@ class Worker(Started):
     def simulate(self, plan: Plan, given: NDArray[np.float64]) -> Reply:
         """Simulate once with these numbers; errors as for ``load``."""
         self.memory.write(given, HEADER)
+        self.memory.write(np.zeros(1), COMPLETE)
         shares = 0 if plan.has_limit else SHARES
         send(self.program, Request.SIMULATE, reals(plan.time_limit) + integers(shares))
         started = time.perf_counter()
@@ -195,6 +198,11 @@ class Worker(Started):
         return self.memory.header(SIMULATED)
 
     @property
+    def is_complete(self) -> bool:
+        """Whether the worker says that the last simulation has reached its end, and recorded all outputs."""
+        return self.plan is not None and self.memory.header(COMPLETE) == self.plan.stop_time
+
+    @property
     def _position(self) -> int:
         """Position of the component of a system that runs or has failed; -1 if the worker tells nonsense."""
         position = self.memory.header(RUNNING)
@@ -209,14 +217,15 @@ class Worker(Started):
     def crash(self, error: Exception) -> tuple[str, tuple[str, ...]]:
         """End the process; return in words why it did not go on, and what it wrote."""
         during, is_garbled = self.during, isinstance(error, Garbled)
-        is_cut = not is_garbled and not self.program.ends_within(_ENDING_SECONDS)
+        is_open = not is_garbled and not self.program.ends_within(_ENDING_SECONDS)
         log, told = self.output.take(), self._told()
         code = self.end()
+        self.is_cut = is_garbled or is_open or code == _CUT_OFF
         if told.cause:
             reason = f"{told.cause}{during}"
         elif is_garbled:
             reason = f"the FMU disturbed the replies of its process{during}"
-        elif is_cut or code == _CUT_OFF:
+        elif self.is_cut:
             reason = f"the FMU cut the connection of its process{during}"
         else:
             reason = f"the FMU's process crashed{during}: {exit_text(code)}"

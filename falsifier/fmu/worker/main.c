@@ -113,7 +113,6 @@ static int simulate(struct request *r)
         ends = is_spent();
         reply(done, ends ? LEAVING : 0, -1.0, way_to_start());
     }
-    end_simulation();
     if (is_quick && !ends)
         watch_requests(QUICK_SECONDS);
     return !ends;

@@ -22,7 +22,7 @@ static const char *const WAYS[] = {"reset", "state", "instance", "library", "pro
 
 static struct system fmus;
 static struct request plan; /* as it was received: read again after the library was loaded again */
-static enum { NEW, BROKEN, SIMULATED_ALL, FINISHED } condition;
+static enum { NEW, BROKEN, FINISHED } condition;
 static enum reuse reuse;
 static unsigned untrusted; /* ways not to try, as bits */
 static int is_taken, instances, is_known;
@@ -121,16 +121,6 @@ static int is_brought_back(void)
     return 0;
 }
 
-/* End the last simulation, if that was not done. Its trajectory has been told of: FMUs may crash here. */
-void end_simulation(void)
-{
-    if (condition != SIMULATED_ALL)
-        return;
-    condition = BROKEN;
-    ask_each(&fmus, END);
-    condition = FINISHED;
-}
-
 static struct outcome run(double limit, unsigned shares, double *reached)
 {
     struct progress progress = {fmus.header, limit, now() + limit, INFINITY, INFINITY, 0};
@@ -138,7 +128,6 @@ static struct outcome run(double limit, unsigned shares, double *reached)
     if (shares)
         progress.next = progress.share = fmus.stop_time / shares;
     *reached = 0.0;
-    end_simulation();
     if (condition != NEW && !is_brought_back()) {
         failing = renew();
         if (failing)
@@ -158,7 +147,7 @@ static struct outcome run(double limit, unsigned shares, double *reached)
     struct outcome o = simulate_system(&fmus, &progress);
     *reached = progress.header[SIMULATED];
     if (o.where == DONE)
-        condition = SIMULATED_ALL;
+        condition = FINISHED;
     return o;
 }
 

@@ -12,7 +12,6 @@ enum reuse { BY_RESET, BY_STATE, BY_INSTANCE, BY_LIBRARY, BY_PROCESS, UNKNOWN };
 void start_session(struct request *request);
 void prepare_session(struct request request);
 struct outcome simulate_again(double limit, unsigned shares, double *reached);
-void end_simulation(void);
 int awaits_test(void);  /* whether find_reuse must be called next */
 void find_reuse(void (*announce)(const char *way));
 const char *way_to_start(void);

@@ -123,8 +123,9 @@ struct plan {
     const double *parameter_values;
 };
 
-/* Numbers at the start of the shared memory: which component of a system runs, and the time that is simulated. */
-enum header { RUNNING, SIMULATED, HEADER = 8 };
+/* Numbers at the start of the shared memory: which component of a system runs, the time that is simulated, and the
+ * stop time once all outputs are recorded. */
+enum header { RUNNING, SIMULATED, COMPLETE, HEADER = 8 };
 
 #define STEPS_PER_CLOCK_CHECK 100
 

@@ -233,7 +233,7 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
         ("Lag_2", "reset"),
         ("NoReset_2", "instance"),
         ("LyingReset_2", "instance"),
-        ("CrashesAtEnd_2", "process"),
+        ("CrashesAtEnd_2", None),
         ("SavedState_2", "state"),
         ("SavedState_3", "state"),
         ("LyingState_2", "instance"),
@@ -241,7 +241,7 @@ def test_thousands_of_runs_start_from_one_saved_state_in_one_worker(name: str) -
         ("KeepsStatic_2", "library"),
     ],
 )
-def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: str) -> None:
+def test_the_cheapest_way_that_gives_the_same_again_is_found(name: str, reuse: str | None) -> None:
     model = isolated(name)
     signals = {v.name: ramp(1.0) for v in model.info.inputs}
     found, pids = [], set()

@@ -329,5 +329,11 @@ struct outcome simulate_system(struct system *s, struct progress *progress)
 {
     s->progress = progress;
     struct outcome o = initialise_system(s);
-    return o.where == DONE ? step_system(s) : o;
+    if (o.where == DONE)
+        o = step_system(s);
+    if (o.where == DONE) {
+        s->header[COMPLETE] = s->stop_time; /* FMUs may crash or hang from here on */
+        ask_each(s, END);
+    }
+    return o;
 }
