@@ -23,8 +23,7 @@ class Registered:
     summary: str  # one line for ``--help``
     # Extra of this project that installs the package which the engine needs; it has the engine's name.
     extra: str = ""
-    # Whether it chooses control points itself if the space allows it; the others search the fixed
-    # parameterization.
+    # Whether it chooses control points itself if the space allows it; others search the fixed ones.
     is_free: bool = False
     uses_context: bool = False  # whether it tries the levels that context files give
 

@@ -23,8 +23,7 @@ from falsifier.problem.problem import Problem
 
 # Questions in a row without a valid answer after which an LLM is not worth its money.
 _MOST_WITHOUT_ANSWER = 3
-# Characters of a reason in a remark: rejected replies are quoted in it, and what is wrong stands at the
-# beginning.
+# Characters of a reason in a remark: rejected replies are quoted in it, after what is wrong.
 _LONGEST_REASON = 240
 # Of a random change: share of the numbers that change, and its standard deviation as a share of the range.
 _SHARE = 0.3

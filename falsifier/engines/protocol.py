@@ -10,8 +10,7 @@ if TYPE_CHECKING:  # --help of commands lists engines, and needs nothing of thes
     from falsifier.llm.conversation import OnExchange
     from falsifier.llm.messages import Chat
 
-# Origins of candidates that no engine chose: what a search starts from, and what is simulated in place of an
-# answer of a language model.
+# Origins of candidates that no engine chose: what a search starts from, and what stands for an LLM's answer.
 KNOWN = "known"
 RANDOM_CHANGE = "random change"
 

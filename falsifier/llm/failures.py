@@ -23,8 +23,7 @@ _FORMAT = (
     "response_format|json_object|structured output|grammar|schema|json mode|response mime type"
     "|failed to initialize samplers"  # llama.cpp, if it cannot constrain this LLM in this way
 )
-# Some servers parse what the LLM wrote, and fail if it does not have the required form: two versions of
-# llama.cpp, and Groq.
+# Some servers (llama.cpp, Groq) parse what the LLM wrote, and fail if it has not the required form.
 _UNREADABLE = (
     "the model produced output that does not match|failed to parse input at pos"
     "|failed to generate json|failed to validate json"

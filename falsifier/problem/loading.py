@@ -29,8 +29,7 @@ from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_fr
 from falsifier.problem.source import MODEL_FILES, Parameterization, ProblemSource, Target, source_of
 from falsifier.problem.spec import read_spec
 
-# Fingerprints of what this process has loaded: whether a problem was changed since then is seen without
-# loading it once more.
+# Fingerprints of what this process has loaded: a changed problem is seen without loading it once more.
 _LOADED: dict[ProblemSource, str] = {}
 # A formula to begin with.
 _EXAMPLE = "G[0,10] (SIGNAL <= 1)"

@@ -25,8 +25,7 @@ _WIDENING = 0.5
 _FAR = 30.0
 # An input that has hardly varied so far would otherwise become a huge deviation as soon as it does.
 _LEAST_INPUT_UNIT = 0.05
-# Maximum number of rows of a regression, and of products: rows times the square of the features. They limit
-# the time of a fit.
+# Maximum numbers of rows of a regression and of products, rows times features squared: they limit its time.
 _MOST_ROWS, _MOST_PRODUCTS = 3000, 3e7
 # Number of the last predictions whose median error is the recent error.
 _RECENT = 4
@@ -38,8 +37,7 @@ _TRUSTED = 0.5
 class Trace:
     """The trajectory of one simulation on the time grid."""
 
-    # Mean of each input in each cell, and the parameters, scaled to [0, 1], shape (all_cells, inputs +
-    # parameters).
+    # Mean of each input in each cell, and the parameters, in [0, 1], shape (all_cells, inputs + parameters).
     inputs: Array
     states: Array  # outputs at the grid points, shape (all_cells + 1, outputs)
 

@@ -273,8 +273,7 @@ class Surrogate:
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
-            # Where levels lead, going on from the lowest one does what a change would; of parameters,
-            # no time decides.
+            # Where levels lead, they do what a change would; of parameters, no time decides.
             "changes": differs and has_inputs and not lead,
             "region": differs,
             "cma": differs,

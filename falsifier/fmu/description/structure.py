@@ -133,8 +133,7 @@ class Structure:
     """
 
     units: Units  # units that it defines, by name
-    # The inputs on which an output depends directly, by the output's name; an output that is missing here may
-    # depend on all inputs.
+    # The inputs on which an output depends directly, by its name; one that is missing may depend on all.
     inputs_of: Mapping[str, frozenset[str]]
     # The inputs on which an output can depend, directly or through states; likewise.
     reaching: Mapping[str, frozenset[str]]
