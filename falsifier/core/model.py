@@ -243,7 +243,7 @@ class ModelInfo:
         return tuple(v for v in self.with_causality("parameter") if not v.alias_of)
 
 
-# Relative tolerance for one time to be an integer multiple of another: of 1/30 s, rounding leaves no exact one.
+# Relative tolerance for one time to be a multiple of another: rounding leaves no exact multiple of 1/30 s.
 GRID_ROUNDING = 1e-6
 # Largest denominator of times like 1/30 s, which are written with many digits.
 _MAX_DENOMINATOR = 100_000

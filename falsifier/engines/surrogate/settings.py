@@ -10,7 +10,7 @@ class Settings:
     """How the engine opens, learns, plans and chooses who proposes."""
 
     cells: int = CELLS  # number of grid cells over the formula's horizon
-    # Number of constant extremes before the first random program, where a single extreme can violate.
+    # Constant extremes before the first random program, for formulas that a single extreme can violate.
     constants: int = 1
     bangs: int = 2  # number of switching inputs among the first simulations of a formula with nested windows
     pauses: int = 2  # number of constant extremes between these
