@@ -131,7 +131,7 @@ class RobustnessMap:
         failed = len(self.robustness) - len(known)
         end = f" {counted(failed, 'simulation')} failed and counted as no violation." if failed else ""
         end += " Stopped by the user." if self.interrupted else ""
-        if (known == self.original).all():
+        if known.size and (known == self.original).all():
             return f"None of these changes moved the robustness.{end}"
         most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
         named = f"{listed(most)} most" if any(self.influences) else "none of these values"
