@@ -204,7 +204,8 @@ def _report_refusal(error: OSError) -> int:
     if error.errno in _EXHAUSTED:
         warn(f"falsifier: {where}{error.strerror}; {_EXHAUSTED[error.errno]}")
     elif not where:
-        warn(f"falsifier: {error}")
+        gone = "; if the current folder was deleted, change to another" if error.errno == errno.ENOENT else ""
+        warn(f"falsifier: {error}{gone}")
     else:
         warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2

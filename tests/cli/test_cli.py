@@ -92,10 +92,8 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
 def test_a_folder_with_files_is_kept(command: list[str], tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine").write_text("kept")
-    assert (
-        "has files, which are kept: choose another --out"
-        in falsifier(*command, "--out", "out", cwd=tmp_path).err
-    )
+    refused = falsifier(*command, "--out", "out", cwd=tmp_path)
+    assert "has files, which are kept: choose another --out" in refused.err
 
 
 def test_files_whose_names_are_not_utf_8_are_told_before_anything_is_written(tmp_path: Path) -> None:

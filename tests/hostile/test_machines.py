@@ -75,9 +75,15 @@ def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tm
     assert says in said and said.count("\n") == 1
 
 
-@pytest.mark.parametrize("shell", ["2>&-", "<&- >&- 2>&-"])
-def test_simulations_need_no_streams_and_no_folder_for_temporary_files(shell: str, tmp_path: Path) -> None:
-    assert run(tmp_path, shell=shell, TMPDIR=str(tmp_path / "none"))[0] == 0
+@pytest.mark.parametrize(("shell", "tmpdir"), [("2>&-", "."), ("<&- >&- 2>&-", "none")])
+def test_simulations_need_no_streams_and_take_any_tmpdir(shell: str, tmpdir: str, tmp_path: Path) -> None:
+    assert run(tmp_path, shell=shell, TMPDIR=tmpdir)[0] == 0
+
+
+def test_a_current_folder_that_was_deleted_is_told(tmp_path: Path) -> None:
+    (tmp_path / "gone").mkdir()
+    code, said = run(tmp_path / "gone", ["run", "AT1"], before=(tmp_path / "gone").rmdir)
+    assert (code, "if the current folder was deleted, change to another" in said) == (3, True)
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ class WorkFolder:
     """A folder in the system's temporary folder, with a lock beside it that says that its owner is alive."""
 
     def __init__(self) -> None:
-        self.path = Path(tempfile.gettempdir()) / f"{_PREFIX}{uuid4().hex}"
+        self.path = Path(tempfile.gettempdir()).absolute() / f"{_PREFIX}{uuid4().hex}"
         # Locked before the folder exists: a folder whose lock is free has lost its owner.
         self._lock = posix_files.lock_file(_lock_of(self.path))
         self.path.mkdir(mode=0o700)
