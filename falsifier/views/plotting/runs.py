@@ -39,7 +39,8 @@ def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
     for run in runs:
         ax.plot(*thinned(run.robustness, _MOST_DRAWN), ".", color=EACH, markersize=4, label="robustness")
         numbers, smallest = improvements(run.robustness)
-        until = (np.append(numbers, len(run.robustness)), np.append(smallest, smallest[-1:]))
+        last = smallest[-1:]  # until the end; none if no simulation was judged
+        until = (np.append(numbers, np.full(len(last), len(run.robustness))), np.append(smallest, last))
         ax.step(*until, where="post", color=OUTPUT, linewidth=1.4, label="smallest so far")
         if run.counterexample is not None:
             found = run.counterexample

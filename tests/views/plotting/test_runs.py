@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path)
     assert xs(lines["counterexample"]).tolist() == [len(recorded)]
     assert ys(lines["counterexample"]).tolist() == [recorded[-1].robustness]
     assert figure.axes[0].get_title() == "HARD: uniform"
+    assert plot_history(replace(found, _robustness=[np.nan], counterexample=None)).axes, "nothing was judged"
 
 
 def test_rates_end_at_the_share_of_falsified_runs(campaign: Path) -> None:
