@@ -1,6 +1,5 @@
 """``falsifier bench`` and ``falsifier watch``."""
 
-import shlex
 import shutil
 import sys
 import time
@@ -25,7 +24,7 @@ from falsifier.campaigns import (
 )
 from falsifier.campaigns.analysis import load, not_begun, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
-from falsifier.campaigns.directory import check_new, is_campaign
+from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.request import Method, Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
@@ -33,10 +32,11 @@ from falsifier.cli import llm_options, options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import FAILED, conclude, say
 from falsifier.core.files import write_whole
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shell_word
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.record.journal import check_new
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import LLM_ENGINES, price_of
@@ -190,7 +190,7 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
         say(run_line(replace(run, status="interrupted") if run.status == "running" else run))
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
-        say(f"stopped; to continue: falsifier resume {shlex.quote(str(directory))}")
+        say(f"stopped; to continue: falsifier resume {shell_word(directory)}")
 
 
 def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:
@@ -211,7 +211,7 @@ def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) 
             write_whole(directory / f"table-{name}.csv", made.csv())
     data = statistics_json(runs)
     write_whole(directory / "table.json", data)
-    again = f"falsifier resume {shlex.quote(str(directory))}"
+    again = f"falsifier resume {shell_word(directory)}"
     if outcome.reason:
         warn(f"stopped: {outcome.reason}; to continue: {again}")
     failed = outcome.progress.counts["failed"]

@@ -1,6 +1,5 @@
 """``falsifier info`` and ``falsifier init``: what an FMU holds, and a spec for it."""
 
-import shlex
 from contextlib import closing
 from dataclasses import asdict, replace
 from math import isinf
@@ -19,6 +18,7 @@ from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
+from falsifier.core.words import shell_word
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.fmu import is_package, read_package, rights_text
 from falsifier.problem.grid import choose_grid
@@ -89,7 +89,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     from falsifier.problem.writing import problem_of_starter
 
     if spec := next((f for f in fmus if f.suffix == ".toml"), None):
-        command = f"falsifier check {shlex.quote(str(spec))}"
+        command = f"falsifier check {shell_word(spec)}"
         raise SpecError(f"{spec} is a spec, not an FMU; to check it: {command}")
     for nameless in (f for f in fmus if not f.name):  # "." and "/", beside which no spec can be named
         _existing_fmu(nameless)
@@ -100,7 +100,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
     text = _starter(fmus, path)
     problem_of_starter(text, path)
     path.write_text(text, encoding="utf-8")
-    command = f"falsifier run {shlex.quote(str(path))}"
+    command = f"falsifier run {shell_word(path)}"
     say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 
 

@@ -1,6 +1,5 @@
 """``falsifier check`` and ``falsifier formalize``: what requirements say, before anything is searched."""
 
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,7 @@ from falsifier.cli.llm_options import connection_options, llm_option, llm_settin
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted, parameterization_text, readable
+from falsifier.core.words import counted, parameterization_text, readable, shell_word
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
@@ -111,7 +110,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
         say("to write one of them into the spec, repeat the command with --choose N")
     else:
         file, name = _write(found, choose, out)
-        say(f"{file}: requirement {name} written; to search: falsifier run {shlex.quote(f'{file}:{name}')}")
+        say(f"{file}: requirement {name} written; to search: falsifier run {shell_word(f'{file}:{name}')}")
 
 
 def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str]:

@@ -1,6 +1,5 @@
 """What is known of a run or file: a counterexample, the nearest miss, or inputs to start a search from."""
 
-import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 from falsifier.core.arguments import utf_8
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import Fitted, fit
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shell_word
 from falsifier.counterexamples import store
 from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.engines.protocol import KNOWN
@@ -179,7 +178,7 @@ def nearest_miss(directory: Path, name: str) -> Case:
     judged = _judged(directory, name)
     misses = [(robustness, candidate) for robustness, candidate in judged if robustness >= 0]
     if not judged:
-        place = shlex.quote(str(directory))
+        place = shell_word(directory)
         why = f"no simulation of this run could be judged by {name}; falsifier coverage {place} says why"
         empty = f"its journal contains no simulation; to simulate: falsifier resume {place}"
         raise SpecError(f"{directory}: {why if simulated(directory) else empty}")
@@ -238,10 +237,8 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
     if not holds_run(place):
         if not place.is_dir() and place.suffix.lower() != ".json":
             found = "" if place.exists() else "no such file; "
-            raise SpecError(
-                f"{place}: {found}expected a CSV file of inputs (u.csv), a counterexample.json or a run "
-                "directory"
-            )
+            expected = "a CSV file of inputs (u.csv), a counterexample.json or a run directory"
+            raise SpecError(f"{place}: {found}expected {expected}")
         return Candidate.from_json(store.load_counterexample(place).candidate)
     names = manifest.read(place).names
     judged = _judged(place, requirement if requirement in names else names[0])

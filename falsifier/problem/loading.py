@@ -5,7 +5,6 @@
     problem = load_problem("specs/AT.toml:AT1", profile="instance2")
 """
 
-import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -19,6 +18,7 @@ from falsifier.core.arguments import texts
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line
 from falsifier.core.model import Interface
+from falsifier.core.words import shell_word
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, written
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
@@ -75,8 +75,8 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         raise SpecError(
             f"{target} is a folder; give a spec file, an FMU or a bundled name. If it holds a run: "
             + written(
-                f"falsifier resume {shlex.quote(target)} continues it, falsifier llm prompt "
-                f"{shlex.quote(target)} --at N prints what was asked before sample N",
+                f"falsifier resume {shell_word(target)} continues it, falsifier llm prompt "
+                f"{shell_word(target)} --at N prints what was asked before sample N",
                 f"resume({target!r}) continues it",
             )
         )
@@ -216,7 +216,7 @@ def reloadable(problem: Problem) -> ProblemSource | None:
 def _stating(fmu: str) -> str:
     """Say how to state a requirement of an FMU."""
     add = written(f"add --stl '{_EXAMPLE}'", f"use load_problem({fmu!r}, stl={_EXAMPLE!r})")
-    return f"{add}, or write a spec with `falsifier init {shlex.quote(fmu)}`"
+    return f"{add}, or write a spec with `falsifier init {shell_word(fmu)}`"
 
 
 def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
@@ -242,7 +242,7 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
         requirement, *others = spec.requirements
         target, names = source.target.rstrip(":"), ", ".join(spec.requirements)
         if others and stated is None:
-            every = written(f"falsifier run {target}", f"falsify(load_problems({target!r}))")
+            every = written(f"falsifier run {shell_word(target)}", f"falsify(load_problems({target!r}))")
             raise SpecError(
                 f"has {len(spec.requirements)} requirements; name one of them, for example "
                 f"{target}:{requirement}; {every} searches all of them. Known: {names}",

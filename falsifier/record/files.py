@@ -112,9 +112,8 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         left = [
             _index(other) for other in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, other.name)
         ]
-        if isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path):
-            return None
-        _tell_lost(path, error.strerror or "it cannot be read")
+        if not (isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path)):
+            _tell_lost(path, error.strerror or "it cannot be read")
         return None
     if is_intact(path, content):
         return Trajectory.load(BytesIO(content))

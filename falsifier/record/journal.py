@@ -16,7 +16,6 @@ checksum: damage is noticed. ``manifest`` and ``files`` have the other files; ``
 
 import os
 import re
-import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -27,8 +26,8 @@ from time import monotonic
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
-from falsifier.core.words import counted
-from falsifier.errors import JournalError
+from falsifier.core.words import counted, shell_word
+from falsifier.errors import JournalError, written
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record import files, manifest
 from falsifier.record.records import (
@@ -196,6 +195,22 @@ def holds_run(directory: Path) -> bool:
         return (directory / manifest.MANIFEST).exists()
 
 
+def check_new(directory: Path, resume: str = "") -> None:
+    """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has.
+
+    ``resume`` is what continues a run there; empty: the usual command or call.
+    """
+    is_campaign = (directory / files.CAMPAIGN).exists()
+    if is_campaign or holds_run(directory):
+        what, function = ("campaign", "resume_campaign") if is_campaign else ("run", "resume")
+        usual = written(f"falsifier resume {shell_word(directory)}", f"{function}({str(directory)!r})")
+        raise JournalError(
+            f"{directory} already contains a {what}: choose another directory, or to continue it: "
+            + (usual if is_campaign or not resume else resume)
+        )
+    files.check_unused(directory)
+
+
 def simulated(directory: Path) -> int:
     """Number of simulations that the journal of a run directory contains."""
     return sum(isinstance(record, EvaluatedRecord) for record in read_journal(directory))
@@ -245,7 +260,7 @@ class JournalReader:
                 except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
-                        f"falsifier tools repair {shlex.quote(str(self.path.parent))}"
+                        f"falsifier tools repair {shell_word(self.path.parent)}"
                     ) from error
                 self.line, self.offset = number, self.offset + len(line)
                 yield record

@@ -3,10 +3,9 @@
 Prompts are folded; nothing needs a script.
 """
 
-import shlex
 from pathlib import Path
 
-from falsifier.core.words import counted, in_one_line
+from falsifier.core.words import counted, in_one_line, shell_word
 from falsifier.llm.messages import Exchange, Message
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, iterations
@@ -27,7 +26,7 @@ def exchanges_html(directory: Path, requirement: str, *, most: int) -> Html:
         before = one.exchanges[-1].messages
     if len(asked) > len(parts):
         said = "Earlier questions are not shown; the last one before sample N: "
-        command = el("code", f"falsifier llm prompt {shlex.quote(str(directory))} --at N")
+        command = el("code", f"falsifier llm prompt {shell_word(directory)} --at N")
         parts.insert(0, el("p", said, command, class_="note"))
     return join(*parts)
 

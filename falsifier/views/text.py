@@ -1,6 +1,5 @@
 """The result of a run as text or JSON."""
 
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +9,7 @@ from falsifier.analyses.assess import Assurance
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_facts, counted, readable
+from falsifier.core.words import candidate_facts, counted, readable, shell_word
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -34,7 +33,7 @@ def result_text(result: Result) -> str:
     head = f"{result.problem.name}: {result.status} after {result.spent.simulations_text}"
     head += f"{untested(result.findings)} ({seconds_text(result.spent)})"
     lines = [head, *fact_lines(result_facts(result))]
-    place = shlex.quote(str(result.directory))
+    place = shell_word(result.directory)
     if result.directory is not None and result.directory.is_dir():
         lines.append(f"  files          {result.directory}")
         lines += [f"  picture        {picture}" for picture in _pictures(result)]
@@ -230,7 +229,7 @@ def _can_continue(result: Result) -> bool:
 def _continue_line(directory: Path) -> str:
     if not directory.is_dir():
         return f"{directory} was moved or deleted; if it was moved, to continue: falsifier resume NEW_PLACE"
-    return f"to continue: falsifier resume {shlex.quote(str(directory))}"
+    return f"to continue: falsifier resume {shell_word(directory)}"
 
 
 def _pictures(result: Result) -> list[Path]:

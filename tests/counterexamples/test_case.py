@@ -18,10 +18,8 @@ def test_the_nearest_miss_has_the_smallest_robustness_of_the_run(tmp_path: Path)
     found = case_of(tmp_path)
     assert result.best is not None
     assert found.candidate.key == result.best.candidate.key
-    assert (
-        f"in 5 simulations; this is about the nearest miss, with robustness {result.best.robustness:+.6g}"
-        in (found.text)
-    )
+    about = f"in 5 simulations; this is about the nearest miss, with robustness {result.best.robustness:+.6g}"
+    assert about in found.text
     assert found.simulated(impossible()).robustness == result.best.robustness
     assert (found.place, found.file) == (tmp_path, tmp_path / "counterexample.json")
 
@@ -54,9 +52,8 @@ def test_of_several_requirements_one_is_named(tmp_path: Path) -> None:
 
 
 def test_several_without_a_counterexample_must_be_chosen_from(tmp_path: Path) -> None:
-    falsify(
-        [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")], "corners", budget=2, directory=tmp_path
-    )
+    problems = [impossible(), lag_problem("G[0,10] (x <= 3)", name="FAR")]
+    falsify(problems, "corners", budget=2, directory=tmp_path)
     with pytest.raises(JournalError, match="searched NEVER, FAR; choose one: requirement=NAME"):
         case_of(tmp_path)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from falsifier.core.model import Interface
+from falsifier.core.words import shell_word
 from falsifier.errors import ModelError
 from falsifier.fmu.description import archive
 
@@ -114,7 +115,7 @@ def _missing_text(
         text += "".join(f"; {reason}" for reason in _reasons(here, others))
     if any(map(_is_source, names)):
         wine = " to run without Wine" if needs_wine else ""
-        text += f"; it contains C sources: compile them with `falsifier tools build {fmu}`{wine}"
+        text += f"; it contains C sources: compile them with `falsifier tools build {shell_word(fmu)}`{wine}"
     elif not needs_wine:
         wine = " or for 64-bit Windows" if "x86-windows" in others and can_run_windows() else ""
         text += f"; export it again for this platform{wine}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.files import file_name
-from falsifier.core.words import counted
+from falsifier.core.words import counted, shell_word
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
@@ -246,8 +246,8 @@ def _questions(section: Section, most: int) -> str:
         join(el("h4", run_name(run)), exchanges_html(run.directory, run.requirement, most=most))
         for run in asked[:_MOST_TALKS]
     ]
-    rest = "".join(f" {run_name(run)}: falsifier report {run.directory}." for run in asked[_MOST_TALKS:])
-    note = el("p", f"Not shown here:{rest}", class_="note") if rest else ""
+    rest = [f"{run_name(run)}: falsifier report {shell_word(run.directory)}." for run in asked[_MOST_TALKS:]]
+    note = el("p", " ".join(["Not shown here:", *rest]), class_="note") if rest else ""
     return join(el("h3", "What was asked, and what came of it"), *parts, note)
 
 
