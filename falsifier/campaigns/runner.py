@@ -134,7 +134,7 @@ def _work(
         place = run_directory(directory, task.name)
         if failure:
             _record_failure(place, task, failure)
-        keep_recorded(place)
+        keep_recorded(place, begun_here=True)
 
     requests = record.request.named()
     tasks, hashes = [], {source: manifest.file_hashes(problem) for source, problem in problems.items()}
@@ -144,7 +144,7 @@ def _work(
             source = request.problems[0]
             tasks.append(RunTask(run.name, request, problems[source], hashes[source], directory.absolute()))
         elif run.falsified:  # its counterexample is missing if the process was killed just after it ended
-            keep_recorded(run_directory(directory, run.name))
+            keep_recorded(run_directory(directory, run.name), begun_here=True)
     with open_workers(jobs) as workers:
         schedule = Schedule(tasks, workers)
         try:

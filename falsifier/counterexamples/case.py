@@ -68,13 +68,15 @@ class Case:
             The problem, and the rights that the spec gives now but did not give then, which are withheld.
 
         Raises:
-            SpecError: if it was made in Python, or can no longer be loaded.
+            SpecError: if it was made in Python, or cannot be loaded any more; JournalError: its file is gone.
         """
         if self.source is None:
             raise SpecError(
                 f"{self.place}: the problem was made in Python: run the script or test that found this, or "
                 "call simulate() and explain() there"
             )
+        remedy = "put it there, or correct problem.target in this file and delete its last key, sum"
+        manifest.check_in_sight(self.place, [self.source], remedy)
         problem = load_source(self.source)
         model = problem.model
         if not isinstance(model, FmuModel | System):

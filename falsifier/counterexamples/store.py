@@ -204,11 +204,8 @@ def counterexample_file(path: Path) -> Path:
     if not holds_run(path):
         manifest.check_no_folder(path)
         raise SpecError(f"not a run directory; {expected}", file=str(path))
-    raise SpecError(
-        f"contains no confirmed counterexample; {expected}"
-        + written(". falsifier explain also takes a run that found none", ""),
-        file=str(path),
-    )
+    also = written(". falsifier explain also takes a run that found none", "")
+    raise SpecError(f"contains no confirmed counterexample; {expected}{also}", file=str(path))
 
 
 def file_of(requirement: str, *, shared: bool) -> str:
@@ -233,13 +230,14 @@ def beside(counterexample: Path, name: str) -> Path:
     return counterexample.with_name(f"{place.stem}{which}{place.suffix}")
 
 
-def keep_recorded(directory: Path) -> None:
+def keep_recorded(directory: Path, *, begun_here: bool = False) -> None:
     """Write the files of counterexamples that are only in a run directory's journal.
 
     Runs that were killed, and runs of a campaign, leave only a journal. Without a run, nothing is done.
+    ``begun_here``: the current folder is the one in which the run began, to which its paths are relative.
 
     Raises:
-        JournalError: if what was confirmed is not recorded as a violation.
+        JournalError: if what was confirmed is not recorded as a violation, or paths lead nowhere from here.
     """
     if not holds_run(directory):
         return
@@ -251,6 +249,8 @@ def keep_recorded(directory: Path) -> None:
         if file.exists():
             continue
         alone = described.of(record.requirement)
+        if not begun_here:
+            manifest.check_in_sight(directory, alone.request.problems)
         evaluations = recorded_evaluations(directory, records, record.requirement, with_trajectories=False)
         evaluation = evaluations.get(record.index)
         if evaluation is None or not evaluation.violated:

@@ -27,6 +27,8 @@ from falsifier.search.parameterization import engine_parameterization, parameter
 from falsifier.search.request import RunRequest, Strict
 
 MANIFEST = "manifest.json"
+# What to do where a run's files, whose paths are relative, are not seen.
+_GO_THERE = "change to the folder in which it was started, and name its directory from there"
 # Runs of a folder that are named where one of them is expected.
 _NAMED = 3
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
@@ -163,14 +165,11 @@ def check_no_folder(directory: Path) -> None:
         raise JournalError(f"{directory} is a folder of runs; give one of them: {some}{more}")
 
 
-def check_in_sight(directory: Path, sources: Iterable[ProblemSource]) -> None:
-    """Check that the files of recorded problems exist; JournalError saying where they are relative to."""
-    for source in sources:
-        if source.parts.file and not Path(source.parts.file).exists():
-            raise JournalError(
-                f"{directory}: started with {source.parts.file}, which does not exist seen from this folder: "
-                "change to the folder in which it was started, and name its directory from there"
-            )
+def check_in_sight(place: Path, sources: Iterable[ProblemSource], remedy: str = _GO_THERE) -> None:
+    """Check that the files of recorded problems exist; JournalError saying what to do otherwise."""
+    for file in (source.parts.file for source in sources):
+        if file and not Path(file).exists():
+            raise JournalError(f"{place}: made with {file}, which is not seen from this folder: {remedy}")
 
 
 def write(directory: Path, manifest: Manifest) -> None:

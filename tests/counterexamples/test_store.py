@@ -135,16 +135,21 @@ def test_what_is_not_there_is_said(tmp_path: Path) -> None:
         load_counterexample(tmp_path / "gone.json")
 
 
-def test_a_run_without_the_file_is_read_from_its_journal(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_without_it_is_read_from_its_journal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     result = falsify("my.toml:R", "corners", budget=5, directory="run")
     assert result.counterexample is not None
+    monkeypatch.chdir("run")
+    with pytest.raises(JournalError, match=r"my\.toml, which is not seen from this folder"):
+        load_counterexample(Path("../run"))
+    monkeypatch.chdir(folder)
     stored = load_counterexample(Path("run"))
     assert stored.robustness == result.counterexample.evaluation.robustness
     assert replay(stored, load_problem("my.toml:R")).text.count("changed") == 0
     assert json.loads(Path("run/counterexample.json").read_text())["problem"]["target"] == "../my.toml:R"
+    Path("my.toml").rename("moved.toml")
+    with pytest.raises(JournalError, match=r"my\.toml, which .* or correct problem\.target"):
+        counterexample_case(Path("run")).problem()
 
 
 def test_a_journal_that_confirms_what_it_does_not_record_as_a_violation_is_named(tmp_path: Path) -> None:
@@ -161,9 +166,8 @@ def test_a_journal_that_confirms_what_it_does_not_record_as_a_violation_is_named
         )
         journal.write(lost)
         line = len(journal.records) + 1
-    with pytest.raises(
-        JournalError, match=rf"journal\.jsonl: line {line} confirms .* NEVER, but simulation 3 "
-    ):
+    named = rf"journal\.jsonl: line {line} confirms .* NEVER, but simulation 3 "
+    with pytest.raises(JournalError, match=named):
         load_counterexample(tmp_path)
 
 
