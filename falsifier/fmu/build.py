@@ -32,7 +32,7 @@ def compile_sources(path: Path, out: Path) -> Path:
     """
     description = read_description(path)
     with tempfile.TemporaryDirectory(prefix="falsifier-build-") as name:
-        folder = Path(name)
+        folder = Path(name).absolute()  # TMPDIR may be relative, and compilers run elsewhere
         extract(path, folder)
         for identifier in sorted(set(description.identifiers.values())):
             target = folder / library_file(description.info.fmi_version, identifier, this_platform())
