@@ -15,12 +15,12 @@ from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.core.literals import one_line
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import JournalError, SpecError
-from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.questions import doubtful_confirmations
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -55,9 +55,9 @@ def assess(
         if not quiet and count % _SAID_EVERY == 0:
             warn(f"simulation {count} of at most {budget}")
 
-    problem, searched = _loaded(given, requirement)
+    problem, search = _loaded(given, requirement)
     with closing(problem.model):
-        found = assess_problem(problem, budget=budget, seed=seed, searched=searched, progress=said)
+        found = assess_problem(problem, budget=budget, seed=seed, progress=said, **search)
     content = assurance_json(found) | {"budget": budget, "seed": seed}
     lines = [f"{problem.name}: {problem.requirement.formula}"]
     lines += [f"  {line}" for line in found.text.splitlines()]
@@ -115,13 +115,13 @@ def margin(
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
-def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
-    """Load the problem of a target, or of a run that has not changed since, with what that evaluated."""
+def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, dict[str, Any]]:
+    """Load the problem of a target, or of a run that has not changed since, with what that found."""
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)
         try:
-            return load_source(options.problem_source(given)), []
+            return load_source(options.problem_source(given)), {}
         except SpecError:
             if not place.is_dir():
                 raise
@@ -149,8 +149,10 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, li
     problem = load_source(source)
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
     manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
-    evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
-    return problem, list(evaluations.values())
+    records = read_journal(place)
+    evaluations = recorded_evaluations(place, records, problem.name, with_trajectories=False)
+    doubtful = doubtful_confirmations(problem, records, evaluations)
+    return problem, {"searched": list(evaluations.values()), "doubtful": doubtful}
 
 
 def _between(text: str) -> tuple[float, float]:

@@ -52,6 +52,9 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     assert done.json["searched"]["simulations"] == 5 and 0.99 < done.json["searched"]["smallest"] < 1.01
     refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
     assert refused.code == 2 and "drop --stl" in refused.err
+    falsify("python:tests.stepped:euler_problem", "corners", budget=2, directory=tmp_path / "fragile")
+    doubted = falsifier("assess", "fragile", "--budget", "5", "--quiet", cwd=tmp_path)
+    assert " (1 violation, not confirmed)." in doubted.out
 
 
 def test_a_run_of_several_requirements_asks_which_one_is_assessed(tmp_path: Path) -> None:
