@@ -28,8 +28,8 @@ _UNREADABLE = (
     "the model produced output that does not match|failed to parse input at pos"
     "|failed to generate json|failed to validate json"
 )
-# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq.
-_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|reduce the length of"
+# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq. A pool is what others use up.
+_CONTEXT = "context[ _]?(window|size|length)(?! pool)|maximum model length|too long to fit|reduce the length"
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
@@ -149,8 +149,8 @@ def classify(
         "longer": _LONGER if api_base is not None or provider.local else "",
         "detail": _detail(text, status),
     }
-    if status == 429 and (found := _WAIT.search(text)):
-        # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
+    # Gemini calls a limit per minute an exceeded quota, too, and tells a wait even if a day's is used up.
+    if status == 429 and "PerDay" not in text and (found := _WAIT.search(text)):
         hours, minutes, number, milli = found.groups(default="0")
         spoken = 3600 * int(hours) + 60 * int(minutes) + float(number) / (1000 if milli == "m" else 1)
         return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)

@@ -191,11 +191,13 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
         "prompt_tokens_details": {"cached_tokens": 64},
     }
     counts["completion_tokens_details"] = {"reasoning_tokens": 12}
-    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts)
+    ended = "model_context_window_exceeded"
+    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
     with serving(answer, refusal) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         first, second = chat.send(REQUEST), chat.send(REQUEST)
     assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
+    assert first.finish_reason == "length", "it was cut off"
     assert (first.usage.cached_tokens, (first.usage + first.usage).cached_tokens) == (64, 128)
     assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
     assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
