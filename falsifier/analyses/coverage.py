@@ -215,7 +215,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     times = np.linspace(0.0, stop_time, _SAMPLES)
     ranges = []
     for r in described.inputs:
-        signals = [c.signals[r.name] for c in candidates]
+        signals = [c.signals[r.name].stepped(stop_time) for c in candidates]
         paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
         # Also what is held only between two of these times; if sampled and held, from the next sampling on.
         most = max((len(s.times) for s in signals), default=0)
@@ -266,7 +266,7 @@ class _Seen:
     """What the system did, simulation by simulation: outputs, modes and their changes."""
 
     def __init__(self, described: Manifest) -> None:
-        self.trajectories = 0
+        self.trajectories, self.stop_time = 0, described.stop_time
         self.outputs: dict[str, OutputCoverage] = {}
         self.inputs = {r.name for r in described.inputs}
         discrete = [r for r in (*described.inputs, *described.parameters) if r.kind != "real"]
@@ -280,7 +280,7 @@ class _Seen:
     def give(self, candidate: Candidate) -> None:
         """Add the modes that one simulation was given."""
         for name, signal in candidate.signals.items():
-            self._add(name, signal.stepped.values)
+            self._add(name, signal.stepped(self.stop_time).values)
         for name, value in candidate.parameters.items():
             self._add(name, (value,))
 
