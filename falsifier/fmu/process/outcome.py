@@ -1,6 +1,5 @@
 """What a worker's replies, and its end, mean in words."""
 
-import re
 from collections.abc import Mapping, Sequence
 
 from falsifier.core.words import readable
@@ -101,11 +100,10 @@ def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> Si
     )
 
 
-def crash(plan: Plan, reached: float, reason: str, log: tuple[str, ...]) -> SimulationError:
+def crash(plan: Plan, reached: float, what: str, details: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation that its process did not survive."""
     at, time = _reached(plan, reached)
-    how = re.split("[:;] ", reason)[0]
-    text = f"{plan.model}: {how}{at}{reason.removeprefix(how)}{last_lines(log)}"
+    text = f"{plan.model}: {what}{at}{details}{last_lines(log)}"
     return SimulationError(text, status="crashed", time=time, log=log)
 
 
