@@ -93,14 +93,14 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT, margin as find_margin
+    from falsifier.analyses.margin import LIMIT, margin as find_margin, stated_at
 
     low, high = _between(between)
     if stl is None or LIMIT not in stl:
         raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(given["target"]).kind != "python"
-    requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None}
+    requirement = {"stl": stated_at(stl, low) if made_here else None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:

@@ -78,6 +78,12 @@ def test_templates_are_taken_like_formulas() -> None:
     assert found.falsified is not None and found.falsified <= 1.0
 
 
+def test_a_threshold_below_zero_keeps_its_sign_in_a_power() -> None:
+    found = margin(system(), "x <= {limit} ^2", (-3, -0.1), engine="corners", budget=60)
+    assert found.falsified is not None and found.unfalsified is not None
+    assert found.unfalsified <= -1 <= found.falsified
+
+
 def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
     """One search in vain at the end finds the threshold: no simulation is needed below what was reached."""
     found = margin(system(), "G[0,10] (x <= {limit})", (-3, 3), engine="corners", budget=60)
