@@ -216,18 +216,17 @@ def _value(option: str) -> tuple[str, float | str]:
     if not name or not said:
         raise SpecError(f"--set {option}: expected NAME=VALUE, for example --set mass=1200")
     number = number_in(said)
-    if number is not None and not isfinite(number):
-        raise SpecError(f"--set {option}: expected a finite number")
     # Of a string, the text counts: 007.
     return name, said if number is None or shortest(number) != said else number
 
 
 def number_in(said: float | str) -> float | None:
-    """Return the number that somebody gave, or whose text somebody typed; None for other texts."""
+    """Return the finite number that somebody gave, or whose text somebody typed; None for other texts."""
     try:
-        return float(said)
+        number = float(said)
     except ValueError:
         return None
+    return number if isfinite(number) else None
 
 
 def _range(option: str) -> tuple[str, InputChoice]:

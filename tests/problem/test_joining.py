@@ -265,7 +265,11 @@ def test_strings_are_no_numbers() -> None:
 
 def test_a_string_keeps_the_text_that_was_typed_and_a_number_may_be_typed_in_any_form() -> None:
     variables = Variable("label", "string", "parameter", settable=True), Variable("mass", settable=True)
-    changes = changes_from_options(values=["label=007", "mass=1.50e3"])
-    found = placed(changes, ModelInfo("m", variables=variables)).parameters
+    changes, info = (
+        changes_from_options(values=["label=007", "mass=1.50e3"]),
+        ModelInfo("m", variables=variables),
+    )
+    assert placed(changes_from_options(values=["label=nan"]), info).parameters["label"].value == "nan"
+    found = placed(changes, info).parameters
     assert (found["label"].value, found["mass"].value) == ("007", 1500.0)
     assert options_from(changes) == [("--set", "label=007"), ("--set", "mass=1.50e3")]
