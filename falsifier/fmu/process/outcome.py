@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from falsifier.core.words import readable
 from falsifier.errors import FalsifierError, ModelError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
-from falsifier.fmu.process.network import Network
+from falsifier.fmu.process.network import Member, Network
 from falsifier.fmu.process.plan import Plan
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal")
@@ -59,7 +59,8 @@ def failure(
     A worker may reply anything. The refusals, of what FMUs tried and may not, end the message.
     """
     component = "" if reply.where in _OF_ALL else network.stepped(reply.component)
-    words = reply.text.split()
+    words, member = reply.text.split(), network.members[_member(network, reply)]
+    step = member.step or plan.times[1] / plan.every
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
     text = _TEXTS.get(reply.where, _EVENT)
@@ -70,8 +71,8 @@ def failure(
         returned=f"returned {_status_name(reply.status)}",
         reached=f"t = {readable(reply.time)} s",
         stop=f"{readable(plan.stop_time)} s",
-        step=f"{plan.times[1] / plan.every:.6g}",
-        remedy=_other_step(network, reply, plan.times[1] / plan.every),
+        step=f"{step:.6g}",
+        remedy=_other_step(member, step),
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),
@@ -122,10 +123,11 @@ def last_lines(log: tuple[str, ...]) -> str:
     return f"; its last message: {lines[0]}" if lines else ""
 
 
-def _other_step(network: Network, reply: Reply, step: float) -> str:
-    """Say which communication step to state for an FMU that refuses the one that it was asked for."""
+def _other_step(member: Member, step: float) -> str:
+    """Say which step to state for an FMU that refuses the one that it was asked for."""
     option = written("--output-interval, or as step_size in a spec", "step_size")
-    internal = network.members[_member(network, reply)].description.info.internal_step
+    option = f"components.{member.name}.step" if member.step else option
+    internal = member.description.info.internal_step
     if internal is None or abs(step / internal - max(1, round(step / internal))) < 1e-9:
         return f"an FMU of one step only needs it as {option}"
     return (

@@ -1,6 +1,7 @@
 """What is checked of a system before anything is simulated: every error names both ends."""
 
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -191,6 +192,9 @@ def test_nonsense_is_no_defect(where: int, text: str, component: int) -> None:
 def test_a_refused_first_step_tells_its_size() -> None:
     error = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", ())
     assert "the first step, of " in str(error) and "needs it as step_size" in str(error)
+    slow = replace(MODEL.network, members=tuple(replace(m, step=0.5) for m in MODEL.network.members))
+    told = failure(slow, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", ())
+    assert re.search(r"the first step, of 0.5 s, .* needs it as components\.\w+\.step", str(told))
     later = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.5, component=0), "", ())
     assert "the step returned error at t = 0.5 s" in str(later)
     pending = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 5, time=0.0, component=0), "", ())
