@@ -2,7 +2,6 @@
 
 from contextlib import closing
 from dataclasses import asdict
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from click.core import ParameterSource
 from falsifier.cli import options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
-from falsifier.core.literals import one_line
+from falsifier.core.literals import number_in, one_line
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_source
@@ -67,7 +66,7 @@ def assess(
 
 @command()
 @options.problem_options
-@options.stl_option("Formula or template with {limit} in place of a threshold.")
+@options.stl_option("Formula or template with {limit} in place of a threshold.", required=True)
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
 @options.budget_option(least=20, note=" of all searches together")
@@ -76,7 +75,7 @@ def assess(
 @options.json_option
 def margin(
     *,
-    stl: str | None,
+    stl: str,
     between: str,
     engine: str,
     budget: int,
@@ -93,11 +92,9 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT, margin as find_margin, stated_at
+    from falsifier.analyses.margin import margin as find_margin, stated_at
 
     low, high = _between(between)
-    if stl is None or LIMIT not in stl:
-        raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(given["target"]).kind != "python"
     requirement = {"stl": stated_at(stl, low) if made_here else None}
@@ -156,10 +153,7 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
 
 
 def _between(text: str) -> tuple[float, float]:
-    try:
-        low, high = map(float, text.split(":"))
-        if -inf < low < high < inf:
+    match [number_in(end) for end in text.split(":")]:
+        case [float(low), float(high)] if low < high:
             return low, high
-    except ValueError:
-        pass
     raise click.UsageError(f"--between {text}: expected LOW:HIGH with LOW < HIGH, for example 100:160")

@@ -5,11 +5,10 @@ import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from math import isfinite
 from typing import Any
 from urllib.parse import urlsplit
 
-from falsifier.core.literals import printable
+from falsifier.core.literals import number_in, printable
 from falsifier.core.secrets import redact, redact_held, without_credentials
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
@@ -211,14 +210,12 @@ def _retry_after(error: Exception) -> float | None:
 
 
 def _seconds_until(stated: str, headers: Mapping[str, Any]) -> float | None:
+    if (seconds := number_in(stated)) is not None:
+        return seconds
     try:
-        seconds = float(stated)
-    except ValueError:
-        try:
-            until = parsedate_to_datetime(stated)
-            # By the server's own clock, which may differ from this machine's.
-            now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
-            seconds = (until - now).total_seconds()
-        except (TypeError, ValueError, OverflowError):
-            return None
-    return seconds if isfinite(seconds) else None
+        until = parsedate_to_datetime(stated)
+        # By the server's own clock, which may differ from this machine's.
+        now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
+        return (until - now).total_seconds()
+    except (TypeError, ValueError, OverflowError):
+        return None

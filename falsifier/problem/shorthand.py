@@ -3,14 +3,13 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
-from falsifier.core.literals import shortest
+from falsifier.core.literals import number_in, shortest
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
@@ -218,15 +217,6 @@ def _value(option: str) -> tuple[str, float | str]:
     number = number_in(said)
     # Of a string, the text counts: 007.
     return name, said if number is None or shortest(number) != said else number
-
-
-def number_in(said: float | str) -> float | None:
-    """Return the finite number that somebody gave, or whose text somebody typed; None for other texts."""
-    try:
-        number = float(said)
-    except ValueError:
-        return None
-    return number if isfinite(number) else None
 
 
 def _range(option: str) -> tuple[str, InputChoice]:

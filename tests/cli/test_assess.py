@@ -34,7 +34,7 @@ def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
 def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
     for wrong, said in (
         (["--stl", "x <= {limit}", "--between", "100"], "--between 100"),
-        (["--stl", "x <= 1", "--between", "0:3"], "--stl: expected a formula with {limit}"),
+        (["--stl", "x <= 1", "--between", "0:3"], "--stl: expected {limit} in place of the th"),
         (["--stl", "x <= {limit}", "--between", "0:3", "--budget", "9"], "a whole number from 20"),
         (["--stl", "G[0,{limit}] (x <= 1)", "--between", "1:30"], "--stl with {limit} = 30: "),
         (["--stl", "x <= 2 + 0*{limit}", "--between", "1:3"], "--stl: the robustness is the same"),
