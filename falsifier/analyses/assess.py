@@ -128,9 +128,9 @@ class Assurance:
             if searched.smallest is None:
                 return f"{effort} has no verdict: all of them failed."
             nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
-            doubt = f" ({counted(searched.unconfirmed, 'violation')}, not confirmed)"
-            told = f"its smallest robustness was {signed(searched.smallest)}"
-            return f"{effort} {nearer}: {told}{doubt if searched.unconfirmed else ''}."
+            doubtful = searched.unconfirmed
+            doubt = f" ({counted(doubtful, 'violation')}, not confirmed)" if doubtful else ""
+            return f"{effort} {nearer}: its smallest robustness was {signed(searched.smallest)}{doubt}."
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."

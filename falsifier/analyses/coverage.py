@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
-from math import ceil, floor
 from os import PathLike
 from pathlib import Path
 
@@ -315,10 +314,7 @@ class _Seen:
 
 def _allowed(r: Range) -> list[int]:
     """Return the numbers that an integer, Boolean or enumeration may have; empty if there are many."""
-    if r.items:
-        return sorted(n for _, n in r.items if r.low <= n <= r.high)
-    first, last = ceil(r.low), floor(r.high)
-    return list(range(first, last + 1)) if last - first < PARTS else []
+    return list(r.numbers) if r.items or r.high - r.low < PARTS else []
 
 
 def edges_of(r: Range) -> list[tuple[float, float]]:

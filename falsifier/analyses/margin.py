@@ -138,8 +138,7 @@ def margin(
         state.judge_all()  # what the search that was stopped has simulated counts, too
     falsified = None if state.reached < 0 else thresholds[state.reached]
     unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
-    searches, simulations = tuple(state.searches), len(state.history)
-    return Margin(falsified, unfalsified, simulations, searches, complete, interrupted)
+    return Margin(falsified, unfalsified, len(state.history), tuple(state.searches), complete, interrupted)
 
 
 def stated_at(vary: str, threshold: float) -> str:

@@ -271,14 +271,10 @@ def carry_out(
     with ExitStack() as stack:
         begun = directory is not None and holds_run(directory)
         if begun and not resume:
-            raise JournalError(
-                f"{directory} already contains a run: choose another directory, or to continue it: "
-                + (
-                    written(f"falsifier resume {directory}", f"resume({str(directory)!r})")
-                    if request.problems
-                    else "resume() with problems=[...]"
-                )
-            )
+            again = written(f"falsifier resume {directory}", f"resume({str(directory)!r})")
+            again = again if request.problems else "resume() with problems=[...]"
+            other = "choose another directory, or to continue it"
+            raise JournalError(f"{directory} already contains a run: {other}: {again}")
         if directory is not None and (directory / CAMPAIGN).exists():
             raise JournalError(f"{directory} already contains a campaign: choose another directory")
         left = directory / JOURNAL if directory is not None and not begun else None

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from falsifier.core.words import readable
-from falsifier.errors import FalsifierError, ModelError, SimulationError, written
+from falsifier.errors import FailureStatus, FalsifierError, ModelError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.network import Member, Network
 from falsifier.fmu.process.plan import Plan
@@ -83,11 +83,9 @@ def failure(
     text = f"{component or plan.model}: {said}{refusals}"
     if reply.where == Where.IMPOSSIBLE:
         return ModelError(text)
-    is_late = reply.where == Where.TIMEOUT
+    status: FailureStatus = "timeout" if reply.where == Where.TIMEOUT else "failed"
     time = None if reply.time < 0 else reply.time
-    return SimulationError(
-        text + last_lines(log), status="timeout" if is_late else "failed", time=time, log=log
-    )
+    return SimulationError(text + last_lines(log), status=status, time=time, log=log)
 
 
 def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
