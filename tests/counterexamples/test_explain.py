@@ -10,7 +10,7 @@ from falsifier.counterexamples.explain import explain
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import Array, lag_problem
-from tests.problems import broken, conditional
+from tests.problems import Columns, broken, conditional
 
 FREE = Freedom(10, 0.1)
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -84,9 +84,7 @@ def test_what_resetting_would_not_change_is_left_out() -> None:
 
 
 def test_a_part_without_which_the_simulation_fails_is_said() -> None:
-    def fails_at_rest(
-        times: Array, inputs: dict[str, Array], parameters: dict[str, float]
-    ) -> Mapping[str, Array]:
+    def fails_at_rest(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
         return broken(times, {"u": 1 - inputs["u"]}, parameters)
 
     problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)

@@ -13,17 +13,13 @@ import falsifier
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
+from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
 from tests.llm.server import Received, Server, Step, serving
 
-SCHEMA = {
-    "type": "object",
-    "properties": {"rationale": {"type": "string"}},
-    "required": ["rationale"],
-    "additionalProperties": False,
-}
+SCHEMA = schema_of_object(rationale={"type": "string"})
 STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
 REQUEST = ChatRequest(
     messages=(Message(role="system", content="standing"), Message(role="user", content="question")),

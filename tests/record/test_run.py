@@ -21,10 +21,10 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import STOP, holds_run
-from falsifier.record.run import falsify, resume
+from falsifier.record.journal import holds_run
+from falsifier.record.run import StopFile, falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.events import Asked, Event, RunStarted
+from falsifier.search.events import Event, RunStarted
 from falsifier.search.make_engines import make_engines
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
@@ -91,16 +91,12 @@ def test_the_budget_of_a_run_that_has_falsified_stays_as_it_was_given(tmp_path: 
     assert manifest.read(tmp_path).request.budget.simulations == 9
 
 
-def test_who_stops_a_run_at_its_last_simulation_interrupts_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stop(event: Event) -> None:
-        if isinstance(event, Asked) and event.first == 2:
-            (tmp_path / "r" / STOP).touch()
-
-    monkeypatch.setattr("falsifier.record.run._STOP_PERIOD", -1.0)
-    result = falsify(impossible(), "uniform", budget=3, directory=tmp_path / "r", listeners=[stop])
-    assert (result.status, result.reason) == ("not falsified", "the budget of 3 simulations is used up")
+@pytest.mark.parametrize(("budget", "status"), [(1, "not falsified"), (2, "interrupted")])
+def test_who_stops_a_run_at_its_end_interrupts_nothing(budget: int, status: str, tmp_path: Path) -> None:
+    (tmp_path / "stop").touch()
+    stop = StopFile(tmp_path / "stop", Budget(budget))
+    stop._looked = 0.0  # long ago
+    assert falsify(impossible(), "uniform", budget=budget, listeners=[stop]).status == status
 
 
 def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:
