@@ -10,6 +10,7 @@ from falsifier.problem.problem import Problem
 from falsifier.testing import Array, lag, lag_problem
 from tests.patience import wait_until
 
+Columns = dict[str, Array]
 # Names an environment variable, "COUNT FOLDER": what is held there after so many simulations have begun.
 HOLD = "FALSIFIER_TESTS_HOLD"
 BEGUN, RELEASE = "begun", "release"
@@ -39,9 +40,7 @@ def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
     return {"x": x}
 
 
-def mostly_broken(
-    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
-) -> Mapping[str, Array]:
+def mostly_broken(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
     """Give NaN unless the input ends in the lowest fifth of its range."""
     x = lag(times, inputs, parameters)["x"].copy()
     if inputs["u"][-1] > -0.6:

@@ -37,6 +37,6 @@ class EulerModel:
         pass
 
 
-def euler_problem(stl: str, *, smallest_step: float = 0.0) -> Problem:
+def euler_problem(stl: str = "G[1,1] (x <= 0.65)", *, smallest_step: float = 0.0) -> Problem:
     problem = lag_problem(stl)
     return replace(problem, model=EulerModel(problem.info, smallest_step))

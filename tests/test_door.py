@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -150,6 +151,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         "engine 'uniform': got an unexpected keyword argument 'sead'; it takes problem, seed",
     ),
     "a number as engine": (lambda: untyped.make_engine(3, easy(), seed=0), "engine: expected a name, got 3"),
+    "a text as reply": (
+        lambda: untyped.falsify(easy(), llm=SimpleNamespace(llm="own", complete=lambda _: "yes")),
+        r"complete\(\) of the chat: expected a falsifier.llm.messages.ChatReply, got 'yes'",
+    ),
     "a number to connect to": (lambda: untyped.connect(3), "llm: expected a name such as openai/gpt"),
     "a number as a component's name": (
         lambda: untyped.System({3: "a.fmu"}),

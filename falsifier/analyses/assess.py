@@ -19,6 +19,7 @@ from falsifier.engines.box import Proposal
 from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem, check_limits, check_problem
 from falsifier.search.findings import Failure, Finding, failures as by_cause
@@ -47,14 +48,16 @@ class Searched:
     Attributes:
         simulations: number of simulations of the search.
         smallest: smallest robustness that it found; None if every simulation failed.
-        violation: in how many simulations it found the first violation, as simulated; None without one.
+        violation: in how many simulations it found a violation that no confirmation doubts; None without one.
         drawable: whether the inputs of that violation are among those that are drawn.
+        unconfirmed: how many violations were not confirmed.
     """
 
     simulations: int
     smallest: float | None
     violation: int | None = None
     drawable: bool = True
+    unconfirmed: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +128,9 @@ class Assurance:
             if searched.smallest is None:
                 return f"{effort} has no verdict: all of them failed."
             nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
-            return f"{effort} {nearer}: its smallest robustness was {signed(searched.smallest)}."
+            doubtful = searched.unconfirmed
+            doubt = f" ({counted(doubtful, 'violation')}, not confirmed)" if doubtful else ""
+            return f"{effort} {nearer}: its smallest robustness was {signed(searched.smallest)}{doubt}."
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."
@@ -139,6 +144,7 @@ def assess(
     seed: int = 0,
     confidence: float = 0.95,
     searched: Sequence[Evaluation] = (),
+    doubtful: Sequence[Confirmation] = (),
     progress: Progress | None = None,
 ) -> Assurance:
     """Bound the probability of a violation by random simulations.
@@ -152,6 +158,7 @@ def assess(
         confidence: confidence of the bound, and of the interval, between 0 and 1.
         searched: evaluations of a search of the same space, in order, to be stated beside the bound, such as
             those of a Result.
+        doubtful: violations of that search that were not confirmed: ``refuted`` and ``fragile`` of a Result.
         progress: called with the number of simulations so far.
 
     Returns:
@@ -202,7 +209,7 @@ def assess(
             upper_bound(violations + failures, len(drawn), each),
         ),
         smallest=min(judged, key=_robustness),
-        searched=_told(searched, problem.space),
+        searched=_told(searched, doubtful, problem.space),
         findings=() if violations else vacuity.findings(),
         interrupted=interrupted,
     )
@@ -233,15 +240,18 @@ def lower_bound(happened: int, trials: int, confidence: float) -> float:
     return 1.0 - upper_bound(trials - happened, trials, confidence)
 
 
-def _told(evaluations: Sequence[Evaluation], space: SearchSpace) -> Searched | None:
+def _told(
+    evaluations: Sequence[Evaluation], doubtful: Sequence[Confirmation], space: SearchSpace
+) -> Searched | None:
     if not evaluations:
         return None
+    doubted = [confirmation.candidate for confirmation in doubtful]
     smallest = min((e.robustness for e in evaluations if e.robustness is not None), default=None)
-    for number, evaluation in enumerate(evaluations, start=1):
-        if evaluation.violated:
-            drawable = fixed_layout(space).represents(evaluation.candidate)
-            return Searched(len(evaluations), smallest, number, drawable)
-    return Searched(len(evaluations), smallest)
+    found = [k for k, e in enumerate(evaluations) if e.violated and e.candidate not in doubted]
+    if not found:
+        return Searched(len(evaluations), smallest, unconfirmed=len(doubted))
+    drawable = fixed_layout(space).represents(evaluations[found[0]].candidate)
+    return Searched(len(evaluations), smallest, found[0] + 1, drawable, len(doubted))
 
 
 def _distribution_text(space: SearchSpace) -> str:

@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
-from math import ceil, floor
 from os import PathLike
 from pathlib import Path
 
@@ -215,7 +214,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     times = np.linspace(0.0, stop_time, _SAMPLES)
     ranges = []
     for r in described.inputs:
-        signals = [c.signals[r.name] for c in candidates]
+        signals = [c.signals[r.name].stepped(stop_time) for c in candidates]
         paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
         # Also what is held only between two of these times; if sampled and held, from the next sampling on.
         most = max((len(s.times) for s in signals), default=0)
@@ -266,7 +265,7 @@ class _Seen:
     """What the system did, simulation by simulation: outputs, modes and their changes."""
 
     def __init__(self, described: Manifest) -> None:
-        self.trajectories = 0
+        self.trajectories, self.stop_time = 0, described.stop_time
         self.outputs: dict[str, OutputCoverage] = {}
         self.inputs = {r.name for r in described.inputs}
         discrete = [r for r in (*described.inputs, *described.parameters) if r.kind != "real"]
@@ -280,7 +279,7 @@ class _Seen:
     def give(self, candidate: Candidate) -> None:
         """Add the modes that one simulation was given."""
         for name, signal in candidate.signals.items():
-            self._add(name, signal.stepped.values)
+            self._add(name, signal.stepped(self.stop_time).values)
         for name, value in candidate.parameters.items():
             self._add(name, (value,))
 
@@ -315,10 +314,7 @@ class _Seen:
 
 def _allowed(r: Range) -> list[int]:
     """Return the numbers that an integer, Boolean or enumeration may have; empty if there are many."""
-    if r.items:
-        return sorted(n for _, n in r.items if r.low <= n <= r.high)
-    first, last = ceil(r.low), floor(r.high)
-    return list(range(first, last + 1)) if last - first < PARTS else []
+    return list(r.numbers) if r.items or r.high - r.low < PARTS else []
 
 
 def edges_of(r: Range) -> list[tuple[float, float]]:

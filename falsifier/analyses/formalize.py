@@ -138,6 +138,7 @@ def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Form
             raise
         if isinstance(error, ChatError) and not isinstance(error, NoValidReplyError):
             rejected.append(f"no better answer came: {error}")
+            exchanges.append(Exchange(llm=chat.llm, messages=request.messages, reply=None, lost=error.lost))
     spent = sum((Spent.on_requests(each.requests, each.usage) for each in exchanges), Spent())
     readings = _judged(subject, readings)
     differences = tuple(

@@ -1,5 +1,6 @@
 """Where a requirement starts to be violated: the threshold between what was falsified and what was not."""
 
+import re
 from bisect import bisect_left
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -137,14 +138,19 @@ def margin(
         state.judge_all()  # what the search that was stopped has simulated counts, too
     falsified = None if state.reached < 0 else thresholds[state.reached]
     unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
-    searches, simulations = tuple(state.searches), len(state.history)
-    return Margin(falsified, unfalsified, simulations, searches, complete, interrupted)
+    return Margin(falsified, unfalsified, len(state.history), tuple(state.searches), complete, interrupted)
+
+
+def stated_at(vary: str, threshold: float) -> str:
+    """Return the text with this threshold, in parentheses where a power would bind more than its sign."""
+    said = f"{threshold:.12g}"
+    return re.sub(rf"{re.escape(LIMIT)}(?=\s*\^)", f"({said})", vary).replace(LIMIT, said)
 
 
 def formula_at(problem: Problem, vary: str, threshold: float) -> Formula:
     """Return the formula in which the threshold has this value; SpecError if it does not fit the problem."""
     try:
-        stated = requirement_of(vary.replace(LIMIT, f"{threshold:.12g}"))
+        stated = requirement_of(stated_at(vary, threshold))
         return formula_of(stated, problem.info, problem.experiment, key="")
     except SpecError as error:
         place = f"{_stated()} with {LIMIT} = {threshold:g}"

@@ -45,7 +45,7 @@ def run_task(task: RunTask) -> None:
         [task.problem],
         run_directory(task.campaign, task.name),
         hashes=task.hashes,
-        listeners=[StopFile(task.campaign / STOP)],
+        listeners=[StopFile(task.campaign / STOP, task.request.budget)],
         resume=True,
         patience=PATIENCE,
     )

@@ -2,7 +2,6 @@
 
 from contextlib import closing
 from dataclasses import asdict
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,15 @@ from click.core import ParameterSource
 from falsifier.cli import options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
-from falsifier.core.literals import one_line
+from falsifier.core.literals import number_in, one_line
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import JournalError, SpecError
-from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Target
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.questions import doubtful_confirmations
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -55,9 +54,9 @@ def assess(
         if not quiet and count % _SAID_EVERY == 0:
             warn(f"simulation {count} of at most {budget}")
 
-    problem, searched = _loaded(given, requirement)
+    problem, search = _loaded(given, requirement)
     with closing(problem.model):
-        found = assess_problem(problem, budget=budget, seed=seed, searched=searched, progress=said)
+        found = assess_problem(problem, budget=budget, seed=seed, progress=said, **search)
     content = assurance_json(found) | {"budget": budget, "seed": seed}
     lines = [f"{problem.name}: {problem.requirement.formula}"]
     lines += [f"  {line}" for line in found.text.splitlines()]
@@ -67,7 +66,7 @@ def assess(
 
 @command()
 @options.problem_options
-@options.stl_option("Formula or template with {limit} in place of a threshold.")
+@options.stl_option("Formula or template with {limit} in place of a threshold.", required=True)
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
 @click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
 @options.budget_option(least=20, note=" of all searches together")
@@ -76,7 +75,7 @@ def assess(
 @options.json_option
 def margin(
     *,
-    stl: str | None,
+    stl: str,
     between: str,
     engine: str,
     budget: int,
@@ -93,14 +92,12 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import LIMIT, margin as find_margin
+    from falsifier.analyses.margin import margin as find_margin, stated_at
 
     low, high = _between(between)
-    if stl is None or LIMIT not in stl:
-        raise click.UsageError(f"--stl: expected a formula with {LIMIT} in place of a threshold")
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(given["target"]).kind != "python"
-    requirement = {"stl": stl.replace(LIMIT, f"{low:.12g}") if made_here else None}
+    requirement = {"stl": stated_at(stl, low) if made_here else None}
 
     def said(threshold: float, falsified: bool, count: int) -> None:  # noqa: FBT001 - given by position
         if not quiet:
@@ -115,13 +112,13 @@ def margin(
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
 
 
-def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, list[Evaluation]]:
-    """Load the problem of a target, or of a run that has not changed since, with what that evaluated."""
+def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, dict[str, Any]]:
+    """Load the problem of a target, or of a run that has not changed since, with what that found."""
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)
         try:
-            return load_source(options.problem_source(given)), []
+            return load_source(options.problem_source(given)), {}
         except SpecError:
             if not place.is_dir():
                 raise
@@ -149,15 +146,14 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, li
     problem = load_source(source)
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
     manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
-    evaluations = recorded_evaluations(place, read_journal(place), described.requirement.name)
-    return problem, list(evaluations.values())
+    records = read_journal(place)
+    evaluations = recorded_evaluations(place, records, problem.name, with_trajectories=False)
+    doubtful = doubtful_confirmations(problem, records, evaluations)
+    return problem, {"searched": list(evaluations.values()), "doubtful": doubtful}
 
 
 def _between(text: str) -> tuple[float, float]:
-    try:
-        low, high = map(float, text.split(":"))
-        if -inf < low < high < inf:
+    match [number_in(end) for end in text.split(":")]:
+        case [float(low), float(high)] if low < high:
             return low, high
-    except ValueError:
-        pass
     raise click.UsageError(f"--between {text}: expected LOW:HIGH with LOW < HIGH, for example 100:160")

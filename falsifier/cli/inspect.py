@@ -61,7 +61,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     if fmu.suffix.lower() in SIMULINK:
         refuse("applies to FMUs only", all=everything, check=checked)
         diagram = read_diagram(fmu)
-        say(as_shown(simulink_text(diagram), asdict(diagram), as_json=as_json))
+        say(as_shown(simulink_text(diagram), as_json and asdict(diagram), as_json=as_json))
         return
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
@@ -72,7 +72,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     except (MachineError, ModelError) as error:  # the description can be shown all the same
         note = f"FMUs cannot be simulated now: {error}"
     found = replace(found, notes=(*found.notes, note))
-    say(as_shown(info_text(found, everything=everything), model_json(found), as_json=as_json))
+    say(as_shown(info_text(found, everything=everything), as_json and model_json(found), as_json=as_json))
     if checked and not as_json:
         _print_convergence(source, found, read_spec(spec).model if spec else ModelSection(), *rights)
 

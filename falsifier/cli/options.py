@@ -6,15 +6,14 @@ or add a remark, a function makes the option.
 
 import logging
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from functools import partial
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
 from falsifier.cli.command import Decorator, Function, add
+from falsifier.core.literals import number_in
 from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.search import DEFAULT_SIMULATIONS
 
@@ -31,9 +30,8 @@ DEFAULT_PARAMETERIZATION: "Parameterization" = "free"
 
 def number(text: str) -> float:
     """Return a positive number; ValueError if it is none, which as the type of an option is a usage error."""
-    with suppress(ValueError):
-        if 0 < (value := float(text)) < inf:
-            return value
+    if (value := number_in(text) or 0.0) > 0:
+        return value
     raise ValueError(text)
 
 
@@ -133,8 +131,9 @@ def interface_option(text: str) -> Decorator:
 def stl_option(
     text: str = "Formula to use instead of the spec's requirement; or a template with its arguments, such as "
     "'settles signal=speed reference=80 within=2% time=3'.",
+    **more: Any,
 ) -> Decorator:
-    return click.option("--stl", metavar="FORMULA", help=text)
+    return click.option("--stl", metavar="FORMULA", help=text, **more)
 
 
 def target_argument(command: Function) -> Function:

@@ -12,7 +12,7 @@ from falsifier.cli.options import inputs_option, json_option, out_option, proble
 from falsifier.cli.output import FAILED, as_shown, conclude
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
-from falsifier.core.literals import csv_text, one_line
+from falsifier.core.literals import csv_text, number_in, one_line
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.counterexamples.case import recorded_inputs
@@ -22,7 +22,6 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
-from falsifier.problem.shorthand import number_in
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines

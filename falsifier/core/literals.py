@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterable
 from decimal import Decimal
 from io import StringIO
+from math import isfinite
 
 # What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
 # the direction of what follows.
@@ -159,6 +160,15 @@ def shortest(value: float) -> str:
     ('1.1', '2', '1e-07')
     """
     return repr(float(value)).removesuffix(".0")
+
+
+def number_in(said: float | str) -> float | None:
+    """Return the finite number that somebody gave, or whose text somebody typed; None for other texts."""
+    try:
+        number = float(said)
+    except ValueError:
+        return None
+    return number if isfinite(number) else None
 
 
 def _writable(text: str) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, isfinite
+from math import ceil, inf, isfinite
 from typing import Literal, get_args
 
 import numpy as np
@@ -114,12 +114,18 @@ class Signal:
         return replace(self, hold=hold)
 
     @property
-    def stepped(self) -> "Signal":
-        """The same signal; what is constant between control points and held has them where it changes."""
+    def moments(self) -> tuple[float, ...]:
+        """Times in s of the control points; of constant pieces that are held, when they are sampled first."""
         if self.hold is None or self.interpolation != "constant":
+            return self.times
+        return tuple(ceil((t - _TIME_ROUNDING) / self.hold) * self.hold for t in self.times)
+
+    def stepped(self, stop_time: float = inf) -> "Signal":
+        """Return the same signal; held constant pieces begin where they are sampled, if that is in time."""
+        if (moments := self.moments) is self.times:
             return self
-        periods = (ceil((t - _TIME_ROUNDING) / self.hold) for t in self.times)
-        points = {k * self.hold: v for k, v in zip(periods, self.values, strict=True)}
+        last = stop_time * (1.0 + _TIME_ROUNDING)
+        points = {t: v for t, v in zip(moments, self.values, strict=True) if t <= last}
         return replace(self, times=tuple(points), values=tuple(points.values()))
 
     @property

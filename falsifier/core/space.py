@@ -370,9 +370,8 @@ def nearest_value(ranged: Range, value: float) -> float:
     if ranged.kind == "real":
         return value
     if ranged.items:
-        numbers = [n for _, n in ranged.items if ranged.low <= n <= ranged.high]
-        return float(min(numbers, key=lambda n: abs(n - value)))
-    return float(min(max(round(value), ceil(ranged.low)), floor(ranged.high)))
+        return float(min(ranged.numbers, key=lambda n: abs(n - value)))
+    return min(max(float(round(value)), ranged.low), ranged.high)
 
 
 def _into_range(value: float, ranged: Range) -> float:

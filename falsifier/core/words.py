@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Collection, Iterable, Sequence
+from math import inf
 from typing import Literal
 
 from falsifier.core.candidate import Candidate
@@ -35,10 +36,10 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
 
     Units are told if the search space is given, which has them.
     """
-    units = {r.name: r.unit for r in space.ranges} if space is not None else {}
-    labels = {name: with_unit(name, unit) for name, unit in units.items()}
+    labels = {r.name: with_unit(r.name, r.unit) for r in space.ranges} if space is not None else {}
+    signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
     return [
-        *(("input", f"{labels.get(n, n)} {signal_text(s.stepped)}") for n, s in candidate.signals.items()),
+        *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()),
         *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),
     ]
 

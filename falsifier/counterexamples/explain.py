@@ -156,7 +156,7 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
     """Reset each signal, each of its longest stretches and each parameter, if that changes anything."""
 
     def effect(reset: Candidate, to: Effect, span: tuple[float, float] | None = None) -> Iterator[Effect]:
-        if reset.key != candidate.key:
+        if reset.key != candidate.key and (span is None or span[0] < span[1]):
             found = evaluate(problem, problem.space.admit(reset))
             yield replace(to, span=span, robustness=found.robustness, violated=found.violated)
 
@@ -198,7 +198,5 @@ def _longest(signal: Signal) -> list[tuple[int, int]]:
 
 def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float, float]:
     """Interval in s that control points influence: between the unchanged neighbours, or to the next step."""
-    finish = signal.times[end] if end < len(signal.times) else stop_time
-    if signal.interpolation == "constant":
-        return signal.times[first], finish
-    return signal.times[max(first - 1, 0)], finish
+    finish = min(signal.moments[end], stop_time) if end < len(signal.times) else stop_time
+    return signal.moments[first if signal.interpolation == "constant" else max(first - 1, 0)], finish

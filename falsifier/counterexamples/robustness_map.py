@@ -234,7 +234,7 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
         signal = candidate.signals[r.name]
         found = stretches(signal.values)
         for first, end in found:
-            time = signal.times[first] if len(found) > 1 else None
+            time = signal.moments[first] if len(found) > 1 else None
             yield Coordinate(r.name, (first, end), time, signal.values[first], r.low, r.high, r.unit)
     for p in problem.space.parameters:
         yield Coordinate(p.name, None, None, candidate.parameters[p.name], p.low, p.high, p.unit)

@@ -4,10 +4,9 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite
 from pathlib import Path
 
-from falsifier.core.literals import csv_cell
+from falsifier.core.literals import csv_cell, number_in
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError, did_you_mean, in_section
@@ -117,11 +116,7 @@ def _append(values: Mapping[str, list[float]], column: Sequence[Variable], cell:
 
 
 def _number(text: str, what: str, others: str = "") -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = float("nan")
-    if not isfinite(number):
+    if (number := number_in(text)) is None:
         raise SpecError(f"{what}: expected a number{others}, got {text!r}")
     return number
 

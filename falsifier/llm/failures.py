@@ -5,11 +5,10 @@ import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from math import isfinite
 from typing import Any
 from urllib.parse import urlsplit
 
-from falsifier.core.literals import printable
+from falsifier.core.literals import number_in, printable
 from falsifier.core.secrets import redact, redact_held, without_credentials
 from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
@@ -28,8 +27,8 @@ _UNREADABLE = (
     "the model produced output that does not match|failed to parse input at pos"
     "|failed to generate json|failed to validate json"
 )
-# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq.
-_CONTEXT = "context[ _]?(?:window|size|length)|maximum model length|too long to fit|reduce the length of"
+# litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq. A pool is what others use up.
+_CONTEXT = "context[ _]?(window|size|length)(?! pool)|maximum model length|too long to fit|reduce the length"
 _LONGEST_DETAIL = 600
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
@@ -149,8 +148,8 @@ def classify(
         "longer": _LONGER if api_base is not None or provider.local else "",
         "detail": _detail(text, status),
     }
-    if status == 429 and (found := _WAIT.search(text)):
-        # Gemini calls a limit per minute an exceeded quota, too; with one that is used up no time is told.
+    # Gemini calls a limit per minute an exceeded quota, too, and tells a wait even if a day's is used up.
+    if status == 429 and "PerDay" not in text and (found := _WAIT.search(text)):
         hours, minutes, number, milli = found.groups(default="0")
         spoken = 3600 * int(hours) + 60 * int(minutes) + float(number) / (1000 if milli == "m" else 1)
         return TransientChatError(where + filled["detail"], retry_after=spoken if wait is None else wait)
@@ -211,14 +210,12 @@ def _retry_after(error: Exception) -> float | None:
 
 
 def _seconds_until(stated: str, headers: Mapping[str, Any]) -> float | None:
+    if (seconds := number_in(stated)) is not None:
+        return seconds
     try:
-        seconds = float(stated)
-    except ValueError:
-        try:
-            until = parsedate_to_datetime(stated)
-            # By the server's own clock, which may differ from this machine's.
-            now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
-            seconds = (until - now).total_seconds()
-        except (TypeError, ValueError, OverflowError):
-            return None
-    return seconds if isfinite(seconds) else None
+        until = parsedate_to_datetime(stated)
+        # By the server's own clock, which may differ from this machine's.
+        now = parsedate_to_datetime(headers["date"]) if "date" in headers else datetime.now(UTC)
+        return (until - now).total_seconds()
+    except (TypeError, ValueError, OverflowError):
+        return None

@@ -7,6 +7,7 @@ from typing import Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
+from falsifier.core.arguments import instance
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact_held
 
@@ -164,6 +165,7 @@ def cleaned(reply: ChatReply, secrets: Iterable[str] = ()) -> ChatReply:
 
     An LLM or a server may repeat what it was sent; secrets of the environment need not be named.
     """
+    instance("complete() of the chat", reply, ChatReply, "a falsifier.llm.messages.ChatReply")
     secrets = tuple(secrets)
     texts = {"text": reply.text, "reasoning": reply.reasoning, "finish_reason": reply.finish_reason}
     return reply.model_copy(

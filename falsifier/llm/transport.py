@@ -33,6 +33,8 @@ T = TypeVar("T")
 
 # A reply of a million characters (messages.LONGEST_REPLY), each escaped, twice over.
 _MOST_BYTES = 16 << 20
+# Of an error no more is read: client libraries search it with patterns, which takes seconds per megabyte.
+_MOST_OF_ERROR = 64 << 10
 # Time for a call that was given up, and whose connections are cut, to end, in s.
 _GRACE = 0.5
 _GIVEN_UP: WeakSet[Thread] = WeakSet()
@@ -272,17 +274,19 @@ class _Limited(httpx.SyncByteStream):
         self._call, self._inner, self._is_success = call, inner, is_success
 
     def __iter__(self) -> Iterator[bytes]:
-        received = bytearray()
+        received, most = bytearray(), _MOST_BYTES if self._is_success else _MOST_OF_ERROR
         with self._call.noting_faults():
             for part in self._inner:
                 received += part
-                if len(received) > _MOST_BYTES:
-                    self._call.refuse(_TOO_LONG)
-        body = bytes(received)
+                if len(received) > most:
+                    break
+            if self._is_success and len(received) > most:
+                self._call.refuse(_TOO_LONG)
+        body = bytes(received[:most])
         if self._is_success:
-            self._call.fault = _unreadable(body)
-            if self._call.fault.status_code is None:
-                self._call.fault.patience = _MOST_MALFORMED
+            body = _with_error_apart(body)
+            fault = self._call.fault = _unreadable(body)
+            fault.patience = _MOST_MALFORMED if fault.status_code is None else None
         yield _mended(body) if isinstance(self._call.fault, UnusableReplyError) else body
 
     def close(self) -> None:
@@ -351,10 +355,19 @@ def _reported(error: Any) -> BrokenReplyError:
     return fault
 
 
+def _with_error_apart(body: bytes) -> bytes:
+    """The body, or just the error in its choice, as OpenRouter sends it: that reads as an empty reply."""
+    with suppress(ValueError, RecursionError, TypeError, LookupError, AttributeError):
+        if error := json.loads(body)["choices"][0].get("error"):
+            return json.dumps({"error": error}).encode()
+    return body
+
+
 def _mended(body: bytes) -> bytes:
     """The body without what the client library would reject all of it for, but what can be read.
 
-    These are counts of tokens that cannot be true, texts in parts, and bytes that are no UTF-8.
+    These are counts of tokens that cannot be true, texts in parts, and bytes that are no UTF-8. A finish
+    reason that the library would take for a proper end is the one of all replies that were cut off.
     """
     sent = json.loads(body.decode(errors="replace"))
     usage, choices = sent.get("usage"), sent.get("choices")
@@ -362,7 +375,7 @@ def _mended(body: bytes) -> bytes:
         sent["usage"] = _possible(usage) if isinstance(usage, dict) else None
     if isinstance(choices, list):
         sent["choices"] = list(map(_with_one_text, choices))
-    return json.dumps(sent).encode()
+    return json.dumps(sent).replace('"model_context_window_exceeded"', '"length"').encode()
 
 
 def _with_one_text(choice: Any) -> Any:

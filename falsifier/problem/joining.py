@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from falsifier.core.files import absent
+from falsifier.core.literals import number_in
 from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed, readable
@@ -18,7 +19,7 @@ from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ModelSection, ParameterSection
-from falsifier.problem.shorthand import number_in, searching, stated_as
+from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 

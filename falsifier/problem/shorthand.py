@@ -3,14 +3,13 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
-from falsifier.core.literals import shortest
+from falsifier.core.literals import number_in, shortest
 from falsifier.core.model import Interface
 from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
@@ -216,18 +215,8 @@ def _value(option: str) -> tuple[str, float | str]:
     if not name or not said:
         raise SpecError(f"--set {option}: expected NAME=VALUE, for example --set mass=1200")
     number = number_in(said)
-    if number is not None and not isfinite(number):
-        raise SpecError(f"--set {option}: expected a finite number")
     # Of a string, the text counts: 007.
     return name, said if number is None or shortest(number) != said else number
-
-
-def number_in(said: float | str) -> float | None:
-    """Return the number that somebody gave, or whose text somebody typed; None for other texts."""
-    try:
-        return float(said)
-    except ValueError:
-        return None
 
 
 def _range(option: str) -> tuple[str, InputChoice]:

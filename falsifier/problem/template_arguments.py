@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
-from falsifier.core.literals import shortest
+from falsifier.core.literals import number_in, shortest
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import ModelChanges, Number, no_truth
 from falsifier.stl import expression, parse
@@ -71,10 +71,8 @@ def share_of(margin: float | str) -> float | None:
     """Return a percentage as a share; None if it is none."""
     if not isinstance(margin, str) or not margin.rstrip().endswith("%"):
         return None
-    try:
-        return float(margin.rstrip()[:-1]) / 100
-    except ValueError:
-        return None
+    number = number_in(margin.rstrip()[:-1])
+    return None if number is None else number / 100
 
 
 Term = Annotated[str | float, BeforeValidator(no_truth), AfterValidator(_term)]

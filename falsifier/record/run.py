@@ -233,15 +233,14 @@ def runs_in(directory: Path) -> list[Path]:
 class StopFile:
     """Listener that interrupts a run, as Ctrl-C does, once a file exists; the run can be resumed."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._looked = monotonic()
+    def __init__(self, path: Path, budget: Budget) -> None:
+        self._path, self._budget, self._looked = path, budget, monotonic()
 
     def __call__(self, event: Event) -> None:
-        """Look for the file after a simulation, but not at each of very quick ones."""
+        """Look for the file after a simulation, but not after the last one, nor each of very quick ones."""
         if isinstance(event, Evaluated) and monotonic() - self._looked > _STOP_PERIOD:
             self._looked = monotonic()
-            if self._path.exists():
+            if self._path.exists() and self._budget.exceeded(event.spent) is None:
                 raise KeyboardInterrupt
 
 
@@ -303,7 +302,7 @@ def carry_out(
             stop = directory / STOP
             stop.unlink(missing_ok=True)  # of an earlier process
             # What happens is recorded first, even if another listener raises.
-            all_listeners = (journal, StopFile(stop), *all_listeners)
+            all_listeners = (journal, StopFile(stop, request.budget), *all_listeners)
         return search(
             problems,
             engines,

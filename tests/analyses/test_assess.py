@@ -15,6 +15,7 @@ from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
 from falsifier.testing import BIAS, FREE, START, Array, lag_problem
+from tests.engines.support import doubtful
 from tests.problems import mostly_broken, never, straight
 
 
@@ -121,6 +122,9 @@ def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero(
     assert found.violations == 0
     assert found.searched == Searched(1, searched[-1].robustness, 1)
     assert "The search found a violation in 1 simulation, although no draw is one." in found.text
+    doubts = [doubtful(found.problem, searched[-1])]
+    found = assess(found.problem, budget=5, searched=searched, doubtful=doubts)
+    assert found.searched == Searched(1, searched[-1].robustness, unconfirmed=1)
 
 
 def test_a_violation_with_signals_that_are_not_drawn_says_nothing_of_the_draws() -> None:

@@ -82,7 +82,8 @@ def test_many_simulations_of_many_inputs_take_little_memory() -> None:
 
 def test_whole_numbers_are_parts_of_their_own_and_modes() -> None:
     u = Range(name="u", low=0, high=2, kind="integer")
-    steps = Signal((0.0, 4.9, 5.0), (0.0, 1.0, 2.0), "constant", hold=0.5)  # 1 is between two samples
+    # 1 is between two samples, and after the last one.
+    steps = Signal((0.0, 4.9, 5.0, 9.7), (0.0, 1.0, 2.0, 1.0), "constant", hold=0.6)
     found = coverage_of(described(u), [(Candidate({"u": steps}), None)])
     assert found.ranges[0].parts.tolist() == [1, 0, 1]
     assert found.ranges[0].gaps == ((1.0, 1.0),)

@@ -12,6 +12,7 @@ from falsifier.analyses.formalize import Formalized, formalize
 from falsifier.analyses.lint import ranges_of
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError, SpecError
+from falsifier.llm.messages import Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.writing import subject_of
 from falsifier.search.request import LLMSettings
@@ -211,6 +212,10 @@ def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, targ
     assert len(ask(server, target, replying(good, bad), cannot).readings) == 1
     found = ask(server, target, replying(good, bad), Step(status=401, message="wrong key"))
     assert len(found.readings) == 1 and "no better answer came" in found.rejected[-1]
+    late = ChatError("no complete reply")
+    late.lost = Usage(prompt_tokens=70, without_reply=1)
+    found = formalize(target, "It is slow.", ScriptedChat([str(replying(good, bad).content), late]))
+    assert (found.spent.calls, found.spent.tokens, found.spent.without_reply) == (2, 70, 1)
     with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
         ask(server, target, *[replying(bad)] * 3)
 

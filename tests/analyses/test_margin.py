@@ -16,10 +16,11 @@ def system() -> Problem:
 
 
 @pytest.mark.parametrize(
-    ("vary", "hardest"), [("G[0,10] (x <= {limit})", 1.0), ("G[0,10] (x >= {limit})", -1.0)]
+    ("vary", "high", "hardest"),
+    [("G[0,10] (x <= {limit})", 3, 1.0), ("x >= {limit}", 3, -1.0), ("x <= {limit} ^2", -0.1, -1.0)],
 )
-def test_the_threshold_is_found_between_two_values_in_either_direction(vary: str, hardest: float) -> None:
-    found = margin(system(), vary, (-3, 3), engine="corners", budget=60)
+def test_the_threshold_is_found_in_either_direction(vary: str, high: float, hardest: float) -> None:
+    found = margin(system(), vary, (-3, high), engine="corners", budget=60)
     assert found.falsified is not None and found.unfalsified is not None
     assert min(found.falsified, found.unfalsified) <= hardest <= max(found.falsified, found.unfalsified)
     assert abs(found.unfalsified - found.falsified) <= 0.06 and found.complete

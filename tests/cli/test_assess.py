@@ -34,7 +34,7 @@ def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
 def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
     for wrong, said in (
         (["--stl", "x <= {limit}", "--between", "100"], "--between 100"),
-        (["--stl", "x <= 1", "--between", "0:3"], "--stl: expected a formula with {limit}"),
+        (["--stl", "x <= 1", "--between", "0:3"], "--stl: expected {limit} in place of the th"),
         (["--stl", "x <= {limit}", "--between", "0:3", "--budget", "9"], "a whole number from 20"),
         (["--stl", "G[0,{limit}] (x <= 1)", "--between", "1:30"], "--stl with {limit} = 30: "),
         (["--stl", "x <= 2 + 0*{limit}", "--between", "1:3"], "--stl: the robustness is the same"),
@@ -52,6 +52,9 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     assert done.json["searched"]["simulations"] == 5 and 0.99 < done.json["searched"]["smallest"] < 1.01
     refused = falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path)
     assert refused.code == 2 and "drop --stl" in refused.err
+    falsify("python:tests.stepped:euler_problem", "corners", budget=2, directory=tmp_path / "fragile")
+    doubted = falsifier("assess", "fragile", "--budget", "5", "--quiet", cwd=tmp_path)
+    assert " (1 violation, not confirmed)." in doubted.out
 
 
 def test_a_run_of_several_requirements_asks_which_one_is_assessed(tmp_path: Path) -> None:

@@ -88,6 +88,8 @@ def test_steps_that_are_held_are_told_when_they_take_effect() -> None:
     held = Signal((0.0, 0.9, 1.2, 1.4), (1.0, 2.0, 3.0, 4.0), "constant", hold=0.5)
     told = "u held: 1 at 0 s, 2 at 1 s, 4 at 1.5 s (2 switches, shortest dwell 0.5 s)"
     assert in_one_line(Candidate({"u": held})) == told
+    late = Candidate({"u": Signal((0.0, 2.5, 9.5), (1.0, 2.0, 3.0), "constant", hold=3.0)})
+    assert candidate_facts(late, SPACE) == [("input", "u [V] held: 1 at 0 s, 2 at 3 s (1 switch)")]
 
 
 @pytest.mark.parametrize("value", [0.1 + 0.2, 1e-7, 120.0, -0.5, 1e300])

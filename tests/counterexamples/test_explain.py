@@ -1,4 +1,5 @@
 from collections.abc import Mapping
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from falsifier.counterexamples.explain import explain
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import Array, lag_problem
-from tests.problems import broken, conditional
+from tests.problems import Columns, broken, conditional
 
 FREE = Freedom(10, 0.1)
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -55,6 +56,11 @@ def test_of_a_signal_the_stretches_that_count_are_named() -> None:
     assert spans == {(0.0, 2.0): True, (2.0, 5.0): True, (5.0, 10.0): False}
     assert "With u at rest (0 V) from 5 to 10 s alone: +" in explanation.text
     assert "from 2 to 5 s" not in explanation.text
+    held = replace(problem.space.inputs[0], hold=3.0)
+    problem = replace(problem, space=replace(problem.space, inputs=(held,)))
+    signal = Signal((0.0, 2.0, 5.0, 9.5), (-1.0, 0.5, 1.0, 0.5), "constant", hold=3.0)
+    explanation = explain(problem, evaluate(problem, Candidate({"u": signal})))
+    assert [e.span for e in explanation.effects[1:]] == [(0.0, 3.0), (3.0, 6.0), (6.0, 10.0)]
 
 
 def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
@@ -78,9 +84,7 @@ def test_what_resetting_would_not_change_is_left_out() -> None:
 
 
 def test_a_part_without_which_the_simulation_fails_is_said() -> None:
-    def fails_at_rest(
-        times: Array, inputs: dict[str, Array], parameters: dict[str, float]
-    ) -> Mapping[str, Array]:
+    def fails_at_rest(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
         return broken(times, {"u": 1 - inputs["u"]}, parameters)
 
     problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)

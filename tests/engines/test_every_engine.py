@@ -19,6 +19,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import FREE, START, Array, EngineContract, Response, drive, lag, lag_problem
 from tests.engines.support import HASTY
+from tests.problems import Columns
 
 NAMES = [name for name in ENGINES if name != "hybrid"]
 FORMULAS = (
@@ -104,9 +105,7 @@ def constant(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return {"x": np.zeros_like(times)}
 
 
-def at_the_end_of_the_range(
-    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
-) -> Mapping[str, Array]:
+def at_the_ends(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
     return {"x": 1.7e308 * np.sign(lag(times, inputs, parameters)["x"])}
 
 
@@ -116,9 +115,7 @@ def with_spikes(times: Array, inputs: dict[str, Array], parameters: dict[str, fl
     return {"x": x}
 
 
-def often_failing(
-    times: Array, inputs: dict[str, Array], parameters: dict[str, float]
-) -> Mapping[str, Array]:
+def often_failing(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
     x = lag(times, inputs, parameters)["x"]
     if int(abs(x[-1]) * 1e6) % 2:
         raise ValueError("it cannot be solved")
@@ -126,7 +123,7 @@ def often_failing(
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("response", [constant, at_the_end_of_the_range, with_spikes, often_failing])
+@pytest.mark.parametrize("response", [constant, at_the_ends, with_spikes, often_failing])
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("formula", ["G[0,10] (x <= 3)", "G[0,10] (x <= 3) or F[0,10] (x >= 9)"])
 def test_no_number_ends_a_search_or_warns(formula: str, name: str, response: Response) -> None:

@@ -96,10 +96,8 @@ class TestContract(EngineContract):
 
     def test_survives_failures(self) -> None:
         problem = lag_problem(free=FREE, parameters=[START])
-        asked = drive(
-            self.make(problem, 1), lambda c: Evaluation(c, "failed", reason="diverged"), rounds=self.rounds
-        )
-        assert len(asked) == self.rounds
+        failed = partial(Evaluation, status="failed", reason="diverged")
+        assert len(drive(self.make(problem, 1), failed, rounds=self.rounds)) == self.rounds
 
     def test_survives_a_plateau(self) -> None:
         problem = lag_problem(free=FREE, parameters=[START])

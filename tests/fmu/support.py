@@ -37,15 +37,17 @@ def commit(model: FmuModel, misdeed: int, *, time_limit: float = patience.HANG) 
     return caught.value
 
 
-def script(body: str, **environment: str) -> subprocess.Popen[str]:
-    """Start a process that simulates."""
-    return subprocess.Popen(
+def script(body: str, **environment: str) -> str:
+    """Return what a process prints that simulates."""
+    return subprocess.run(
         [sys.executable, "-c", SCRIPT + body, str(fixtures.path("Misdeeds_2"))],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
         preexec_fn=listen_to_interrupts,
-    )
+        timeout=patience.HANG,
+        check=False,
+    ).stdout
 
 
 def assert_nothing_is_left(folder: Path) -> None:

@@ -179,6 +179,10 @@ BROKEN: dict[str, tuple[Behaviour, str]] = {
     "no text": (sends(response(b"\xff\xfe\x00")), "not JSON (it begins with"),
     "depth": (sends(response(b"[" * 100_000)), "nested too deeply"),
     "no choices": (sends(response(b'{"id": "1", "choices": []}')), "without any choice"),
+    "an endless error": (
+        in_turn(sends(HEAD.replace(b"200", b"500") + b"\r\n"), trickles_of(b"not loaded " * 6000)),
+        "not loaded not loaded",
+    ),
     "an error as text": (sends(response(b'{"error": "model not loaded"}')), "model not loaded"),
     "a page of a proxy": (
         sends(response(b"<html>\n<title>502 Bad Gateway</title>\n</html>", status="502 x")),

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, field
 
 from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.llm.scripted import ScriptedChat
 
-SCHEMA = {
-    "type": "object",
-    "properties": {"sum": {"type": "number"}},
-    "required": ["sum"],
-    "additionalProperties": False,
-}
-QUESTION = ChatRequest(messages=(Message(role="user", content="what is 1 + 2?"),), reply_schema=SCHEMA)
+QUESTION = ChatRequest(
+    messages=(Message(role="user", content="what is 1 + 2?"),),
+    reply_schema=schema_of_object(sum={"type": "number"}),
+)
 
 
 @dataclass

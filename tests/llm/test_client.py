@@ -13,17 +13,13 @@ import falsifier
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
+from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
 from tests.llm.server import Received, Server, Step, serving
 
-SCHEMA = {
-    "type": "object",
-    "properties": {"rationale": {"type": "string"}},
-    "required": ["rationale"],
-    "additionalProperties": False,
-}
+SCHEMA = schema_of_object(rationale={"type": "string"})
 STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
 REQUEST = ChatRequest(
     messages=(Message(role="system", content="standing"), Message(role="user", content="question")),
@@ -191,11 +187,13 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
         "prompt_tokens_details": {"cached_tokens": 64},
     }
     counts["completion_tokens_details"] = {"reasoning_tokens": 12}
-    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts)
+    ended = "model_context_window_exceeded"
+    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
     with serving(answer, refusal) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         first, second = chat.send(REQUEST), chat.send(REQUEST)
     assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
+    assert first.finish_reason == "length", "it was cut off"
     assert (first.usage.cached_tokens, (first.usage + first.usage).cached_tokens) == (64, 128)
     assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
     assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"

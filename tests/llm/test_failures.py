@@ -140,6 +140,12 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
             Step(raw='{"error": {"message": "no", "code": 401}}'),
             "check OPENAI_API_KEY. the server reports: no",
         ),
+        (
+            Step(raw='{"choices": [{"message": {}, "error": {"code": 502, "message": "overloaded"}}]}'),
+            "/v1: the server reports: overloaded",
+        ),
+        (Step(status=503, message="context size pool overloaded"), "/v1: context size pool overloaded"),
+        (Step(status=429, message="exceeded your current quota: PerDay. Retry in 7s."), "no quota left"),
         (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -226,6 +226,10 @@ def test_words_that_stand_for_numbers_are_read(reply: dict[str, Any]) -> None:
             "times.1 (of 'on'): Value error",
         ),
         ({"point": [0, 0, 0.4, 0, 1]}, "number 3: 0.4 is no whole number; the nearest is 0"),
+        ({"signals": [{"name": "door", "values": [0, 2]}, 5]}, "signals.1: "),
+        ({"signals": {"door": [None, 2], "on": [0, 1]}}, "signals.0.values.0 (of 'door'): "),
+        ({"parameters": [{"name": "gear", "value": "fast"}]}, "parameters.0.value (of 'gear'): "),
+        ({"signals": [{"name": "n" * 200, "values": [True]}]}, f"unknown input '{'n' * 64}' ..."),
     ],
     ids=str,
 )
@@ -313,18 +317,3 @@ def test_what_can_be_read_in_one_way_only_is_read_and_everything_else_told() -> 
     assert len(ROWS) == len(list(odd_replies()))
     assert sum(came == "read" for _, came in ROWS) >= 27
     assert all(came == "read" or len(came) > len("rejected: ") for _, came in ROWS)
-
-
-@pytest.mark.parametrize(
-    ("reply", "problem"),
-    [
-        ({"signals": [{"name": "door", "values": [0, 2]}, 5]}, "signals.1: "),
-        ({"signals": {"door": [None, 2], "on": [0, 1]}}, "signals.0.values.0 (of 'door'): "),
-        ({"parameters": [{"name": "gear", "value": "fast"}]}, "parameters.0.value (of 'gear'): "),
-        ({"signals": [{"name": "n" * 200, "values": [True]}]}, f"unknown input '{'n' * 64}' ..."),
-    ],
-    ids=str,
-)
-def test_what_is_wrong_names_the_input_or_parameter(reply: dict[str, Any], problem: str) -> None:
-    with pytest.raises(RejectedReplyError, match=f"^{re.escape(problem)}"):
-        discrete(**reply)

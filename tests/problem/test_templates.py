@@ -181,7 +181,7 @@ def test_what_is_no_template_says_how_to_write_one(text: str) -> None:
         ("signal", "speed +", "position"),
         ("within", "x", "percentage such as"),
         ("within", -1, "at least 0"),
-        ("within", "nan%", "at least 0"),
+        ("within", "nan%", "or a percentage such as '2%', got 'nan%'"),
         ("time", -1, "greater than or equal to 0"),
         ("after", -1, "time of at least 0"),
         ("after", "x >", "position"),

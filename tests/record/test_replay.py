@@ -24,18 +24,19 @@ from falsifier.testing import lag_problem
 from tests.patience import HANG
 from tests.record.support import run
 
+PROBLEM = lag_problem("G[0,10] (x <= 2)")
+
 
 @pytest.mark.parametrize("engine", ["uniform", "corners", "sobol"])
 @pytest.mark.parametrize("keep", [1, 8, 17])
 def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine: str, keep: int) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    whole = run(problem, tmp_path / "whole", engine=engine)
+    whole = run(PROBLEM, tmp_path / "whole", engine=engine)
     lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
     cut = tmp_path / "cut"
     shutil.copytree(tmp_path / "whole", cut)
     torn = lines[keep][: len(lines[keep]) // 2]
     (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
-    resumed = run(problem, cut, engine=engine)
+    resumed = run(PROBLEM, cut, engine=engine)
     assert [(e.candidate.key, e.robustness) for e in resumed.evaluations] == [
         (e.candidate.key, e.robustness) for e in whole.evaluations
     ]
@@ -45,12 +46,11 @@ def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine
 
 
 def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    run(problem, tmp_path, budget=3)
+    run(PROBLEM, tmp_path, budget=3)
     with pytest.raises(
         JournalError, match=r"candidate 0 of the engine 'uniform' differs .* does not propose"
     ):
-        resume(tmp_path, problems=[problem], engine=make_engine("uniform", problem, seed=2))
+        resume(tmp_path, problems=[PROBLEM], engine=make_engine("uniform", PROBLEM, seed=2))
 
 
 def test_time_stands_still_while_a_run_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,9 +64,8 @@ def test_time_stands_still_while_a_run_is_repeated(tmp_path: Path, monkeypatch: 
 
 
 def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    whole = run(problem, tmp_path, budget=5)
-    (resumed,) = resume(tmp_path, problems=[problem], budget=Budget(8, seconds=1e-9))
+    whole = run(PROBLEM, tmp_path, budget=5)
+    (resumed,) = resume(tmp_path, problems=[PROBLEM], budget=Budget(8, seconds=1e-9))
     assert keys(resumed) == keys(whole)
     assert resumed.reason == "the time limit of 1e-09 s is reached"
 
@@ -74,13 +73,12 @@ def test_a_run_whose_time_is_used_up_is_still_repeated(tmp_path: Path) -> None:
 def test_the_time_of_a_run_that_was_killed_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = count(step=10)
     monkeypatch.setattr("falsifier.search.loop.perf_counter", lambda: float(next(ticks)))
-    problem = lag_problem("G[0,10] (x <= 2)")
-    run(problem, tmp_path, budget=5)
+    run(PROBLEM, tmp_path, budget=5)
     journal = tmp_path / "journal.jsonl"
     journal.write_bytes(b"".join(journal.read_bytes().splitlines(keepends=True)[:-1]))
     last = read_journal(tmp_path)[-1]
     assert isinstance(last, EvaluatedRecord) and last.elapsed > 100.0
-    (resumed,) = resume(tmp_path, problems=[problem], budget=Budget(8, seconds=100.0))
+    (resumed,) = resume(tmp_path, problems=[PROBLEM], budget=Budget(8, seconds=100.0))
     assert resumed.reason == "the time limit of 100 s is reached"
     assert resumed.spent.simulations == 5 and resumed.spent.seconds > last.elapsed
 
@@ -98,21 +96,19 @@ def keys(result: Result) -> list[object]:
 def test_with_several_cores_an_engine_is_asked_as_soon_as_one_is_free(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
     monkeypatch.setattr("falsifier.record.run.local_executor", threads)
-    whole = falsify(problem, "cma", budget=12, seed=1, jobs=3, directory=tmp_path)
+    whole = falsify(PROBLEM, "cma", budget=12, seed=1, jobs=3, directory=tmp_path)
     kinds = [r.kind for r in read_journal(tmp_path) if r.kind != "ended"]
     assert kinds == ["asked"] * 3 + ["evaluated", "asked"] * 9 + ["evaluated"] * 3
-    (resumed,) = resume(tmp_path, problems=[problem])
+    (resumed,) = resume(tmp_path, problems=[PROBLEM])
     assert keys(resumed) == keys(whole)
 
 
 def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
     monkeypatch.setattr("falsifier.record.run.local_executor", threads)
-    whole = falsify(problem, "uniform", budget=6, seed=1, jobs=2, directory=tmp_path)
+    whole = falsify(PROBLEM, "uniform", budget=6, seed=1, jobs=2, directory=tmp_path)
     shutil.rmtree(tmp_path / "trajectories")
     together = Barrier(2)
 
@@ -122,7 +118,7 @@ def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
 
     monkeypatch.setattr("falsifier.evaluation.workers.evaluate_any", simulated)
     events: list[Event] = []
-    (resumed,) = resume(tmp_path, problems=[problem], listeners=[events.append])
+    (resumed,) = resume(tmp_path, problems=[PROBLEM], listeners=[events.append])
     assert keys(resumed) == keys(whole)
     evaluated = [event.evaluation for event in events if isinstance(event, Evaluated)]
     assert len(evaluated) == 6 and all(each.trajectory is not None for each in evaluated)

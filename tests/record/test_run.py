@@ -22,7 +22,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run
-from falsifier.record.run import falsify, resume
+from falsifier.record.run import StopFile, falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Event, RunStarted
 from falsifier.search.make_engines import make_engines
@@ -89,6 +89,14 @@ def test_the_budget_of_a_run_that_has_falsified_stays_as_it_was_given(tmp_path: 
     assert falsify(EASY, "corners", budget=9, directory=tmp_path).falsified
     resume(tmp_path, budget=50)
     assert manifest.read(tmp_path).request.budget.simulations == 9
+
+
+@pytest.mark.parametrize(("budget", "status"), [(1, "not falsified"), (2, "interrupted")])
+def test_who_stops_a_run_at_its_end_interrupts_nothing(budget: int, status: str, tmp_path: Path) -> None:
+    (tmp_path / "stop").touch()
+    stop = StopFile(tmp_path / "stop", Budget(budget))
+    stop._looked = 0.0  # long ago
+    assert falsify(impossible(), "uniform", budget=budget, listeners=[stop]).status == status
 
 
 def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Path) -> None:

@@ -1,12 +1,11 @@
 """What a worker's replies, and its end, mean in words."""
 
-import re
 from collections.abc import Mapping, Sequence
 
 from falsifier.core.words import readable
-from falsifier.errors import FalsifierError, ModelError, SimulationError, written
+from falsifier.errors import FailureStatus, FalsifierError, ModelError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
-from falsifier.fmu.process.network import Network
+from falsifier.fmu.process.network import Member, Network
 from falsifier.fmu.process.plan import Plan
 
 _STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal")
@@ -60,7 +59,8 @@ def failure(
     A worker may reply anything. The refusals, of what FMUs tried and may not, end the message.
     """
     component = "" if reply.where in _OF_ALL else network.stepped(reply.component)
-    words = reply.text.split()
+    words, member = reply.text.split(), network.members[_member(network, reply)]
+    step = member.step or plan.times[1] / plan.every
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
     text = _TEXTS.get(reply.where, _EVENT)
@@ -71,8 +71,8 @@ def failure(
         returned=f"returned {_status_name(reply.status)}",
         reached=f"t = {readable(reply.time)} s",
         stop=f"{readable(plan.stop_time)} s",
-        step=f"{plan.times[1] / plan.every:.6g}",
-        remedy=_other_step(network, reply, plan.times[1] / plan.every),
+        step=f"{step:.6g}",
+        remedy=_other_step(member, step),
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),
@@ -83,11 +83,9 @@ def failure(
     text = f"{component or plan.model}: {said}{refusals}"
     if reply.where == Where.IMPOSSIBLE:
         return ModelError(text)
-    is_late = reply.where == Where.TIMEOUT
+    status: FailureStatus = "timeout" if reply.where == Where.TIMEOUT else "failed"
     time = None if reply.time < 0 else reply.time
-    return SimulationError(
-        text + last_lines(log), status="timeout" if is_late else "failed", time=time, log=log
-    )
+    return SimulationError(text + last_lines(log), status=status, time=time, log=log)
 
 
 def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:
@@ -101,11 +99,10 @@ def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> Si
     )
 
 
-def crash(plan: Plan, reached: float, reason: str, log: tuple[str, ...]) -> SimulationError:
+def crash(plan: Plan, reached: float, what: str, details: str, log: tuple[str, ...]) -> SimulationError:
     """Return the error for a simulation that its process did not survive."""
     at, time = _reached(plan, reached)
-    how = re.split("[:;] ", reason)[0]
-    text = f"{plan.model}: {how}{at}{reason.removeprefix(how)}{last_lines(log)}"
+    text = f"{plan.model}: {what}{at}{details}{last_lines(log)}"
     return SimulationError(text, status="crashed", time=time, log=log)
 
 
@@ -124,10 +121,11 @@ def last_lines(log: tuple[str, ...]) -> str:
     return f"; its last message: {lines[0]}" if lines else ""
 
 
-def _other_step(network: Network, reply: Reply, step: float) -> str:
-    """Say which communication step to state for an FMU that refuses the one that it was asked for."""
+def _other_step(member: Member, step: float) -> str:
+    """Say which step to state for an FMU that refuses the one that it was asked for."""
     option = written("--output-interval, or as step_size in a spec", "step_size")
-    internal = network.members[_member(network, reply)].description.info.internal_step
+    option = f"components.{member.name}.step" if member.step else option
+    internal = member.description.info.internal_step
     if internal is None or abs(step / internal - max(1, round(step / internal))) < 1e-9:
         return f"an FMU of one step only needs it as {option}"
     return (

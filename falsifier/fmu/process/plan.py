@@ -69,19 +69,17 @@ def make_plan(
     model = description.info.name
     variables = {v.name: v for v in description.info.variables}
     inputs, parameters = tuple(inputs), tuple(parameters)
-    for name in inputs:
+    for name in (*inputs, *parameters, *experiment.outputs):
         description.slot(name)
+    for name in inputs:
         if (role := variables[name].causality) != "input":
             known = ", ".join(v.name for v in description.info.inputs) or "none"
             raise ModelError(
                 f"{model}: {name!r} is not an input, its causality is {role}; the inputs are: {known}"
             )
     for name in parameters:
-        description.slot(name)
         if refusal := variables[name].refusal:
             raise ModelError(f"{model}: {name!r} cannot be set: {refusal}")
-    for name in experiment.outputs:
-        description.slot(name)
     for name, _ in experiment.strings:
         slot = description.slots.get(name)
         if slot is None:

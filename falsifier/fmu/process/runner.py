@@ -220,9 +220,8 @@ class Runner:
             log = worker.output.take()
             reason = f"the FMU hung for {time_limit:g} s (time_limit) while it was loaded{worker.during}"
         else:
-            said, log = worker.crash(error)
-            how, _, end = said.partition(": ")
-            reason = f"{how} while it was loaded{f' ({end})' if end else ''}"
+            what, details, log = worker.crash(error)
+            reason = f"{what} while it was loaded{details}"
         text = f"{self._order.network.name}: {reason}{outcome.last_lines(log)}"
         if not self._has_loaded:
             return ModelError(text)

@@ -214,22 +214,19 @@ class Worker(Started):
         name = self._order.network.stepped(self._position)
         return f" in component {name}" if name else ""
 
-    def crash(self, error: Exception) -> tuple[str, tuple[str, ...]]:
-        """End the process; return in words why it did not go on, and what it wrote."""
+    def crash(self, error: Exception) -> tuple[str, str, tuple[str, ...]]:
+        """End the process; return in words what happened, details to be told after it, and what it wrote."""
         during, is_garbled = self.during, isinstance(error, Garbled)
         is_open = not is_garbled and not self.program.ends_within(_ENDING_SECONDS)
         log, told = self.output.take(), self._told()
         code = self.end()
         self.is_cut = is_garbled or is_open or code == _CUT_OFF
-        if told.cause:
-            reason = f"{told.cause}{during}"
-        elif is_garbled:
-            reason = f"the FMU disturbed the replies of its process{during}"
-        elif self.is_cut:
-            reason = f"the FMU cut the connection of its process{during}"
-        else:
-            reason = f"the FMU's process crashed{during}: {exit_text(code)}"
-        return f"{reason}; {told.refusals}" if told.refusals else reason, log
+        what, details = told.cause, f"; {told.refusals}" if told.refusals else ""
+        if not what and self.is_cut:
+            what = f"the FMU {'disturbed the replies' if is_garbled else 'cut the connection'} of its process"
+        elif not what:
+            what, details = "the FMU's process crashed", f": {exit_text(code)}{details}"
+        return what + during, details, log
 
     @property
     def refusals(self) -> str:

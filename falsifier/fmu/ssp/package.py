@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import inf, isfinite
 from pathlib import Path, PurePosixPath
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
 from falsifier.core.files import absent
+from falsifier.core.literals import number_in
 from falsifier.errors import ModelError, SpecError, did_you_mean, in_section
 from falsifier.fmu.description.archive import extract, file_hash
 from falsifier.fmu.description.variables import is_true
@@ -155,11 +155,7 @@ def type_and_unit(element: Element) -> tuple[str, str, Element]:
 
 def number(name: str, text: str) -> float:
     """Return the finite number that an attribute states; raise SpecError for others."""
-    try:
-        found = float(text)
-    except ValueError:
-        found = inf
-    if not isfinite(found):
+    if (found := number_in(text)) is None:
         raise SpecError(f"{name}: {text!r} is not a finite number; correct it")
     return found
 

@@ -290,7 +290,7 @@ def _input_steps(evaluation: Evaluation) -> tuple[float, ...]:
             time
             for signal in evaluation.candidate.signals.values()
             if signal.interpolation == "constant"
-            for time, before, after in zip(signal.times[1:], signal.values, signal.values[1:], strict=False)
+            for time, before, after in zip(signal.moments[1:], signal.values, signal.values[1:], strict=False)
             if before != after
         }
     )

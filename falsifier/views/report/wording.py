@@ -86,8 +86,9 @@ def input_table(shown: Shown) -> Table:
     A cell is empty where an input has no control point; how it goes on between them stands in the header.
     """
     signals = {
-        name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal.stepped
-        for name, signal in shown.candidate.signals.items()
+        name: Signal((0.0,), signal.values[:1]) if len(set(signal.values)) == 1 else signal
+        for name, s in shown.candidate.signals.items()
+        for signal in [s.stepped(shown.run.manifest.stop_time)]
     }
     header, columns = ["time [s]"], []
     for name, signal in signals.items():

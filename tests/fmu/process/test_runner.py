@@ -122,9 +122,7 @@ threading.Timer(0.3, os.kill, (os.getpid(), 9)).start()
 print(runner._worker.program.pid, flush=True)
 go(2)
 """
-    with script(body, TMPDIR=str(tmp_path)) as process:
-        assert process.stdout is not None
-        pid = int(process.stdout.read())
+    pid = int(script(body, TMPDIR=str(tmp_path)))
     patience.wait_until(lambda: not Path(f"/proc/{pid}").exists())
     assert_nothing_is_left(tmp_path)
 
@@ -137,11 +135,7 @@ threading.Thread(target=go, args=(2,), daemon=True).start()
 time.sleep(0.3)
 print("end", flush=True)
 """
-    with script(body, TMPDIR=str(tmp_path)) as process:
-        try:
-            assert process.communicate(timeout=patience.HANG)[0] == "end\n"
-        finally:
-            process.kill()
+    assert script(body, TMPDIR=str(tmp_path)) == "end\n"
     assert_nothing_is_left(tmp_path)
 
 
@@ -154,9 +148,7 @@ if not pid:
 os.waitpid(pid, 0)
 print(go(), flush=True)
 """
-    with script(body, TMPDIR=str(tmp_path)) as process:
-        assert process.stdout is not None
-        assert process.stdout.read() == "10.0\n10.0\n"
+    assert script(body, TMPDIR=str(tmp_path)) == "10.0\n10.0\n"
     assert_nothing_is_left(tmp_path)
 
 
@@ -169,9 +161,7 @@ try:
 except KeyboardInterrupt:
     print("interrupted", go())
 """
-    with script(body) as process:
-        assert process.stdout is not None
-        assert process.stdout.read() == "interrupted 10.0\n"
+    assert script(body) == "interrupted 10.0\n"
 
 
 def orders(number: int) -> list[Order]:

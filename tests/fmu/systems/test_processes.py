@@ -9,6 +9,7 @@ import pytest
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Component, Connection, Coupling
+from tests.campaigns.test_kill import children
 from tests.fmu.small_systems import LOOP, component, pids, run, solved, system
 from tests.fmu.support import CRASH, HANG
 from tests.patience import wait_until
@@ -53,10 +54,6 @@ def test_libraries_that_must_be_loaded_again_cost_no_process_of_the_master() -> 
         run(model, "a.y", "b.y")
         used |= set(pids(model))
     assert len(used) == 1
-
-
-def children(pid: int | str) -> list[str]:
-    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
 
 
 def test_a_component_that_crashes_or_hangs_is_named_and_the_next_simulation_works() -> None:

@@ -112,7 +112,8 @@ def test_inputs_are_a_table_of_their_control_points(tmp_path: Path) -> None:
 
 def test_numbers_to_enter_are_not_rounded_to_six_digits() -> None:
     u = Signal((0.0, 43215.25), (2147483647.0, 1 / 3), "constant")
-    shown = SimpleNamespace(candidate=Candidate({"u": u}), units={})
+    run = SimpleNamespace(manifest=SimpleNamespace(stop_time=43216.0))
+    shown = SimpleNamespace(candidate=Candidate({"u": u}), units={}, run=run)
     assert input_table(shown).rows == (("0", "2147483647"), ("43215.25", "0.3333333333"))  # type: ignore[arg-type]
     assert signal_text(Signal((0.0,), (2147483647.0,))) == "constant 2147483647"
 
