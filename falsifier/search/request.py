@@ -38,7 +38,7 @@ class Strict(BaseModel):
 
 
 class LLMSettings(Strict):
-    """Which language model to ask, and how."""
+    """Which language model to ask, and how; what does not fit is a ``ValidationError`` of pydantic."""
 
     # An option that contains a key is rejected, and the error must not show it either.
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, defer_build=True)
