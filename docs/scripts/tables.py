@@ -106,7 +106,8 @@ def _type(said: Mapping[str, Any]) -> str:
         return _type(said["additionalProperties"])
     limits = [f"> {said['exclusiveMinimum']:g}"] if "exclusiveMinimum" in said else []
     limits += [f">= {said['minimum']:g}"] if "minimum" in said else []
-    return " ".join([said["type"], *limits])
+    limits += [f"<= {said['maximum']:g}"] if "maximum" in said else []
+    return f"{said['type']} {', '.join(limits)}".rstrip()
 
 
 def _engines(_: str | None) -> str:

@@ -42,8 +42,8 @@ def assess(
 
     TARGET is a bundled problem (AT1), a spec file (my.toml or my.toml:REQ), an FMU with --stl, or a run
     directory: then inputs are drawn from the search space of the run, and its findings are stated beside
-    the bound. Every control point and every parameter is drawn uniformly from its range, as by the engine
-    uniform. The upper bound is exact (Clopper and Pearson).
+    the bound. Every control point of the fixed parameterization and every parameter is drawn uniformly
+    from its range. The upper bound is exact (Clopper and Pearson).
 
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the draws so far count.

@@ -32,6 +32,7 @@ class Trajectory:
 
     Raises:
         MonitorError: if the times are no such grid, or a column is not of one number per time.
+        SpecError: if times or a column are no array of numpy, such as a list.
     """
 
     times: NDArray[np.float64]

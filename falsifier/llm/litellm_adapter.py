@@ -164,24 +164,25 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
         if name not in taken:
             given = written(f"--llm-option {name}", name)
             raise ChatSetupError(
-                f"{given}: {provider} has no such option; {did_you_mean(name, sorted(taken))}. What litellm "
+                f"{given}: {provider} has no such option; {did_you_mean(name, taken)}. What litellm "
                 "does not know can be sent in Python: connect(NAME, options={'extra_body': {...}})"
             )
 
 
-def _options_of(llm: str) -> set[str]:
-    """Names of what litellm takes for an LLM: OpenAI's parameters, the provider's and its own."""
+def _options_of(llm: str) -> list[str]:
+    """Names of what litellm takes for an LLM: first what the LLM does, then the provider's and litellm's."""
     litellm = load_litellm()
     from litellm.types.utils import all_litellm_params
     from litellm.utils import ProviderConfigManager
 
     name, provider, *_ = litellm.get_llm_provider(llm)
     taken = {*signature(litellm.completion).parameters, *all_litellm_params, "extra_body", "max_retries"}
-    taken |= set(litellm.get_supported_openai_params(model=name, custom_llm_provider=provider) or ())
+    first = litellm.get_supported_openai_params(model=name, custom_llm_provider=provider) or ()
     config = ProviderConfigManager.get_provider_chat_config(name, litellm.LlmProviders(provider))
     for kind in type(config).__mro__:
-        taken |= {key for key in getattr(kind, "__annotations__", {}) if key.islower() and key[0] != "_"}
-    return taken - {"kwargs", "self"}
+        taken |= {key for key in getattr(kind, "__annotations__", {}) if key.islower()}
+    ordered = dict.fromkeys((*first, *sorted(taken - {"kwargs", "self"})))
+    return [name for name in ordered if name[0] != "_"]
 
 
 def dropped_parameters(llm: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:

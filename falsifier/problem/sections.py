@@ -45,11 +45,16 @@ def _number_or_word(value: Any) -> float | str:
 
 # A path, or a text with one: all that users name is recorded.
 Recordable = Annotated[str, AfterValidator(utf_8)]
-Number = Annotated[float, BeforeValidator(_plain), Field(allow_inf_nan=False)]
+# Limits come first: after a validator, a JSON Schema does not state them.
+Number = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(_plain)]
 Value = Annotated[float | str, BeforeValidator(_number_or_word)]
-Seconds = Annotated[float, BeforeValidator(_plain), Field(gt=0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False), BeforeValidator(_plain)]
+Duration = Annotated[float, Field(ge=0, allow_inf_nan=False), BeforeValidator(_plain)]
 Truth = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, BeforeValidator(_plain)]
+# Maximum number of control points of one input.
+MAX_CONTROL_POINTS = 10_000
+_ControlPoints = Annotated[int, Field(ge=1, le=MAX_CONTROL_POINTS), BeforeValidator(_plain)]
 
 
 def in_order(limits: tuple[float, float]) -> tuple[float, float]:
@@ -62,8 +67,6 @@ def in_order(limits: tuple[float, float]) -> tuple[float, float]:
 Range = Annotated[tuple[Number, Number], AfterValidator(in_order)]
 # Of a variable, whose items' names stand for numbers that are known once there is a model.
 Ends = Annotated[tuple[Value, Value], AfterValidator(lambda e: e if str in map(type, e) else in_order(e))]
-# Maximum number of control points of one input.
-MAX_CONTROL_POINTS = 10_000
 
 
 class Strict(BaseModel):
@@ -101,9 +104,7 @@ def _wrong(key: str, message: str) -> PydanticCustomError:
 class FreeSection(Strict):
     """Limits of a free parameterization."""
 
-    max_control_points: Count = Field(
-        ge=1, le=MAX_CONTROL_POINTS, description="Maximum number of control points."
-    )
+    max_control_points: _ControlPoints = Field(description="Maximum number of control points.")
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
@@ -113,10 +114,8 @@ class InputSection(Strict):
     range: Ends | None = Field(
         None, description="[low, high], numbers or names of items; default: the FMU's min and max."
     )
-    control_points: Count | None = Field(
+    control_points: _ControlPoints | None = Field(
         None,
-        ge=1,
-        le=MAX_CONTROL_POINTS,
         description="Number of evenly spaced control points; default: engines choose them, 5 if fixed.",
     )
     interpolation: Interpolation | None = Field(

@@ -79,7 +79,6 @@ Term = Annotated[str | float, BeforeValidator(no_truth), AfterValidator(_term)]
 Condition = Annotated[str, AfterValidator(_condition)]
 Margin = Annotated[float | str, BeforeValidator(no_truth), AfterValidator(_margin)]
 Moment = Annotated[float | str, BeforeValidator(no_truth), AfterValidator(_moment)]
-Duration = Annotated[Number, Field(ge=0)]
 
 
 # -- parts of formulas, as text ------------------------------------------------------------------------------

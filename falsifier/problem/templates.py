@@ -23,11 +23,10 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from falsifier.errors import FormulaError
-from falsifier.problem.sections import Count, Number, Range, Seconds
+from falsifier.problem.sections import Count, Duration, Number, Range, Seconds
 from falsifier.problem.template_arguments import (
     Clock,
     Condition,
-    Duration,
     Margin,
     Moment,
     Template,

@@ -21,10 +21,10 @@ from falsifier.problem.sections import no_truth
 from falsifier.problem.source import ProblemSource
 from falsifier.search.budget import Budget
 
-_Number = Annotated[float, BeforeValidator(no_truth), Field(allow_inf_nan=False)]
 _Count = Annotated[int, BeforeValidator(no_truth)]
 # A negative price, or one that is not a number, would switch off the limit on the cost.
-_Price = Annotated[_Number, Field(ge=0)]
+_Price = Annotated[float, Field(ge=0, allow_inf_nan=False), BeforeValidator(no_truth)]
+_Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False), BeforeValidator(no_truth)]
 
 # Which trajectories a record keeps. history: the first ones, then each that improves on the best; best: only
 # the best one, for campaigns of very many runs.
@@ -38,7 +38,7 @@ class Strict(BaseModel):
 
 
 class LLMSettings(Strict):
-    """Which language model to ask, and how."""
+    """Which language model to ask, and how; what does not fit is a ``ValidationError`` of pydantic."""
 
     # An option that contains a key is rejected, and the error must not show it either.
     model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, defer_build=True)
@@ -54,9 +54,7 @@ class LLMSettings(Strict):
         default=None,
         description="US dollars per million tokens sent, and per million received; default: litellm's table.",
     )
-    timeout: _Number | None = Field(
-        default=None, gt=0, description="Seconds to wait for one reply; default: 600."
-    )
+    timeout: _Seconds | None = Field(default=None, description="Seconds to wait for one reply; default: 600.")
     anonymous: bool = Field(default=False, description="Use neutral names in prompts.")
     cache: bool = Field(default=True, description="Answer repeated questions from disk.")
 

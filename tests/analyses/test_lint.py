@@ -1,7 +1,6 @@
 """Findings on requirements that say nothing, and none on the bundled specs."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +11,8 @@ from falsifier.analyses.lint import lint, static_findings, unmoved_findings
 from falsifier.cli.requirements import check
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
-from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import ProblemSource
-from falsifier.stl import parse
-from falsifier.testing import Array, lag_problem
+from falsifier.testing import BIAS, Array, lag_problem
 from tests.fmu.fixtures import altered
 from tests.problem.support import AT, spec
 
@@ -52,6 +49,7 @@ FOUND = [
     ("F[0,20] (throttle > 100.5)", "never", "F[0,20] (throttle > 100.5)", "every trajectory"),
     ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
     ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake = 0"),
+    ("G[0,20] (throttle < 50 or waitTicks > 3 or speed < 9)", "never", "waitTicks > 3", "waitTicks = 2"),
     ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
     *((right, "", "", "") for right in ("F[0,3] (throttle <= 3*speed)", "G[0,20] (wheel <= 200)")),
     ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
@@ -98,11 +96,10 @@ def test_a_requirement_about_booleans_alone_has_no_margin(tmp_path: Path, formul
 
 
 def test_a_searched_parameter_does_not_change_over_time() -> None:
-    problem = lag_problem()
-    fixed = replace(problem, parameters={"u": 1.0}, space=problem.space)
+    problem = lag_problem(parameters=[BIAS])
     assert not list(static_findings(problem))
-    with_input = replace(fixed, requirement=Requirement("R", parse("G[0,3] (u <= 2)")))
-    assert [f.kind for f in static_findings(with_input)] == ["always", "window"]
+    named = problem.with_requirement("G[0,3] (bias <= 0.5)")
+    assert [f.kind for f in static_findings(named)] == ["window"]
 
 
 def test_requirements_that_repeat_others_are_found(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Run directories are plain files that keep to the exported JSON Schemas."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -14,7 +15,9 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "run-directory.md"
 
 
 def schema(what: str) -> dict[str, object]:
-    loaded: dict[str, object] = json.loads(CliRunner().invoke(cli, ["tools", "schema", what]).stdout)
+    printed = CliRunner().invoke(cli, ["tools", "schema", what]).stdout
+    assert not re.search(r'"(gt|ge|lt|le)":', printed)  # pydantic's names of limits, which schemas ignore
+    loaded: dict[str, object] = json.loads(printed)
     jsonschema.Draft202012Validator.check_schema(loaded)
     return loaded
 
