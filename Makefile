@@ -61,8 +61,7 @@ worker: .venv-export/installed
 	$(BIN)/pip $(PIP_INSTALL) -c constraints.txt -e .
 	@touch $@
 
-# An editable install has a copy of the pytest plugin.
-.venv/test: pyproject.toml constraints.txt pytest_falsifier.py | .venv/bin/pip
+.venv/test: pyproject.toml constraints.txt | .venv/bin/pip
 	$(BIN)/pip $(PIP_INSTALL) -c constraints.txt -e '.[test]'
 	@touch .venv/installed $@
 
