@@ -15,16 +15,8 @@ from pathlib import Path
 from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
-from falsifier.errors import JournalError, written
-from falsifier.record.files import (
-    CAMPAIGN,
-    can_be_a_folder,
-    check_unused,
-    is_locked,
-    locked,
-    read_sealed,
-    write_sealed,
-)
+from falsifier.errors import JournalError
+from falsifier.record.files import CAMPAIGN, can_be_a_folder, is_locked, locked, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -44,17 +36,6 @@ class CampaignRecord(Surroundings):
 def is_campaign(directory: Path) -> bool:
     """Whether a directory contains a campaign."""
     return (directory / CAMPAIGN).exists()
-
-
-def check_new(directory: Path) -> None:
-    """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has."""
-    if is_campaign(directory) or holds_run(directory):
-        what, resume = ("campaign", "resume_campaign") if is_campaign(directory) else ("run", "resume")
-        raise JournalError(
-            f"{directory} already contains a {what}: choose another directory, or to continue it: "
-            + written(f"falsifier resume {directory}", f"{resume}({str(directory)!r})")
-        )
-    check_unused(directory)
 
 
 def write_campaign(directory: Path, record: CampaignRecord) -> None:

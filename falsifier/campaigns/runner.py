@@ -8,7 +8,6 @@ from time import perf_counter
 from falsifier.campaigns.directory import (
     CampaignRecord,
     campaign_lock,
-    check_new,
     read_campaign,
     run_directory,
     write_campaign,
@@ -24,7 +23,7 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import STOP, holds_run, open_journal
+from falsifier.record.journal import STOP, check_new, holds_run, open_journal
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget

@@ -25,7 +25,7 @@ from falsifier.campaigns import (
 )
 from falsifier.campaigns.analysis import load, not_begun, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
-from falsifier.campaigns.directory import check_new, is_campaign
+from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.request import Method, Searcher, ceiling, method_of
 from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
@@ -37,6 +37,7 @@ from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource
+from falsifier.record.journal import check_new
 from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import LLM_ENGINES, price_of

@@ -28,7 +28,7 @@ from time import monotonic
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
 from falsifier.core.words import counted
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, written
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record import files, manifest
 from falsifier.record.records import (
@@ -194,6 +194,19 @@ def holds_run(directory: Path) -> bool:
     """Whether a directory contains a run."""
     with files.can_be_a_folder(directory):
         return (directory / manifest.MANIFEST).exists()
+
+
+def check_new(directory: Path, *, is_loadable: bool = True) -> None:
+    """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has."""
+    is_campaign = (directory / files.CAMPAIGN).exists()
+    if is_campaign or holds_run(directory):
+        what, resume = ("campaign", "resume_campaign") if is_campaign else ("run", "resume")
+        how = written(f"falsifier resume {directory}", f"{resume}({str(directory)!r})")
+        how = how if is_loadable else "resume() with problems=[...]"
+        raise JournalError(
+            f"{directory} already contains a {what}: choose another directory, or to continue it: {how}"
+        )
+    files.check_unused(directory)
 
 
 def simulated(directory: Path) -> int:

@@ -16,15 +16,15 @@ from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
-from falsifier.errors import JournalError, SpecError, written
+from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.files import CAMPAIGN, check_unused
-from falsifier.record.journal import JOURNAL, STOP, holds_run, open_journal, simulated
+from falsifier.record.files import check_unused
+from falsifier.record.journal import JOURNAL, STOP, check_new, holds_run, open_journal, simulated
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of
@@ -271,25 +271,14 @@ def carry_out(
         )
     with ExitStack() as stack:
         begun = directory is not None and holds_run(directory)
-        if begun and not resume:
-            raise JournalError(
-                f"{directory} already contains a run: choose another directory, or to continue it: "
-                + (
-                    written(f"falsifier resume {directory}", f"resume({str(directory)!r})")
-                    if request.problems
-                    else "resume() with problems=[...]"
-                )
-            )
-        if directory is not None and (directory / CAMPAIGN).exists():
-            raise JournalError(f"{directory} already contains a campaign: choose another directory")
         left = directory / JOURNAL if directory is not None and not begun else None
         if left is not None and left.exists() and left.stat().st_size:
             raise JournalError(
                 f"{directory} contains a journal without its manifest, so its run is unknown: "
                 "choose another directory, or delete it"
             )
-        if directory is not None and not begun and not resume:
-            check_unused(directory)
+        if directory is not None and not resume:
+            check_new(directory, is_loadable=bool(request.problems))
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         recorded = manifest.read(directory) if begun and directory else None
         told = told_problems(request, problems, recorded.contexts if recorded else {})
