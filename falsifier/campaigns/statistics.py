@@ -23,7 +23,8 @@ R = TypeVar("R", bound=RunProgress)
 class Statistics:
     """Statistics of several runs.
 
-    All numbers but ``unfinished`` and ``best`` cover finished runs only: they spent the budget or falsified.
+    All but ``unfinished``, ``best`` and ``budgets`` cover finished runs only: they spent the budget or
+    falsified.
 
     Attributes:
         runs: number of finished runs.
@@ -42,6 +43,9 @@ class Statistics:
         simulations: number of simulations of all runs.
         failures: those among them that failed.
         kept: replies from the cache in all runs, whose tokens and cost are not counted.
+        budgets: the different limits on the simulations of a run, in ascending order.
+        known: number of runs that began with known inputs.
+        repeated: number of runs with the seed of another one, which say nothing new.
     """
 
     runs: int
@@ -60,6 +64,9 @@ class Statistics:
     simulations: int
     failures: int
     kept: int
+    budgets: tuple[int, ...]
+    known: int
+    repeated: int
 
 
 def statistics(runs: Iterable[RunProgress]) -> Statistics:
@@ -86,6 +93,9 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
         simulations=spent.simulations,
         failures=spent.failures,
         kept=spent.kept,
+        budgets=tuple(sorted({limit for run in runs if (limit := run.request.budget.simulations)})),
+        known=sum(bool(run.request.start_from) for run in finished),
+        repeated=len(finished) - len({run.seed for run in finished}),
     )
 
 
