@@ -11,7 +11,6 @@ import csv
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from io import StringIO
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -22,7 +21,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from falsifier.campaigns.runs import Run
 from falsifier.campaigns.tables import read_published
 from falsifier.core.candidate import Candidate
-from falsifier.core.literals import csv_cell
+from falsifier.core.literals import csv_text
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted, shortened
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, first_fault
@@ -164,14 +163,10 @@ def export(runs: Iterable[Run]) -> dict[str, str]:
         is_instance = run.method.profile in _PROFILES.values()
         method = replace(run.method, profile="") if is_instance else run.method
         methods.setdefault(method.label, []).append(run)
-    files = {}
-    for label, of_method in methods.items():
-        buffer = StringIO()
-        writer = csv.DictWriter(buffer, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(_exported, of_method))
-        files[label] = buffer.getvalue()
-    return files
+    return {
+        label: csv_text([COLUMNS, *(_exported(run).values() for run in of_method)])
+        for label, of_method in methods.items()
+    }
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -210,8 +205,8 @@ def tolerance(requirement: str) -> float:
 def _exported(run: Run) -> dict[str, object]:
     system, property_ = _NAMES.get(run.requirement, (run.manifest.model.rpartition(".")[2], run.requirement))
     row: dict[str, object] = {
-        "system": csv_cell(system),
-        "property": csv_cell(property_),
+        "system": system,
+        "property": property_,
         "instance": next((i for i, p in _PROFILES.items() if p == (run.method.profile or None)), "1"),
         "input": "[]",
         "parameters": "[]",

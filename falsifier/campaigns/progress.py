@@ -1,7 +1,7 @@
 """Progress of a campaign, read from its directory: the same for the process that runs it and for others."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,8 +43,13 @@ class Follower:
     """
 
     def __init__(self, directory: Path) -> None:
-        self._places = [directory] if is_campaign(directory) else run_directories(directory)
-        self._runs = list(_followed(directory))
+        self._places = [directory]
+        if is_campaign(directory):
+            asked = requested_runs(directory)
+            self._runs = [RunFollower(run_directory(directory, run.name), [run]) for run in asked]
+        else:
+            self._places = run_directories(directory)
+            self._runs = [RunFollower(p, list[RunProgress](unread_runs(p))) for p in self._places]
 
     @property
     def is_worked_on(self) -> bool:
@@ -54,16 +59,6 @@ class Follower:
     def look(self) -> Progress:
         """Read what is new, and return the current progress, whose runs change with the next look."""
         return Progress(tuple(run for follower in self._runs for run in follower.look()))
-
-
-def _followed(directory: Path) -> Iterator[RunFollower[RunProgress]]:
-    """Yield a follower for each run of a campaign, or for each run directory."""
-    if is_campaign(directory):
-        for run in requested_runs(directory):
-            yield RunFollower(run_directory(directory, run.name), [run])
-        return
-    for place in run_directories(directory):
-        yield RunFollower(place, list[RunProgress](unread_runs(place)))
 
 
 def spent_together(shares: Iterable[tuple[object, Spent]]) -> Spent:

@@ -32,12 +32,14 @@ class RunProgress(Summary):
         requirement: name of the requirement; numbered if another run has another formula of the same name.
         method: how it searches.
         seed: seed of the engine.
+        request: what was asked for.
     """
 
     name: str
     requirement: str
     method: Method
     seed: int
+    request: RunRequest
 
     @property
     def simulations(self) -> int:
@@ -65,7 +67,7 @@ class Run(RunProgress):
     @property
     def is_ad_hoc(self) -> bool:
         """Whether the requirement is a formula to which nobody gave a name."""
-        source = self.manifest.request.source
+        source = self.request.source
         return source is not None and source.stl is not None and source.stl_name == STL_NAME
 
     @property
@@ -76,7 +78,7 @@ class Run(RunProgress):
     @property
     def counts(self) -> bool:
         """Whether tables count it: it ended with a result, or spent its budget and not all of it failed."""
-        budget, spent = self.manifest.request.budget, replace(self.spent, cost=self.spent.cost or 0.0)
+        budget, spent = self.request.budget, replace(self.spent, cost=self.spent.cost or 0.0)
         is_spent = self.best is not None and budget.exceeded(spent) is not None
         return self.finished or (self.status == "failed" and is_spent)
 
@@ -109,12 +111,11 @@ def load(directory: str | Path) -> list[Run]:
     """
     places = run_directories(Path(directory))
     runs = [run for place in places for run in RunFollower(place, unread_runs(place)).look()]
-    formulas: dict[str, list[str]] = {}
+    formulas: dict[str, dict[str, None]] = {}
     for run in runs:
-        known = formulas.setdefault(run.requirement, [])
-        known += [run.manifest.requirement.formula] if run.manifest.requirement.formula not in known else []
+        formulas.setdefault(run.requirement, {})[run.manifest.requirement.formula] = None
     for run in runs:  # runs of --stl all have the same name
-        if len(known := formulas[run.requirement]) > 1:
+        if len(known := [*formulas[run.requirement]]) > 1:
             run.requirement += f"-{known.index(run.manifest.requirement.formula) + 1}"
     return runs
 
@@ -122,20 +123,17 @@ def load(directory: str | Path) -> list[Run]:
 def not_begun(directory: str | Path, begun: Sequence[Run]) -> list[RunProgress]:
     """Return the runs of a campaign that have not begun, which tables count beside those that have."""
     place, known = Path(directory), {run.directory.name for run in begun}
-    names = {run.manifest.request.problems[0]: run.requirement for run in begun}
-    asked = read_campaign(place).request.named() if is_campaign(place) else {}
-    left = {name: request for name, request in asked.items() if name not in known}
-    return [_requested(name, r, names.get(r.problems[0])) for name, r in left.items()]
+    names = {run.request.problems[0]: run.requirement for run in begun if run.request.problems}
+    left = [run for run in requested_runs(place) if run.name not in known] if is_campaign(place) else []
+    return [replace(run, requirement=names.get(run.request.problems[0], run.requirement)) for run in left]
 
 
 def requested_runs(directory: Path) -> list[RunProgress]:
     """Return the runs of a campaign as they were asked for, before anything is read of them."""
-    return [_requested(name, r) for name, r in read_campaign(directory).request.named().items()]
-
-
-def _requested(name: str, r: RunRequest, requirement: str | None = None) -> RunProgress:
-    called = requirement or r.problems[0].name
-    return RunProgress(name=name, requirement=called, method=method_of(r), seed=r.seed)
+    return [
+        RunProgress(name=name, requirement=r.problems[0].name, method=method_of(r), seed=r.seed, request=r)
+        for name, r in read_campaign(directory).request.named().items()
+    ]
 
 
 def load_run(directory: str | Path, requirement: str | None = None) -> Run:
@@ -165,6 +163,7 @@ def unread_runs(directory: Path) -> list[Run]:
             requirement=name,
             method=method_of_run(manifest),
             seed=manifest.request.seed,
+            request=manifest.request,
             recorded_as=name,
         )
         for name in manifest.names

@@ -23,7 +23,7 @@ R = TypeVar("R", bound=RunProgress)
 class Statistics:
     """Statistics of several runs.
 
-    All numbers but ``unfinished`` and ``best`` cover finished runs only: they spent the budget or falsified.
+    All but ``unfinished``, ``best`` and ``budgets`` are of finished runs: they spent the budget or falsified.
 
     Attributes:
         runs: number of finished runs.
@@ -42,6 +42,9 @@ class Statistics:
         simulations: number of simulations of all runs.
         failures: those among them that failed.
         kept: replies from the cache in all runs, whose tokens and cost are not counted.
+        budgets: the different limits on the simulations of a run, in ascending order.
+        known: number of runs that began with known inputs.
+        repeated: number of runs without a language model that have the seed of another one: nothing new.
     """
 
     runs: int
@@ -60,6 +63,9 @@ class Statistics:
     simulations: int
     failures: int
     kept: int
+    budgets: tuple[int, ...]
+    known: int
+    repeated: int
 
 
 def statistics(runs: Iterable[RunProgress]) -> Statistics:
@@ -69,6 +75,7 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
     counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
     spent = sum((run.spent for run in finished), Spent())
     share = 1 / max(len(finished), 1)
+    seeds = [run.seed for run in finished if not run.method.llm]
     return Statistics(
         runs=len(finished),
         falsified=len(counts),
@@ -86,6 +93,9 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
         simulations=spent.simulations,
         failures=spent.failures,
         kept=spent.kept,
+        budgets=tuple(sorted({limit for run in runs if (limit := run.request.budget.simulations)})),
+        known=sum(bool(run.request.start_from) for run in finished),
+        repeated=len(seeds) - len(set(seeds)),
     )
 
 

@@ -164,21 +164,16 @@ class Table:
 
 
 def main_table(runs: Iterable[RunProgress], published: Published) -> Table:
-    """Make a table with one row per requirement and method, and the published results if there are any.
-
-    The published results apply to the specs' own (fixed) parameterization of instance 1, so only rows of that
-    parameterization show them.
-    """
-    found = {key: statistics(members) for key, members in group(runs).items()}
-    others = {key: published.scores(key[0]) if comparable(key[1]) else {} for key in found}
+    """Make a table with one row per requirement and method, and the published results where they apply."""
+    groups = group(runs)
+    found = {key: statistics(members) for key, members in groups.items()}
+    others = {key: published.scores(key[0]) for key, m in groups.items() if all(map(comparable, m))}
     names = COLUMNS if any(others.values()) else {}
     rows = []
     for (requirement, method), numbers in found.items():
-        rate = f"{numbers.falsified}/{numbers.runs}"
-        rate += f" +{numbers.unfinished}" if numbers.unfinished else ""
-        row = [requirement, method.label, rate, *(text(numbers) for text in _NUMBERS.values())]
+        row = [requirement, method.label, *(text(numbers) for text in _NUMBERS.values())]
         if names:
-            known = others[requirement, method]
+            known = others.get((requirement, method), {})
             place = _place(score(numbers), published.competitors(requirement)) if known else NONE
             row += [place, *(_cell(known.get(name)) for name in names)]
         rows.append(tuple(row))
@@ -190,22 +185,22 @@ def main_table(runs: Iterable[RunProgress], published: Published) -> Table:
     if names:
         named = ((COLUMNS.get(name, name), source) for name, source in published.sources.items() if source)
         notes |= {f"Source of {name}: {source}." for name, source in named}
-    header = ("requirement", "method", "FR", *_NUMBERS, *(("rank",) if names else ()), *names.values())
+    header = ("requirement", "method", *_NUMBERS, *(("rank",) if names else ()), *names.values())
     return Table("Falsification", header, tuple(rows), (legend, *sorted(notes)))
 
 
 def ablation_table(runs: Iterable[RunProgress], published: Published) -> Table:
     """Make a table of prompt variants side by side, with the published results for each."""
-    ours = _by_column(runs, lambda m: f"{m.variant} ({replace(m, variant='').label})" if m.variant else "")
-    theirs = {f"{name} published": scores for name, scores in published.ablation.items()}
-    return _side_by_side("Prompt variants: FR / S", ours, theirs)
+
+    def column(m: Method) -> str:
+        return f"{m.variant} ({replace(m, variant='').label})" if m.variant else ""
+
+    return _side_by_side("Prompt variants: FR / S", runs, column, published.ablation)
 
 
 def llms_table(runs: Iterable[RunProgress], published: Published) -> Table:
     """Make a table of language models side by side, with the published results."""
-    ours = _by_column(runs, lambda m: m.label if m.llm else "")
-    theirs = {f"{name} published": scores for name, scores in published.llms.items()}
-    return _side_by_side("Language models: FR / S", ours, theirs)
+    return _side_by_side("Language models: FR / S", runs, lambda m: m.label if m.llm else "", published.llms)
 
 
 TABLES: Mapping[str, Callable[[Iterable[RunProgress], Published], Table]] = {
@@ -224,9 +219,14 @@ def statistics_json(runs: Iterable[RunProgress]) -> str:
     return json.dumps(rows, indent=2) + "\n"
 
 
-def comparable(method: Method) -> bool:
-    """Whether a method's results may be compared with the published ones."""
-    return method.parameterization == "fixed" and not method.profile and not method.together
+def comparable(run: RunProgress) -> bool:
+    """Whether a run may be compared with the published ones, which are of instance 1.
+
+    That is a bundled requirement with its own (fixed) parameterization, searched alone and from the start.
+    """
+    method, asked = run.method, run.request
+    is_theirs = asked.source is not None and asked.source.is_bundled and not asked.start_from
+    return is_theirs and method.parameterization == "fixed" and not (method.profile or method.together)
 
 
 def score(found: Statistics) -> Score:
@@ -236,6 +236,8 @@ def score(found: Statistics) -> Score:
 
 # Columns with what they show of the statistics.
 _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
+    "FR": lambda s: f"{s.falsified}/{s.runs}" + (f" +{s.unfinished}" if s.unfinished else ""),
+    "budget": lambda s: ", ".join(map(str, s.budgets)) or NONE,
     "FR 95 %": lambda s: _interval(s.rate_interval, 2),
     "mean S": lambda s: _number(s.mean, 1),
     "mean 95 %": lambda s: _interval(s.mean_interval, 1),
@@ -248,14 +250,14 @@ _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
     "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
 }
 _LEGEND = (
-    "FR: falsified runs / finished runs, which falsified or spent their budget. S: simulations per falsified "
-    "run; std is the sample standard deviation. Intervals, from five runs on: Wilson for FR, percentile "
-    "bootstrap for the mean. Best robustness: the smallest of all runs. Seconds, tokens and cost are means "
-    "per run."
+    "FR: falsified runs / finished runs, which falsified or spent their budget. Budget: limit on the "
+    "simulations of a run; several if runs differ. S: simulations per falsified run; std is the sample "
+    "standard deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. "
+    "Best robustness: the smallest of all runs. Seconds, tokens and cost are means per run."
 )
 _PUBLISHED_LEGEND = (
-    "Rank: position among all published tools known for the requirement, by FR, then by mean S; ties share "
-    "a rank. Published cells: falsified runs / mean S."
+    "Rank: position among all published tools known for the requirement, by FR, then by mean S, whatever the "
+    "budgets; ties share a rank. Published cells: FR / mean S."
 )
 
 _LEGEND_SIDE = "FR / S: falsified runs/finished runs / mean number of simulations per falsified run."
@@ -267,6 +269,8 @@ _UNFINISHED = (
 _COUNTED: Mapping[str, Callable[[Statistics], str]] = {
     "Simulations that failed": lambda s: f"{s.failures} of {s.simulations}" if s.failures else "",
     "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.kept or ""),
+    "Runs that began with known inputs": lambda s: f"{s.known} of {s.runs}" if s.known else "",
+    "Runs with the seed of another one, so intervals are too narrow": lambda s: str(s.repeated or ""),
 }
 
 
@@ -289,26 +293,26 @@ def _cell(cell: Score | None) -> str:
     if cell is None:
         return ""
     tool = f"{cell.tool} " if cell.tool else ""
-    return f"{tool}{cell.falsified} / {_number(cell.mean, 1)}"
-
-
-def _by_column(runs: Iterable[RunProgress], name: Callable[[Method], str]) -> dict[str, dict[str, Score]]:
-    """Scores by column and requirement; methods whose name is empty are omitted."""
-    found: dict[str, dict[str, Score]] = {}
-    for (requirement, method), members in group(runs).items():
-        if name(method):
-            found.setdefault(name(method), {})[requirement] = score(statistics(members))
-    return found
+    return f"{tool}{cell.falsified}/{cell.runs} / {_number(cell.mean, 1)}"
 
 
 def _side_by_side(
-    title: str, ours: Mapping[str, Mapping[str, Score]], theirs: Mapping[str, Mapping[str, Score]]
+    title: str,
+    runs: Iterable[RunProgress],
+    column: Callable[[Method], str],
+    theirs: Mapping[str, Mapping[str, Score]],
 ) -> Table:
-    requirements = list(dict.fromkeys(r for column in ours.values() for r in column))
-    every: dict[str, Mapping[str, Score]] = {**ours, **theirs}
+    """Scores by column and requirement, ours before theirs; methods whose column is empty are omitted."""
+    groups = {key: members for key, members in group(runs).items() if column(key[1])}
+    known = {requirement for (requirement, _), m in groups.items() if all(map(comparable, m))}
+    every: dict[str, dict[str, Score]] = {}
+    for (requirement, method), members in groups.items():
+        every.setdefault(column(method), {})[requirement] = score(statistics(members))
+    for name, scores in theirs.items():
+        every[f"{name} published"] = {r: found for r, found in scores.items() if r in known}
     rows = []
-    for requirement in requirements:
-        cells = (column.get(requirement) for column in every.values())
+    for requirement in dict.fromkeys(requirement for requirement, _ in groups):
+        cells = (scores.get(requirement) for scores in every.values())
         texts = (NONE if c is None else f"{c.falsified}/{c.runs} / {_number(c.mean, 1)}" for c in cells)
         rows.append((requirement, *texts))
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))

@@ -74,15 +74,7 @@ def assess(
 @options.quiet_option
 @options.json_option
 def margin(
-    *,
-    stl: str,
-    between: str,
-    engine: str,
-    budget: int,
-    seed: int,
-    quiet: bool,
-    as_json: bool,
-    **given: Any,
+    *, stl: str, between: str, engine: str, budget: int, seed: int, quiet: bool, as_json: bool, **given: Any
 ) -> None:
     """Find the threshold at which a search starts to find violations.
 

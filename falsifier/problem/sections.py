@@ -115,8 +115,7 @@ class InputSection(Strict):
         None, description="[low, high], numbers or names of items; default: the FMU's min and max."
     )
     control_points: _ControlPoints | None = Field(
-        None,
-        description="Number of evenly spaced control points; default: engines choose them, 5 if fixed.",
+        None, description="Number of evenly spaced control points; default: engines choose them, 5 if fixed."
     )
     interpolation: Interpolation | None = Field(
         None,

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_serializer
 
+from falsifier.core.files import bundled
 from falsifier.errors import SpecError, first_fault
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import ModelChanges, Number, Recordable
@@ -91,6 +92,14 @@ class ProblemSource(BaseModel):
     def parts(self) -> Target:
         """The parts of the target."""
         return Target.parse(self.target)
+
+    @property
+    def is_bundled(self) -> bool:
+        """Whether it is a bundled requirement as it is: nothing that decides its outputs was changed."""
+        parts = self.parts
+        is_ours = parts.kind == "spec" and Path(parts.file).resolve().parent == bundled("specs").resolve()
+        changes = self.changes.model_dump(exclude={"allow", "deny"}, exclude_defaults=True)
+        return (parts.kind == "bundled" or is_ours) and not (self.stl or self.shortest_piece or changes)
 
     @property
     def name(self) -> str:

@@ -20,7 +20,6 @@ from falsifier.errors import JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Held, Problem
-from falsifier.problem.requirement import Requirement
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
 from falsifier.search.parameterization import engine_parameterization, parameterization_of, searched_space
@@ -48,13 +47,6 @@ class RequirementRecord(Strict):
     name: str
     formula: str
     description: str = ""
-
-    @classmethod
-    def of(cls, requirement: Requirement) -> "RequirementRecord":
-        """Return the record of a requirement."""
-        return cls(
-            name=requirement.name, formula=str(requirement.formula), description=requirement.description
-        )
 
 
 class Origin(NamedTuple):
@@ -187,12 +179,15 @@ def describe(
     """
     problem = problems[0]
     space, used = problem.space, engine_parameterization(request.engine, request.llm)
+    stated = (p.requirement for p in problems)
     return Manifest(
         **environment(),
         run=token_hex(4),
         request=request,
         engine=engine,
-        requirements=tuple(RequirementRecord.of(p.requirement) for p in problems),
+        requirements=tuple(
+            RequirementRecord(name=r.name, formula=str(r.formula), description=r.description) for r in stated
+        ),
         fingerprints={p.name: p.fingerprint for p in problems},
         model=problem.info.name,
         components=problem.info.components,

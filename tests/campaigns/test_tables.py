@@ -1,12 +1,16 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from falsifier.campaigns import Method
 from falsifier.campaigns.analysis import Published, Run, Score, ablation_table, llms_table, load, main_table
 from falsifier.campaigns.tables import statistics_json
+from falsifier.problem.source import ProblemSource
+from falsifier.search.budget import Budget
+from falsifier.search.request import RunRequest
 
 PUBLISHED = Published(
     {
@@ -22,7 +26,11 @@ PUBLISHED = Published(
 
 @pytest.fixture
 def runs(campaign: Path) -> list[Run]:
-    return load(campaign)
+    return [replace(run, request=asked_for(run.requirement, 20)) for run in load(campaign)]
+
+
+def asked_for(target: str, budget: int, **more: Any) -> RunRequest:
+    return RunRequest(problems=(ProblemSource(target=target, **more),), budget=Budget(budget))
 
 
 def cells(table_rows: tuple[tuple[str, ...], ...], header: tuple[str, ...], name: str) -> list[str]:
@@ -39,8 +47,8 @@ def test_the_main_table_stands_beside_the_published_numbers(runs: list[Run]) -> 
     assert cells(table.rows, table.header, "rank") == ["2 (tie)", "2 (tie)", "–", "–"]
     held = [replace(r, verdict=r.verdict and replace(r.verdict, robustness=1e-300)) for r in runs[-1:]]
     assert cells(main_table(held, PUBLISHED).rows, table.header, "best robustness") == ["+0"]
-    assert cells(table.rows, table.header, "best ARCH-COMP tool")[0] == "FReaK 10 / 1.5"
-    assert cells(table.rows, table.header, "LLM-Falsifier")[2] == "0 / –"
+    assert cells(table.rows, table.header, "best ARCH-COMP tool")[0] == "FReaK 10/10 / 1.5"
+    assert cells(table.rows, table.header, "LLM-Falsifier")[2] == "0/10 / –"
     assert any("a report" in note for note in table.notes)
 
 
@@ -49,12 +57,30 @@ def test_free_parameterizations_and_other_profiles_stand_apart_and_without_publi
 ) -> None:
     free = [replace(run, method=replace(run.method, parameterization="free")) for run in runs]
     other = [replace(run, method=replace(run.method, profile="instance2")) for run in runs]
-    table = main_table([*runs, *free, *other], PUBLISHED)
-    assert len(table.rows) == 12
+    shared = [replace(run, method=replace(run.method, together=True)) for run in runs]
+    table = main_table([*runs, *free, *other, *shared], PUBLISHED)
+    assert len(table.rows) == 16
     for row in table.rows:
-        apart = "free" in row[1] or "instance2" in row[1]
+        apart = any(told in row[1] for told in ("free", "instance2", "shared search"))
         assert (row[-1] == "") == apart
         assert row[table.header.index("rank")] in (("–",) if apart else ("2 (tie)", "–"))
+
+
+def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
+    known = runs[1].request.model_copy(update={"start_from": ({},)})
+    own = asked_for("my.toml:HARD", 60)  # an own requirement may have the name of a published one
+    changed = asked_for("HARD", 20, changes={"stop_time": 5.0})
+    for request in (own, changed, known):
+        assert "rank" not in main_table([replace(runs[0], request=request), runs[1]], PUBLISHED).header
+    columns = ablation_table([replace(asked(runs[0], "MP1"), request=own)], PUBLISHED).rows[0]
+    assert columns == ("HARD", "1/1 / 2.0", "–")
+    table = main_table([runs[0], replace(runs[0], request=own), replace(runs[1], request=known)], PUBLISHED)
+    assert cells(table.rows, table.header, "budget") == ["20, 60"]
+    assert "Runs that began with known inputs: HARD uniform 1 of 3." in table.notes
+    assert "Runs with the seed of another one, so intervals are too narrow: HARD uniform 1." in table.notes
+    assert not any("seed" in n for n in main_table([asked(runs[0], "MP1")] * 2, PUBLISHED).notes), (
+        "asked anew"
+    )
 
 
 def test_unfinished_runs_are_counted_apart_but_not_those_that_spent_their_budget(runs: list[Run]) -> None:

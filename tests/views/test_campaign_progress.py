@@ -1,5 +1,6 @@
 from falsifier.campaigns import Method, Progress, RunProgress
 from falsifier.search.budget import Spent
+from falsifier.search.request import RunRequest
 from falsifier.views.campaign_progress import Scoreboard, overall_line
 
 
@@ -10,8 +11,8 @@ def run(name: str, seed: int, status: str, simulations: int = 0, best: float | N
         requirement=name,
         method=Method("uniform"),
         seed=seed,
+        request=RunRequest(problems=()),
         status=status,  # type: ignore[arg-type]
-        reason="",
         best=None if best is None else 0,
         _robustness=[] if best is None else [best],
         spent=spent,

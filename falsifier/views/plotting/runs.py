@@ -59,16 +59,15 @@ def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
 def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     """Plot the share of falsified runs over the number of simulations, one curve per method."""
     ax = ax if ax is not None else own_axes()
-    by_method: dict[str, list[Run]] = {}
-    for run in runs:
-        by_method.setdefault(run.method.label, []).append(run)
-    for label, members in by_method.items():
+    runs = list(runs)
+    for label in dict.fromkeys(run.method.label for run in runs):
+        members = [run for run in runs if run.method.label == label]
         counts, shares = falsification_curve(members)
-        name = caption(f"{label} ({counted(len(members), 'run')})")
+        name = caption(f"{label} ({counted(sum(run.counts for run in members), 'run')})")
         ax.step(counts, shares, where="post", linewidth=1.6, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     whole_ticks(ax.xaxis, {})
-    if by_method:
+    if runs:
         ax.legend()
     return figure_of(ax)
 

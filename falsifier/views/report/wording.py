@@ -11,6 +11,7 @@ from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
 from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
+from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from
 from falsifier.problem.source import ProblemSource
@@ -30,21 +31,22 @@ _MOST_COUNTED = 5000
 
 
 def differences(sides: Sequence[Side]) -> Table:
-    """Return what the directories of a comparison differ in: files, formulas, engines, seeds and versions."""
+    """Return what the directories of a comparison differ in: engine, options, formula, files and version."""
     columns: list[dict[str, dict[str, None]]] = []
     for side in sides:
         told: dict[str, dict[str, None]] = {}
         for run in side.runs:
             manifest = run.manifest
-            facts = {
-                "engine": run.method.label,
-                "seed": str(run.seed),
-                f"formula of {run.requirement}": manifest.requirement.formula,
-                **{Path(path).name: f"SHA-256 {digest[:12]}" for path, digest in manifest.hashes.items()},
-                "falsifier": manifest.falsifier,
-            }
-            for name, text in facts.items():
-                told.setdefault(name, {})[text] = None
+            facts = [
+                ("engine", run.method.label),
+                *_options(manifest.request),
+                (f"formula of {run.requirement}", manifest.requirement.formula),
+                *((Path(path).name, f"SHA-256 {digest[:12]}") for path, digest in manifest.hashes.items()),
+                ("falsifier", manifest.falsifier),
+            ]
+            for name, value in facts:
+                if value is not None and name != "--engine":
+                    told.setdefault(name, {})[str(value)] = None
         columns.append(told)
     names = dict.fromkeys(name for told in columns for name in told)
     texts = {name: [", ".join(told.get(name, ())) for told in columns] for name in names}
@@ -187,16 +189,29 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     >>> run_command(RunRequest(problems=(ProblemSource(target="AT1"),), engine="uniform"))
     'falsifier run AT1 --engine uniform --budget 100 --seed 0'
     """
-    problem, budget = request.source, request.budget
-    if problem is None:
+    if (problem := request.source) is None:
         return "(no command: the problem was made in Python)"
+    if request.engine not in (None, "llm", *ENGINES):
+        return f"(no command: the engine {request.engine!r} was made in Python)"
+    if request.start_from:
+        return "(no command: it began with known inputs, which the manifest lists)"
     if shared and problem.stl is not None:
         return "(no command: these requirements were searched together in Python)"
     target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
-    options: list[tuple[str, object]] = [
+    words = ["falsifier", "run", target]
+    for name, value in _options(request):
+        words += [] if value is None else [name] if value is True else [name, str(value)]
+    return shlex.join(words)
+
+
+def _options(request: RunRequest) -> list[tuple[str, object]]:
+    """Return the options of a command that repeats a run; None: as by default."""
+    problem, budget = request.source or ProblemSource(target=""), request.budget
+    return [
         ("--stl", problem.stl),
         ("--parameterization", _parameterization(problem)),
         *options_from(problem.changes),
+        *(("--context", file) for file in problem.context),
         ("--engine", request.engine),
         *(_llm_options(request.llm) if request.llm else ()),
         ("--budget", budget.simulations),
@@ -206,10 +221,6 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         ("--seed", request.seed),
         ("--jobs", request.jobs if request.jobs > 1 else None),
     ]
-    words = ["falsifier", "run", target]
-    for name, value in options:
-        words += [] if value is None else [name] if value is True else [name, str(value)]
-    return shlex.join(words)
 
 
 def _parameterization(problem: ProblemSource) -> str | None:

@@ -26,7 +26,8 @@ def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path)
 
 
 def test_rates_end_at_the_share_of_falsified_runs(campaign: Path) -> None:
-    axes = plot_rates(load(campaign)).axes[0]
+    runs = load(campaign)
+    axes = plot_rates([*runs, replace(runs[0], status="interrupted")]).axes[0]
     assert [line.get_label() for line in axes.get_lines()] == ["uniform (4 runs)", "corners (4 runs)"]
     assert [ys(line)[-1] for line in axes.get_lines()] == [0.5, 0.5]
 

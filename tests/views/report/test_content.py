@@ -33,9 +33,12 @@ def test_the_heading_of_a_formula_without_a_name_is_the_formula(tmp_path: Path) 
 
 def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     places = [tmp_path / folder / "nightly" for folder in ("before", "after")]
-    for place in places:
-        falsify(hard(), "uniform", budget=20, directory=place)
+    for place, budget in zip(places, (20, 30), strict=True):
+        falsify(hard(), "uniform", budget=budget, directory=place)
     text = markdown_report(*places).replace("\\", "")
+    assert "| --budget | 20 | 30 |" in text
+    falsify(hard(), "uniform", budget=20, seed=1, directory=tmp_path / "after" / "weekly")
+    assert "| HARD | uniform | 2/2 |" in markdown_report(tmp_path / "after"), "made in Python, too"
     for place in places:
         assert f"## HARD in {place}: violated" in text
         assert f"{place}: falsifier " in text, "its versions"
@@ -55,16 +58,18 @@ def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) 
 def test_a_search_can_be_repeated_from_its_command() -> None:
     changes = changes_from_options(ranges=["u=0:1:3"], stop_time=5.0)
     request = RunRequest(
-        problems=(ProblemSource(target="my.toml:R", stl="G[0,1] (x <= 1)", changes=changes),),
+        problems=(ProblemSource(target="my.toml:R", stl="x <= 1", changes=changes, context=("a.c",)),),
         engine="uniform",
         seed=3,
         budget=Budget(7, cost=0.5),
         jobs=2,
     )
     assert run_command(request) == (
-        "falsifier run my.toml:R --stl 'G[0,1] (x <= 1)' --search u=0:1:3 --stop-time 5.0 --engine uniform "
-        "--budget 7 --max-cost 0.5 --seed 3 --jobs 2"
+        "falsifier run my.toml:R --stl 'x <= 1' --search u=0:1:3 --stop-time 5.0 --context a.c --engine "
+        "uniform --budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
+    assert "my own" in run_command(request.model_copy(update={"engine": "my own"}))
+    assert "known inputs" in run_command(request.model_copy(update={"start_from": ({},)}))
     model = LLMSettings(
         name="openai/gpt-5-mini",
         effort="high",
