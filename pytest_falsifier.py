@@ -436,12 +436,13 @@ def _message(item: pytest.Item, checked: "Checked", database: "Database") -> str
 
 def _command(item: pytest.Item, file: Path, database: "Database") -> str:
     """Command that replays the counterexample; the test itself if its file cannot load this problem."""
+    from falsifier.core.words import shell_word
     from falsifier.counterexamples.store import load_counterexample
 
     stored = load_counterexample(file)
     # A file that was moved here loads what it was found for.
     if stored.problem is not None and database.place(stored.requirement, stored.problem) == file.parent:
-        return f"falsifier replay {_short(file)}"
+        return f"falsifier replay {shell_word(_short(file))}"
     return f"pytest {'--falsifier ' if isinstance(item, RequirementItem) else ''}'{item.nodeid}'"
 
 

@@ -129,15 +129,19 @@ class Signal:
         return replace(self, times=tuple(points), values=tuple(points.values()))
 
     @property
+    def switch_times(self) -> tuple[float, ...]:
+        """Times in s of the control points with another value than the one before."""
+        return tuple(t for t, (a, b) in zip(self.times[1:], pairwise(self.values), strict=True) if a != b)
+
+    @property
     def switches(self) -> int:
         """Number of changes of value from one control point to the next."""
-        return sum(a != b for a, b in pairwise(self.values))
+        return len(self.switch_times)
 
     @property
     def shortest_dwell(self) -> float | None:
         """Shortest time in s between two changes of value; None with fewer than two changes."""
-        changes = [t for t, (a, b) in zip(self.times[1:], pairwise(self.values), strict=True) if a != b]
-        return min((b - a for a, b in pairwise(changes)), default=None)
+        return min((b - a for a, b in pairwise(self.switch_times)), default=None)
 
 
 @lru_cache(maxsize=256)

@@ -15,7 +15,7 @@ from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import readable
 from falsifier.counterexamples.shrink import (
     constant_signal,
-    stretches,
+    sampled_stretches,
     with_parameter,
     with_signal,
     with_stretch,
@@ -156,7 +156,7 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
     """Reset each signal, each of its longest stretches and each parameter, if that changes anything."""
 
     def effect(reset: Candidate, to: Effect, span: tuple[float, float] | None = None) -> Iterator[Effect]:
-        if reset.key != candidate.key and (span is None or span[0] < span[1]):
+        if reset.key != candidate.key:
             found = evaluate(problem, problem.space.admit(reset))
             yield replace(to, span=span, robustness=found.robustness, violated=found.violated)
 
@@ -165,7 +165,7 @@ def _effects(problem: Problem, candidate: Candidate) -> Iterator[Effect]:
         to = _reset(problem, r, signal.values)
         if set(signal.values) != {to.instead}:
             yield from effect(with_signal(candidate, r.name, constant_signal(problem, r, to.instead)), to)
-        for first, end in _longest(signal):
+        for first, end in _longest(signal, problem.space.stop_time):
             span = _span(signal, first, end, problem.space.stop_time)
             reset = with_signal(candidate, r.name, with_stretch(signal, first, end, to.instead))
             yield from effect(reset, to, span)
@@ -188,12 +188,10 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
     return Effect(ranged.name, None, nearest_value(ranged, middle + aside), is_rest=False)
 
 
-def _longest(signal: Signal) -> list[tuple[int, int]]:
+def _longest(signal: Signal, stop_time: float) -> list[tuple[int, int]]:
     """The longest stretches of equal values, in time order; none for a constant signal."""
-    found = stretches(signal.values)
-    if len(found) < 2:
-        return []
-    return sorted(sorted(found, key=lambda s: s[0] - s[1])[:_MAX_STRETCHES])
+    found = sampled_stretches(signal, stop_time)
+    return sorted(sorted(found, key=lambda s: s[0] - s[1])[:_MAX_STRETCHES]) if len(found) > 1 else []
 
 
 def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float, float]:

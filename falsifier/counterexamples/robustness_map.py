@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted, listed, readable, with_unit
-from falsifier.counterexamples.shrink import stretches, with_parameter, with_signal, with_stretch
+from falsifier.counterexamples.shrink import sampled_stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
@@ -232,7 +232,7 @@ def _percent(size: float) -> str:
 def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]:
     for r in problem.space.inputs:
         signal = candidate.signals[r.name]
-        found = stretches(signal.values)
+        found = sampled_stretches(signal, problem.space.stop_time)
         for first, end in found:
             time = signal.moments[first] if len(found) > 1 else None
             yield Coordinate(r.name, (first, end), time, signal.values[first], r.low, r.high, r.unit)

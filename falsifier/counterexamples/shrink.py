@@ -295,6 +295,12 @@ def stretches(values: tuple[float, ...]) -> list[tuple[int, int]]:
     return list(pairwise(starts))
 
 
+def sampled_stretches(signal: Signal, stop_time: float) -> list[tuple[int, int]]:
+    """Return those that are sampled: one that is held may be over, or the simulation, before it is."""
+    at = (*signal.moments, inf)
+    return [(i, k) for i, k in stretches(signal.values) if at[i] < at[k] and at[i] <= stop_time]
+
+
 def with_signal(candidate: Candidate, name: str, signal: Signal) -> Candidate:
     """Return the candidate with one input's signal replaced."""
     return replace(candidate, signals={**candidate.signals, name: signal})

@@ -106,8 +106,7 @@ def test_a_sentence_has_its_readings(server: Server, target: str, sentence: str,
     replies = [answer(target, text) for text in formulas]
     found = ask(server, target, replying(*replies), sentence=sentence)
     assert [r.formula for r in found.readings] == [parse(text) for text in formulas]
-    assert found.rejected == ()
-    assert found.spent.calls == 1
+    assert (found.rejected, found.spent.calls) == ((), 1)
     assert found.spent.cost == pytest.approx(140e-6)
     asked = server.received[0].texts
     assert sentence in asked[-1]
@@ -159,10 +158,8 @@ def test_a_wrong_reading_goes_back_with_the_reason(server: Server, target: str, 
     good = {"formula": GOOD, "meaning": "", "units": [], "satisfied": LOW, "violated": HIGH}
     found = ask(server, target, replying(good | changes), replying(good))
     assert [str(r.formula) for r in found.readings] == [GOOD]
-    assert len(found.rejected) == 1
-    assert reason in found.rejected[0]
-    assert reason in server.received[1].texts[-1]
-    assert found.spent.calls == 2
+    assert len(found.rejected) == 1 and reason in found.rejected[0]
+    assert reason in server.received[1].texts[-1] and found.spent.calls == 2
 
 
 def test_whole_numbers_may_be_equal(server: Server, target: str) -> None:

@@ -49,7 +49,7 @@ def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
 def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path) -> None:
     directory = tmp_path / "c"
     run_campaign(request("easy"), directory)
-    with pytest.raises(JournalError, match="already contains a campaign"):
+    with pytest.raises(JournalError, match=r"a campaign: .*resume_campaign\(Path\("):
         run_campaign(request("easy"), directory)
     with pytest.raises(JournalError, match="already contains a campaign"):
         falsify(problems.easy(), "uniform", budget=1, directory=directory)

@@ -26,16 +26,14 @@ def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
     found = done.json["counterexample"]
     assert done.json["status"] == "falsified"
     assert found["robustness"] == pytest.approx(-0.2133, abs=1e-3)
-    assert found["critical_time"] == 20
-    assert found["predicate"] == "speed <= 120"
+    assert (found["critical_time"], found["predicate"]) == (20, "speed <= 120")
     assert set(found["signals"]["throttle"]["values"]) == {100}
     assert set(found["signals"]["brake"]["values"]) == {0}
     run = tmp_path / "run"
     assert {p.name for p in run.iterdir()} >= {"manifest.json", "journal.jsonl", "counterexample.json"}
     assert {OUTPUT, INPUT, CRITICAL} <= colours(run / "counterexample.png")
     manifest = json.loads((run / "manifest.json").read_text())
-    assert len(manifest["hashes"]) == 2
-    assert manifest["request"]["seed"] == 0
+    assert (len(manifest["hashes"]), manifest["request"]["seed"]) == (2, 0)
     assert "confirmed" in done.err
     assert json.loads((run / "counterexample.json").read_text())["robustness"] == found["robustness"]
 

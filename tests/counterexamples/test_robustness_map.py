@@ -7,6 +7,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange, ValueKind
 from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
+from falsifier.counterexamples.shrink import sampled_stretches
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
@@ -73,6 +74,8 @@ def test_each_stretch_moves_alone() -> None:
     found = robustness_map(free, evaluate(free, Candidate({"u": signal})), budget=30)
     assert [(c.time, c.value) for c in found.coordinates] == [(0.0, 1.0), (2.0, 0.0), (6.0, 1.0)]
     assert found.axes[0] == 2  # what comes last decides x(10)
+    signal = Signal((0.0, 0.5, 1.0, 9.5), (0.0, 0.5, 1.0, 0.5), "constant", hold=3.0)
+    assert sampled_stretches(signal, 10.0) == [(0, 1), (2, 3)], "of what is held, what is sampled"
 
 
 @pytest.mark.filterwarnings("error")

@@ -130,8 +130,7 @@ def test_what_is_sent(wire: Wire) -> None:
     assert "question" in str(received.body) and "standing" in str(received.body)
     if wire.header is not None:
         assert lowered(received)[wire.header[0]] == wire.header[1]
-    assert reply.usage.prompt_tokens == 100
-    assert reply.usage.completion_tokens == 20
+    assert (reply.usage.prompt_tokens, reply.usage.completion_tokens) == (100, 20)
     # What every request has whose reply is limited and whose connection can be cut.
     assert lowered(received)["accept-encoding"] == "identity"
 
@@ -157,10 +156,8 @@ def test_effective_parameters_name_what_was_dropped() -> None:
         dropped, kept = known.send(REQUEST).parameters, other.send(REQUEST).parameters
     assert dropped["dropped"] == ["temperature"]
     assert "temperature" not in dropped
-    assert dropped["effort"] == "low"
-    assert dropped["mode"] == "json_schema"
-    assert kept["temperature"] == 0.5
-    assert "dropped" not in kept
+    assert (dropped["effort"], dropped["mode"]) == ("low", "json_schema")
+    assert kept["temperature"] == 0.5 and "dropped" not in kept
 
 
 def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:

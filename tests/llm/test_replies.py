@@ -47,8 +47,7 @@ def test_signals_by_name() -> None:
     assert candidate.signals["throttle"] == Signal((0, 5, 10), (100, 50, 0), "linear", 0.05)
     assert candidate.signals["brake"] == Signal((0, 5), (0, 325), "constant", None)
     assert candidate.parameters == {"mass": 1000}
-    assert candidate.origin == "me"
-    assert candidate.rationale == "full throttle"
+    assert (candidate.origin, candidate.rationale) == ("me", "full throttle")
 
 
 def test_numbers_in_order() -> None:

@@ -122,7 +122,7 @@ def _continuous(
     """Courses of what is compared and of other signals; or of these terms only, in fewer points."""
     compared = compared_columns(view, inside)
     columns = _shown_columns(view, inside, compared) if of is None else compared
-    steps = _input_steps(evaluation) if of is None else ()
+    steps = _input_steps(view, evaluation) if of is None else ()
     for name, column in columns.items():
         if (of is not None and name not in of) or view.is_discrete(name, column):
             continue
@@ -283,17 +283,10 @@ def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluati
     return np.asarray(np.abs(times - critical) <= max(reach, 4 * view.experiment.output_interval))
 
 
-def _input_steps(evaluation: Evaluation) -> tuple[float, ...]:
+def _input_steps(view: View, evaluation: Evaluation) -> tuple[float, ...]:
     """Times at which inputs step, if they are few."""
-    found = sorted(
-        {
-            time
-            for signal in evaluation.candidate.signals.values()
-            if signal.interpolation == "constant"
-            for time, before, after in zip(signal.moments[1:], signal.values, signal.values[1:], strict=False)
-            if before != after
-        }
-    )
+    signals = (s.stepped(view.space.stop_time) for s in evaluation.candidate.signals.values())
+    found = sorted({time for s in signals if s.interpolation == "constant" for time in s.switch_times})
     return tuple(found) if len(found) <= _MOST_STEPS else ()
 
 

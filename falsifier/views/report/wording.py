@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed, readable, with_unit
+from falsifier.core.words import counted, listed, readable, shell_word, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
@@ -162,18 +163,16 @@ def advice(shown: Shown) -> list[Fact]:
     run = shown.run
     if not run.falsified or (shown.is_shrunk and shown.explanation):
         return []
-    command = ["falsifier", "explain", str(run.counterexample_file if run.method.together else run.directory)]
-    if shown.is_shrunk:
-        return [("To explain it", shlex.join(command))]
-    return [("To simplify and explain it", shlex.join([*command, "--shrink"]))]
+    place = shell_word(run.counterexample_file if run.method.together else run.directory)
+    what, option = ("explain", "") if shown.is_shrunk else ("simplify and explain", " --shrink")
+    return [(f"To {what} it", f"falsifier explain {place}{option}")]
 
 
 def replay_command(run: Run, *, shrunk: bool = False) -> str:
     """Shell command that replays a run's counterexample, or what it was shrunk to."""
-    place = run.counterexample_file if run.method.together else run.directory
-    if shrunk:
-        place = beside(run.counterexample_file, SHRUNK)
-    return shlex.join(["falsifier", "replay", str(place)])
+    found = run.counterexample_file if run.method.together else run.directory
+    place = beside(run.counterexample_file, SHRUNK) if shrunk else found
+    return f"falsifier replay {shell_word(place)}"
 
 
 def commands(shown: Shown) -> list[Fact]:
@@ -198,10 +197,9 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
     if shared and problem.stl is not None:
         return "(no command: these requirements were searched together in Python)"
     target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
-    words = ["falsifier", "run", target]
-    for name, value in _options(request):
-        words += [] if value is None else [name] if value is True else [name, str(value)]
-    return shlex.join(words)
+    stated = [(name, value) for name, value in _options(request) if value is not None]
+    words = chain.from_iterable([name] if value is True else [name, str(value)] for name, value in stated)
+    return f"falsifier run {shell_word(target)} {shlex.join(words)}"
 
 
 def _options(request: RunRequest) -> list[tuple[str, object]]:

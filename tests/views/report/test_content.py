@@ -58,14 +58,14 @@ def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) 
 def test_a_search_can_be_repeated_from_its_command() -> None:
     changes = changes_from_options(ranges=["u=0:1:3"], stop_time=5.0)
     request = RunRequest(
-        problems=(ProblemSource(target="my.toml:R", stl="x <= 1", changes=changes, context=("a.c",)),),
+        problems=(ProblemSource(target="-my.toml:R", stl="x <= 1", changes=changes, context=("a.c",)),),
         engine="uniform",
         seed=3,
         budget=Budget(7, cost=0.5),
         jobs=2,
     )
     assert run_command(request) == (
-        "falsifier run my.toml:R --stl 'x <= 1' --search u=0:1:3 --stop-time 5.0 --context a.c --engine "
+        "falsifier run ./-my.toml:R --stl 'x <= 1' --search u=0:1:3 --stop-time 5.0 --context a.c --engine "
         "uniform --budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
     assert "my own" in run_command(request.model_copy(update={"engine": "my own"}))
