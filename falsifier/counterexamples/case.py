@@ -125,10 +125,11 @@ class Case:
         if self.is_miss and evaluation.robustness is None:
             raise SimulationError(f"{problem.name}: the simulation now fails: {evaluation.reason}")
         if self.is_miss and evaluation.violated:
-            again = f"falsifier run ... --inputs {shell_word(self.place)}"
+            place, call = shell_word(self.place), "falsify(..., start_from=[...])"
             raise SpecError(
-                f"the nearest miss of {problem.name} now violates ({signed(evaluation.robustness)}): the "
-                f"model or formula changed; search again: {written(again, 'falsify(..., start_from=[...])')}"
+                f"the nearest miss of {problem.name} now violates (robustness "
+                f"{signed(evaluation.robustness)}): the model or the requirement has changed; search again: "
+                + written(f"falsifier run ... --inputs {place}", call)
             )
         if not self.is_miss and not evaluation.violated:
             found = evaluation.reason or f"its robustness is now {signed(evaluation.robustness)}"
