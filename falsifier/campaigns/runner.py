@@ -15,7 +15,7 @@ from falsifier.campaigns.directory import (
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
-from falsifier.core.arguments import whole
+from falsifier.core.arguments import path_of, whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError
 from falsifier.evaluation.workers import open_workers
@@ -42,7 +42,7 @@ class CampaignEnd:
 
 
 def run_campaign(
-    request: CampaignRequest, directory: Path, *, jobs: int = 1, listeners: Iterable[Listener] = ()
+    request: CampaignRequest, directory: str | Path, *, jobs: int = 1, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Start a campaign.
 
@@ -58,7 +58,7 @@ def run_campaign(
         ChatError: for an unknown provider or a missing key.
         ModelError: if an FMU cannot be used.
     """
-    jobs = whole("jobs", jobs, least=1)
+    jobs, directory = whole("jobs", jobs, least=1), path_of("directory", directory)
     problems = check_request(request)
     with campaign_lock(directory):
         check_new(directory)
@@ -68,7 +68,7 @@ def run_campaign(
 
 
 def resume_campaign(
-    directory: Path, *, jobs: int = 1, limits: Budget | None = None, listeners: Iterable[Listener] = ()
+    directory: str | Path, *, jobs: int = 1, limits: Budget | None = None, listeners: Iterable[Listener] = ()
 ) -> CampaignEnd:
     """Continue a campaign: finished runs are kept, the others are resumed from their journals.
 
@@ -83,7 +83,7 @@ def resume_campaign(
         SpecError: see run_campaign.
         ModelError: see run_campaign.
     """
-    jobs = whole("jobs", jobs, least=1)
+    jobs, directory = whole("jobs", jobs, least=1), path_of("directory", directory)
     with campaign_lock(directory):
         record = read_campaign(directory)
         manifest.check_in_sight(directory, (run.problems[0] for run in record.request.runs))

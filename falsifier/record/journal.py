@@ -202,8 +202,8 @@ def check_new(directory: Path, resume: str = "") -> None:
     """
     is_campaign = (directory / files.CAMPAIGN).exists()
     if is_campaign or holds_run(directory):
-        what, call = ("campaign", "resume_campaign(Path({!r}))") if is_campaign else ("run", "resume({!r})")
-        usual = written(f"falsifier resume {shell_word(directory)}", call.format(str(directory)))
+        what, call = ("campaign", "resume_campaign") if is_campaign else ("run", "resume")
+        usual = written(f"falsifier resume {shell_word(directory)}", f"{call}({str(directory)!r})")
         raise JournalError(
             f"{directory} already contains a {what}: choose another directory, or to continue it: "
             + (usual if is_campaign or not resume else resume)

@@ -39,17 +39,17 @@ def test_each_run_is_the_one_that_runs_alone(tmp_path: Path) -> None:
 
 def test_resume_repeats_nothing_that_is_finished(tmp_path: Path) -> None:
     directory = tmp_path / "c"
-    first = run_campaign(request("easy", "impossible"), directory)
+    first = run_campaign(request("easy", "impossible"), str(directory))
     assert first.progress.finished == 4
     files = {p: p.read_bytes() for p in directory.rglob("journal.jsonl")}
-    assert resume_campaign(directory).progress == first.progress
+    assert resume_campaign(str(directory)).progress == first.progress
     assert {p: p.read_bytes() for p in directory.rglob("journal.jsonl")} == files
 
 
 def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path) -> None:
     directory = tmp_path / "c"
     run_campaign(request("easy"), directory)
-    with pytest.raises(JournalError, match=r"a campaign: .*resume_campaign\(Path\("):
+    with pytest.raises(JournalError, match=r"a campaign: .*resume_campaign\('"):
         run_campaign(request("easy"), directory)
     with pytest.raises(JournalError, match="already contains a campaign"):
         falsify(problems.easy(), "uniform", budget=1, directory=directory)
