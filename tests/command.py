@@ -51,25 +51,35 @@ class Done:
         return loaded
 
 
-def falsifier(*arguments: str, cwd: Path, env: dict[str, str] | None = None, fresh: bool = False) -> Done:
+def falsifier(
+    *arguments: str,
+    cwd: Path,
+    env: dict[str, str] | None = None,
+    fresh: bool = False,
+    code: int | None = None,
+) -> Done:
     """Run ``falsifier`` with these arguments in a folder, without keys in the environment.
 
     ``fresh``: start a new interpreter, for tests of what is imported or what variables do to the interpreter.
+    ``code``: what it must end with.
     """
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
     environment = clean | {"PYTHONPATH": str(ROOT), "COLUMNS": "160"} | (env or {})
-    if not fresh:
-        return forked(["falsifier", *arguments], cwd, environment)
-    done = subprocess.run(
-        [sys.executable, "-c", "from falsifier.cli import main; main()", *arguments],
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=HANG,
-        check=False,
-    )
-    return Done(done.returncode, done.stdout, done.stderr)
+    if fresh:
+        ended = subprocess.run(
+            [sys.executable, "-c", "from falsifier.cli import main; main()", *arguments],
+            cwd=cwd,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=HANG,
+            check=False,
+        )
+        done = Done(ended.returncode, ended.stdout, ended.stderr)
+    else:
+        done = forked(["falsifier", *arguments], cwd, environment)
+    assert code in (None, done.code), f"ended with {done.code}: {done.err}{done.out}"
+    return done
 
 
 def forked(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Done:

@@ -26,8 +26,7 @@ def at1(server: str, *more: str) -> list[str]:
 HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
 
 
-def bench(command: Any, *more: str) -> Result:
-    result: Result = command(
-        "bench", HARD, NEVER, "--engine", "uniform", "--runs", "2", "--budget", "20", *more
-    )
+def bench(command: Any, *more: str, code: int | None = None) -> Result:
+    asked = ("bench", HARD, NEVER, "--engine", "uniform", "--runs", "2", "--budget", "20", *more)
+    result: Result = command(*asked, code=code)
     return result

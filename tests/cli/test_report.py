@@ -9,8 +9,7 @@ from tests.command import falsifier
 
 def test_reports_of_a_campaign_and_of_one_run(command: Any, tmp_path: Path) -> None:
     bench(command, "--out", "c", "--quiet")
-    written = command("report", "c", "--arch-comp", "v.csv")
-    assert written.exit_code == 0, written.output
+    command("report", "c", "--arch-comp", "v.csv", code=0)
     assert (tmp_path / "c" / "report.html").read_text().startswith("<!DOCTYPE html>")
     assert (tmp_path / "v.csv").read_text().count("yes") == 2
     assert command("report", "c", "--markdown").stdout.startswith("# Falsification report: c")
@@ -30,8 +29,7 @@ def test_files_of_the_competition_have_one_method_and_what_is_left_out_is_told(
     rows = {path.name: len(path.read_text().splitlines()) - 1 for path in tmp_path.glob("*.csv")}
     assert rows == {"v-uniform.csv": 4, "v-corners.csv": 3}
     (tmp_path / "v-uniform.csv").write_text("mine")
-    kept = command("report", "c", "--arch-comp", "v.csv")
-    assert "v-uniform.csv exists and is kept" in str(kept.exception)
+    assert "v-uniform.csv exists and is kept" in str(command("report", "c", "--arch-comp", "v.csv").exception)
 
 
 def test_every_evaluation_is_written_as_a_table(command: Any, tmp_path: Path) -> None:
@@ -51,8 +49,7 @@ def test_directories_are_compared_in_one_page(command: Any, tmp_path: Path) -> N
     runs = sorted(map(str, (tmp_path / "c" / "runs").iterdir()))
     assert command("report", *runs[:2], "-o", "both.html").exit_code == 0
     assert "What differs" in (tmp_path / "both.html").read_text()
-    refused = command("report", *runs[:2], "--arch-comp", "v.csv")
-    assert refused.exit_code == 2 and "takes one DIRECTORY" in refused.output
+    assert "takes one DIRECTORY" in command("report", *runs[:2], "--arch-comp", "v.csv", code=2).output
 
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:
@@ -61,16 +58,14 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
         'AT,AT2,2,"[0 100 0]",[],1,2\n'
         'AT,AT2,2,"[0 0 0]",[],1,2\n'
     )
-    result = command("tools", "validate", "v.csv")
-    assert result.exit_code == 1
+    result = command("tools", "validate", "v.csv", code=1)
     assert "row 1, AT2: reproduced, robustness -" in result.stdout
     assert "row 2, AT2: not reproduced, robustness +" in result.stdout
     assert "1 of 2 counterexamples accepted" in result.stdout
     (tmp_path / "v.csv").write_bytes(b"\x9c\x00")
     unread = command("tools", "validate", "v.csv")
     assert "v.csv: cannot be read: expected a CSV file in UTF-8" in str(unread.exception)
-    simulated = command("simulate", "v.csv")
-    assert "v.csv: expected a file that ends in .toml, .fmu" in str(simulated.exception)
+    assert "v.csv: expected a file that ends in .toml, .fmu" in str(command("simulate", "v.csv").exception)
 
 
 NEVER = "python:tests.problems:impossible"
@@ -78,8 +73,7 @@ NEVER = "python:tests.problems:impossible"
 
 def test_what_a_run_tried_is_printed_and_drawn(tmp_path: Path) -> None:
     falsifier("run", NEVER, "--engine", "corners", "--budget", "4", "--out", "r", cwd=tmp_path)
-    done = falsifier("coverage", "r", cwd=tmp_path)
-    assert done.code == 0, done.err
+    done = falsifier("coverage", "r", cwd=tmp_path, code=0)
     for part in ("NEVER: what 4 simulations tried", "u [V]", "never tried", "x [m]", "r/coverage.png"):
         assert part in done.out, done.out
     assert (tmp_path / "r" / "coverage.png").read_bytes().startswith(b"\x89PNG")

@@ -13,13 +13,11 @@ WIDE = SPEC + "[requirements.R]\nformula = 'G[0,20] (throttle <= 100)'\n"
 
 
 def test_check_prints_requirement_place_and_what_to_do(tmp_path: Path) -> None:
-    done = falsifier("check", spec(tmp_path, WIDE), cwd=tmp_path)
-    assert done.code == 1, done.err
+    done = falsifier("check", spec(tmp_path, WIDE), cwd=tmp_path, code=1)
     assert "R: always: no trajectory in range violates it" in done.out
     assert "  in      G[0,20] (throttle <= 100)" in done.out
     assert "  to do   check threshold" in done.out
-    found = falsifier("check", "my.toml", "--json", cwd=tmp_path)
-    assert found.code == 1
+    found = falsifier("check", "my.toml", "--json", cwd=tmp_path, code=1)
     assert [f["kind"] for f in found.json] == ["always"]  # type: ignore[index]
 
 
@@ -27,8 +25,7 @@ def test_check_says_what_is_searched(tmp_path: Path) -> None:
     repeated = falsifier("check", "AT", cwd=tmp_path)
     assert repeated.code == 1, "AT6abc repeats others"
     assert repeated.out.count(": ok") == 10
-    done = falsifier("check", "CC1", cwd=tmp_path)
-    assert done.code == 0
+    done = falsifier("check", "CC1", cwd=tmp_path, code=0)
     assert done.out.startswith("CC1: ok, ") and done.out.endswith("nothing found\n")
 
 

@@ -14,8 +14,7 @@ EASY = "python:tests.problems:easy"
 
 def test_own_inputs_are_judged_and_written(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u,x\n0,1,0\n8,1,0\n8,-1,0\n10,-1,0\n")
-    done = falsifier("simulate", EASY, "--inputs", "u.csv", "--out", "o", "--json", cwd=tmp_path)
-    assert done.code == 1, done.err
+    done = falsifier("simulate", EASY, "--inputs", "u.csv", "--out", "o", "--json", cwd=tmp_path, code=1)
     assert done.json["violated"] and done.json["critical_time"] == pytest.approx(8)
     assert "not inputs of the model, and not used: x" in done.err
     assert {OUTPUT, INPUT, CRITICAL} <= colours(tmp_path / "o" / "trajectory.png")
@@ -26,8 +25,7 @@ def test_own_inputs_are_judged_and_written(tmp_path: Path) -> None:
 
 
 def test_constants_and_parameters_are_set_and_the_text_says_what_decided(tmp_path: Path) -> None:
-    done = falsifier("simulate", EASY, "--set", "u=0.5", "--set", "x0=0.25", cwd=tmp_path)
-    assert done.code == 0, done.err
+    done = falsifier("simulate", EASY, "--set", "u=0.5", "--set", "x0=0.25", cwd=tmp_path, code=0)
     for part in ("EASY: not violated", "robustness     +0.4", "decided by x <= 0.9", "constant 0.5", "x0"):
         assert part in done.out
     assert list(tmp_path.iterdir()) == []
@@ -77,19 +75,19 @@ def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tm
         inputs.u.value = 2.0
         requirements.R.formula = 'G (y <= 5)'
     """)
-    done = falsifier("simulate", "lag.toml", "--json", cwd=tmp_path)
-    assert done.code == 0 and "R: no inputs given" in done.err, done.err
-    alone = falsifier("simulate", str(lag), "--stl", "G[0,1] (y <= 5)", "--json", cwd=tmp_path)
-    assert alone.code == 0 and alone.json["robustness"] > done.json["robustness"], alone.err
-    searched = falsifier("check", "lag.toml", cwd=tmp_path)
-    assert searched.code == 2 and "nothing to search" in searched.err
+    done = falsifier("simulate", "lag.toml", "--json", cwd=tmp_path, code=0)
+    assert "R: no inputs given" in done.err
+    alone = falsifier("simulate", str(lag), "--stl", "G[0,1] (y <= 5)", "--json", cwd=tmp_path, code=0)
+    assert alone.json["robustness"] > done.json["robustness"]
+    assert "nothing to search" in falsifier("check", "lag.toml", cwd=tmp_path, code=2).err
 
 
 def test_a_package_needs_no_ranges_for_own_inputs(tmp_path: Path) -> None:
     package = str(write(tmp_path / "plant.ssp", structure(system(PLANT)), "Plant_2"))
     formula = "G[0,1] (plant.y <= 5)"
-    done = falsifier("simulate", package, "--stl", formula, "--set", "plant.u=2", "--json", cwd=tmp_path)
-    assert done.code == 0, done.err
+    done = falsifier(
+        "simulate", package, "--stl", formula, "--set", "plant.u=2", "--json", cwd=tmp_path, code=0
+    )
     assert done.json["signals"]["plant.u"]["values"] == [2.0]
 
 
@@ -113,14 +111,12 @@ def test_wrong_use_ends_with_two_and_a_failed_simulation_with_three(
 
 def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0,7\n")
-    outside = falsifier("run", EASY, "--inputs", "u.csv", cwd=tmp_path)
-    assert outside.code == 2
+    outside = falsifier("run", EASY, "--inputs", "u.csv", cwd=tmp_path, code=2)
     assert "u.csv: input 'u' at t = 0 s: 7 is outside its range [-1, 1]" in outside.err
     (tmp_path / "u.csv").write_text("time,u\n0,1\n10,1\n")
     target = "python:tests.problems:impossible"
     start = ["--inputs", "u.csv", "--engine", "uniform", "--budget", "3", "--json"]
-    done = falsifier("run", target, *start, "--out", "run", cwd=tmp_path)
-    assert done.code == 0, done.err
+    done = falsifier("run", target, *start, "--out", "run", cwd=tmp_path, code=0)
     lines = [json.loads(line) for line in (tmp_path / "run" / "journal.jsonl").read_text().splitlines()]
     asked = [c["origin"] for line in lines if line["kind"] == "asked" for c in line["candidates"]]
     assert asked == ["known", "uniform", "uniform"]
@@ -128,7 +124,5 @@ def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) ->
     journal = tmp_path / "run" / "journal.jsonl"
     first = journal.read_bytes().splitlines(keepends=True)[:3]  # as if killed after it
     journal.write_bytes(b"".join(first))
-    resumed = falsifier("resume", "run", "--json", cwd=tmp_path)
-    assert resumed.code == 0, resumed.err
-    assert resumed.json["best"] == done.json["best"]
+    assert falsifier("resume", "run", "--json", cwd=tmp_path, code=0).json["best"] == done.json["best"]
     assert falsifier("run", target, "--inputs", "run", *start[2:], cwd=tmp_path).code == 0

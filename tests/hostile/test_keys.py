@@ -99,8 +99,7 @@ PASSWORD = "a-plain-password"
 def test_an_address_with_a_password_is_refused_and_not_repeated(
     tmp_path: Path, command: tuple[str, ...], at: str
 ) -> None:
-    done = falsifier(*command, at.format(PASSWORD), cwd=tmp_path)
-    assert done.code == 2
+    done = falsifier(*command, at.format(PASSWORD), cwd=tmp_path, code=2)
     assert f"{command[-1]}:" in done.err
     assert "environment variable OPENAI_API_BASE" in done.err
     assert PASSWORD not in done.out + done.err + recorded(tmp_path)

@@ -87,8 +87,8 @@ def test_a_prompt_beyond_the_models_context_is_never_cut(tmp_path: Path) -> None
         *("run", "python:tests.problems:impossible", "--llm", "short.gguf", "--budget", "2", "--out", "run"),
         cwd=tmp_path,
         env={"XDG_CACHE_HOME": "cache"},
+        code=3,
     )
-    assert done.code == 3
     for part in ("the prompt is too long", "llama.cpp: --ctx-size", "(256 tokens)"):
         assert part in done.out, part
     assert "litellm" not in done.out
@@ -106,8 +106,8 @@ class TestModelFile:
             *("--variant", "MP1", "--budget", "2", "--out", "run", "--llm-option", "max_tokens=200"),
             cwd=tmp_path,
             env={"XDG_CACHE_HOME": str(tmp_path / "cache")},
+            code=3,
         )
-        assert done.code == 3, done.err
         assert "failed after 2 simulations" in done.out
         assert "language model gave no usable answer" in done.out
         recorded = (tmp_path / "run" / "manifest.json").read_text()
