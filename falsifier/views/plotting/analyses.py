@@ -17,7 +17,7 @@ from falsifier.analyses.coverage import (
 )
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
-from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, whole_ticks
+from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, new_figure, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,8 +36,6 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
 
     Of each kind, the first eight are drawn; the pairs are the least tried ones.
     """
-    from matplotlib.figure import Figure
-
     by_name = {r.searched.name: r for r in found.ranges}
     inputs = [r for r in found.ranges if r.times is not None]
     parameters = [r for r in found.ranges if r.times is None]
@@ -49,7 +47,7 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     ]
     columns = min(_COLUMNS, max(1, len(drawn)))
     rows = max(1, -(-len(drawn) // columns))
-    figure = Figure(figsize=(3.4 * columns + 0.6, 2.7 * rows + 0.5), layout="constrained")
+    figure = new_figure(3.4 * columns + 0.6, 2.7 * rows + 0.5)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, draw in zip(axes, drawn, strict=False):
         draw(ax)
@@ -131,9 +129,7 @@ def _label(r: RangeCoverage) -> str:
 
 def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     """Plot robustness over the size of the change, and over the two most influential inputs."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4.4), layout="constrained")
+    figure = new_figure(11, 4.4)
     left, right = figure.subplots(1, 2)
     centre, colour = ("counterexample", VIOLATED) if found.original < 0 else ("nearest miss", OUTPUT)
     violates = found.robustness < 0

@@ -50,11 +50,16 @@ def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:
         axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
 
 
-def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":
-    """Make axes that fill a new figure of this size in inches."""
+def new_figure(width: float, height: float) -> "Figure":
+    """Make a figure of this size in inches."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained").subplots()
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def own_axes(width: float = 8.0, height: float = 4.0) -> "Axes":
+    """Make axes that fill a new figure of this size in inches."""
+    return new_figure(width, height).subplots()
 
 
 def figure_of(ax: "Axes") -> "Figure":
@@ -70,30 +75,26 @@ def save_figure(figure: "Figure", path: Path) -> None:
     """Write a figure; the file extension determines the format."""
     # By which our pictures are told from others, so that these are not replaced.
     key = "Software" if path.suffix.lower() == ".png" else "Creator"
-    buffer = BytesIO()
-    _save(figure, buffer, format=path.suffix[1:].lower(), dpi=130, metadata={key: "falsifier"})
-    write_whole(path, buffer.getvalue())
+    write_whole(path, _content(figure, path.suffix[1:].lower(), dpi=130, metadata={key: "falsifier"}))
 
 
 def png(figure: "Figure", *, dpi: int) -> bytes:
     """Return a figure as the content of a PNG file."""
-    buffer = BytesIO()
-    _save(figure, buffer, format="png", dpi=dpi)
-    return buffer.getvalue()
+    return _content(figure, "png", dpi=dpi)
 
 
 def svg(figure: "Figure") -> bytes:
     """Return a figure as the content of an SVG file without a background; equal figures give equal bytes."""
     from matplotlib import rc_context
 
-    buffer = BytesIO()
     with rc_context({"svg.hashsalt": "falsifier"}):
-        _save(figure, buffer, format="svg", transparent=True, metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+        return _content(figure, "svg", transparent=True, metadata={"Date": None, "Creator": None})
 
 
-def _save(figure: "Figure", place: BytesIO, **options: Any) -> None:
+def _content(figure: "Figure", kind: str, **options: Any) -> bytes:
     """Draw a figure; characters that the font lacks, as in names of signals, become boxes without a word."""
+    buffer = BytesIO()
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        figure.savefig(place, **options)
+        figure.savefig(buffer, format=kind, **options)
+    return buffer.getvalue()

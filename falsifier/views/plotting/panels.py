@@ -74,15 +74,11 @@ def panels(
     the numbers of other signals that are not real, by signal.
     """
     labels = {**labels, **{r.name: labels_of(r.kind, r.items) for r in inputs if r.kind != "real"}}
-    compared: dict[str, _Judged] = {}
+    compared: dict[Expression, _Judged] = {}
     for predicate, window in judged_windows(formula):
-        compared.setdefault(str(compared_sides(predicate)[0]), []).append((predicate, window))
-    drawn = [
-        (name, set(quantity.signals), _quantity(trajectory, judged, verdict))
-        for name, judged in compared.items()
-        for quantity in [compared_sides(judged[0][0])[0]]
-    ]
-    drawn += [(r.name, {r.name}, _input(r, trajectory, candidate)) for r in inputs]
+        compared.setdefault(compared_sides(predicate)[0], []).append((predicate, window))
+    drawn = [(str(e), e.signals, _quantity(trajectory, e, judged, verdict)) for e, judged in compared.items()]
+    drawn += [(r.name, (r.name,), _input(r, trajectory, candidate)) for r in inputs]
     shown = [
         replace(
             panel,
@@ -126,8 +122,9 @@ def judged_windows(
 _Judged = list[tuple[Predicate, tuple[float, float]]]
 
 
-def _quantity(trajectory: Trajectory, judged: _Judged, verdict: Verdict | None) -> Panel:
-    expression = compared_sides(judged[0][0])[0]
+def _quantity(
+    trajectory: Trajectory, expression: Expression, judged: _Judged, verdict: Verdict | None
+) -> Panel:
     end = float(trajectory.times[-1])
     bounds = tuple(
         Bound(str(p), begin, min(finish, end), _evaluated(compared_sides(p)[1], trajectory))

@@ -24,6 +24,7 @@ from falsifier.views.plotting.axes import (
     VIOLATED,
     caption,
     figure_of,
+    new_figure,
     own_axes,
     whole_ticks,
     wrapped,
@@ -104,11 +105,9 @@ def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = ""
 
     The title may have several lines; without a verdict, nothing is marked.
     """
-    from matplotlib.figure import Figure
-
     heights = [_PANEL_HEIGHT if panel.bounds else _LOW_HEIGHT for panel in drawn]
     height = sum(heights) + _LINE_HEIGHT * (title.count("\n") + 1)
-    figure = Figure(figsize=(9, 0.8 + height), layout="constrained")
+    figure = new_figure(9, 0.8 + height)
     axes = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     group = ""
     for ax, panel in zip(axes, drawn, strict=True):
