@@ -42,6 +42,11 @@ class Score:
         mean = float("inf") if self.mean is None else round(self.mean, _DECIMALS)
         return -self.falsified / max(self.runs, 1), mean
 
+    @property
+    def text(self) -> str:
+        """The cell without the tool: FR / S."""
+        return f"{self.falsified}/{self.runs} / {_number(self.mean, 1)}"
+
 
 @dataclass(frozen=True, slots=True)
 class Published:
@@ -79,16 +84,13 @@ class Published:
 COLUMNS = {"best": "best ARCH-COMP tool", "llm_falsifier": "LLM-Falsifier", "uniform": "uniform random"}
 
 
-def rank(score: Score, others: Iterable[Score]) -> int | None:
-    """Rank of a score: one plus the number of better ones; None without a falsified run."""
-    if score.falsified == 0:
-        return None
-    return 1 + sum(other.falsified > 0 and other.key < score.key for other in others)
-
-
-def is_tied(score: Score, others: Iterable[Score]) -> bool:
-    """Whether another score has the same rank."""
-    return any(other.falsified > 0 and other.key == score.key for other in others)
+def place(own: Score, others: Sequence[Score]) -> str:
+    """Rank of a score among others, which may be shared; NONE without a falsified run, or without others."""
+    if own.falsified == 0 or not others:
+        return NONE
+    keys = [other.key for other in others if other.falsified]
+    rank = 1 + sum(key < own.key for key in keys)
+    return f"{rank} (tie)" if own.key in keys else str(rank)
 
 
 @cache
@@ -174,8 +176,9 @@ def main_table(runs: Iterable[RunProgress], published: Published) -> Table:
         row = [requirement, method.label, *(text(numbers) for text in _NUMBERS.values())]
         if names:
             known = others.get((requirement, method), {})
-            place = _place(score(numbers), published.competitors(requirement)) if known else NONE
-            row += [place, *(_cell(known.get(name)) for name in names)]
+            rank = place(score(numbers), published.competitors(requirement)) if known else NONE
+            cells = map(known.get, names)
+            row += [rank, *(f"{cell.tool} {cell.text}".strip() if cell else "" for cell in cells)]
         rows.append(tuple(row))
     notes = {_UNFINISHED} if any(s.unfinished for s in found.values()) else set[str]()
     for told, count in _COUNTED.items():
@@ -282,20 +285,6 @@ def _interval(interval: Interval | None, decimals: int) -> str:
     return NONE if interval is None else f"{interval[0]:.{decimals}f}..{interval[1]:.{decimals}f}"
 
 
-def _place(own: Score, competitors: Sequence[Score]) -> str:
-    place = rank(own, competitors) if competitors else None
-    if place is None:
-        return NONE
-    return f"{place} (tie)" if is_tied(own, competitors) else str(place)
-
-
-def _cell(cell: Score | None) -> str:
-    if cell is None:
-        return ""
-    tool = f"{cell.tool} " if cell.tool else ""
-    return f"{tool}{cell.falsified}/{cell.runs} / {_number(cell.mean, 1)}"
-
-
 def _side_by_side(
     title: str,
     runs: Iterable[RunProgress],
@@ -313,6 +302,5 @@ def _side_by_side(
     rows = []
     for requirement in dict.fromkeys(requirement for requirement, _ in groups):
         cells = (scores.get(requirement) for scores in every.values())
-        texts = (NONE if c is None else f"{c.falsified}/{c.runs} / {_number(c.mean, 1)}" for c in cells)
-        rows.append((requirement, *texts))
+        rows.append((requirement, *(cell.text if cell else NONE for cell in cells)))
     return Table(title, ("requirement", *every), tuple(rows), (_LEGEND_SIDE,))
