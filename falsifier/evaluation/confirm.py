@@ -63,20 +63,11 @@ class Confirmation:
         return plot(self)
 
 
-@dataclass(frozen=True, slots=True)
-class _Opinion:
-    """One repetition: both monitors' robustness, and why it is not a violation (empty if it is)."""
-
-    trajectory: Trajectory | None
-    robustness: float | None
-    reference: float | None
-    doubt: str
-
-
 def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     """Repeat a violation on fresh instances, at the given communication step and at half of it."""
     check_evaluation(problem, evaluation)
-    fresh = _repeat(problem, evaluation.candidate)
+    fresh = _repeated(problem, evaluation.candidate)
+    reference, doubt = _second_opinion(problem, fresh)
     first, again = signed(evaluation.robustness), signed(fresh.robustness)
     differs = f"equal inputs give different outputs: the robustness was {first} when it was found; "
     # As far as it is shown: some solvers keep a step size from the simulation before.
@@ -86,28 +77,29 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
         evaluation=evaluation,
         outcome="refuted",
         robustness=fresh.robustness,
-        reference=fresh.reference,
-        reason=f"{differs}the second simulation {fresh.doubt}",
+        reference=reference,
+        reason=f"{differs}the second simulation {doubt}",
     )
-    if fresh.doubt:
+    if doubt:
         return found
-    reason = (
-        f"{differs}a fresh simulation gives {again}, the second monitor (rtamt) {signed(fresh.reference)}"
-    )
+    reason = f"{differs}a fresh simulation gives {again}, the second monitor (rtamt) {signed(reference)}"
     finer = half_step(problem)
-    halved = _repeat(finer, evaluation.candidate, known=fresh)
+    halved = _repeated(finer, evaluation.candidate)
+    is_same = _same(fresh.trajectory, halved.trajectory)
+    if not is_same:
+        _, doubt = _second_opinion(finer, halved)
     outcome: Outcome = "confirmed"
     is_solved = getattr(problem.model, "interface", "") == "model-exchange"
     step = "largest solver step" if is_solved else "communication step"
     steps = f"half the {step} ({finer.experiment.step_size:.4g} s)"
     if halved.robustness is None or fresh.robustness is None:
         # No verdict either way: the violation at the given step stands, and the reason states the failure.
-        reason += f"; with {steps} it {halved.doubt}"
-    elif halved.doubt:
+        reason += f"; with {steps} it {doubt}"
+    elif doubt:
         outcome = "fragile" if halved.robustness >= 0 else "refuted"
         change = halved.robustness - fresh.robustness
-        reason = f"{reason}, but with {steps} it {halved.doubt}, a change of {signed(change, 4)}"
-    elif _same(fresh.trajectory, halved.trajectory):
+        reason = f"{reason}, but with {steps} it {doubt}, a change of {signed(change, 4)}"
+    elif is_same:
         reason += f"; its outputs do not depend on the {step}"
     else:
         reason += f"; {steps} gives {signed(halved.robustness)}"
@@ -133,17 +125,19 @@ def other_interface(problem: Problem) -> Problem:
     return replace(problem, model=replace(model, interface=others[0]))
 
 
-def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = None) -> _Opinion:
-    """Simulate on a fresh instance; if the outputs equal those of a known opinion, return that opinion."""
-    from falsifier.stl import second_monitor
-
+def _repeated(problem: Problem, candidate: Candidate) -> Evaluation:
+    """Simulate on a fresh instance."""
     # The next simulation then loads the model again, so nothing left over from the search can influence it.
     problem.model.close()
-    again = evaluate_any(problem, candidate)
-    if again.trajectory is None or again.robustness is None:
-        return _Opinion(None, None, None, f"failed: {again.reason}")
-    if known is not None and _same(known.trajectory, again.trajectory):
-        return known
+    return evaluate_any(problem, candidate)
+
+
+def _second_opinion(problem: Problem, again: Evaluation) -> tuple[float | None, str]:
+    """Return the second monitor's robustness, and why a repetition is not a violation (empty if it is)."""
+    from falsifier.stl import second_monitor
+
+    if again.trajectory is None:
+        return None, f"failed: {again.reason}"
     reference, doubt = None, ""
     try:
         reference = second_monitor.robustness(problem.requirement.formula, again.trajectory)
@@ -153,7 +147,7 @@ def _repeat(problem: Problem, candidate: Candidate, *, known: _Opinion | None = 
         doubt = f"does not violate: robustness {signed(again.robustness)}"
     elif reference is not None and reference >= 0:
         doubt = f"has robustness {signed(again.robustness)}, but rtamt computes {signed(reference)}"
-    return _Opinion(again.trajectory, again.robustness, reference, doubt)
+    return reference, doubt
 
 
 def _same(one: Trajectory | None, other: Trajectory | None) -> bool:

@@ -1,6 +1,7 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil
@@ -95,11 +96,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
     trajectory = _with_inputs(problem, candidate, outputs)
-    try:
-        verdict = monitor_for(problem).evaluate(trajectory)
-    except MonitorError as error:
-        return Evaluation(candidate, "failed", None, str(error), None, seconds, outputs.log)
-    return Evaluation(candidate, "ok", verdict, "", trajectory, seconds, outputs.log)
+    return judge(problem, Evaluation(candidate, trajectory=trajectory, seconds=seconds, log=outputs.log))
 
 
 def simulate(
@@ -213,21 +210,12 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     brief = replace(experiment, stop_time=_shortest(problem))
     found: list[dict[str, float]] = []
     for corner in space.bounds.T:
-        try:
+        with suppress(CandidateError, ModelError, SimulationError):
             candidate = space.decode(corner)
-            outputs = problem.model.simulate(
-                candidate.signals, {**problem.parameters, **candidate.parameters}, brief
-            )
-        except (CandidateError, ModelError, SimulationError):
-            continue
-        found.append(outputs.at(0.0))
-    if not found:
-        return {}
-    return {
-        name: (min(values[name] for values in found), max(values[name] for values in found))
-        for name in experiment.outputs
-        if name in found[0]
-    }
+            parameters = {**problem.parameters, **candidate.parameters}
+            found.append(problem.model.simulate(candidate.signals, parameters, brief).at(0.0))
+    names = [name for name in experiment.outputs if found and name in found[0]]
+    return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
 
 def _shortest(problem: Problem) -> float:
@@ -238,7 +226,7 @@ def _shortest(problem: Problem) -> float:
 
 
 def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
-    """Evaluate the problem's requirement on a trajectory that was simulated for another requirement."""
+    """Evaluate the problem's requirement on a trajectory, also of a simulation for another requirement."""
     if evaluation.trajectory is None:
         return evaluation
     try:
