@@ -8,8 +8,7 @@
     lock              held while a process works on this campaign
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 from pydantic import Field
@@ -17,7 +16,7 @@ from pydantic import Field
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.words import shell_word
 from falsifier.errors import JournalError
-from falsifier.record.files import CAMPAIGN, can_be_a_folder, is_locked, locked, read_sealed, write_sealed
+from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
 from falsifier.record.journal import holds_run
 from falsifier.record.manifest import Surroundings
 
@@ -77,17 +76,14 @@ def run_directories(directory: Path) -> list[Path]:
     )
 
 
-@contextmanager
-def campaign_lock(directory: Path) -> Iterator[None]:
+def campaign_lock(directory: Path) -> AbstractContextManager[None]:
     """Hold the campaign's lock; JournalError if another process holds it."""
-    with can_be_a_folder(directory):
-        directory.mkdir(parents=True, exist_ok=True)
+    make_folder(directory)
     busy = (
         f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
         f"falsifier watch {shell_word(directory)}"
     )
-    with locked(directory / _LOCK, busy=busy, patience=_LOCK_PATIENCE):
-        yield
+    return locked(directory / _LOCK, busy=busy, patience=_LOCK_PATIENCE)
 
 
 def is_worked_on(directory: Path) -> bool:

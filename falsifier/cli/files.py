@@ -9,7 +9,7 @@ from falsifier.core.literals import one_line
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
-from falsifier.record.files import can_be_a_folder, check_unused
+from falsifier.record.files import check_unused, make_folder
 from falsifier.views.terminal import warn
 
 # File name extensions of pictures that users name.
@@ -40,8 +40,7 @@ def check_out(path: Path, *, begins: bytes = b"", holds: bytes = b"", kept: Path
 def made_folder(directory: Path) -> None:
     """Make a folder to write to; JournalError if it has files."""
     check_unused(directory)
-    with can_be_a_folder(directory):
-        directory.mkdir(parents=True, exist_ok=True)
+    make_folder(directory)
 
 
 def checked_picture(path: Path) -> Path:

@@ -66,15 +66,12 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
     Raises:
         JournalError: if another process still holds it after that time.
     """
-    lock = FileLock(path)
     try:
-        lock.acquire(timeout=patience)
+        held = FileLock(path).acquire(timeout=patience)
     except Timeout:
         raise JournalError(busy) from None
-    try:
+    with held:
         yield
-    finally:
-        lock.release()
 
 
 def is_locked(path: Path) -> bool:
@@ -147,6 +144,12 @@ def can_be_a_folder(directory: Path) -> Iterator[None]:
         raise JournalError(
             f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
         ) from None
+
+
+def make_folder(directory: Path) -> None:
+    """Make a folder, and those above it, where they are missing; JournalError if it can never be one."""
+    with can_be_a_folder(directory):
+        directory.mkdir(parents=True, exist_ok=True)
 
 
 def check_unused(directory: Path) -> None:

@@ -172,9 +172,8 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
     Raises:
         JournalError: if another process still writes here after that time, or a line is damaged.
     """
-    with files.can_be_a_folder(directory):
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / files.TRAJECTORIES).mkdir(exist_ok=True)
+    files.make_folder(directory)
+    (directory / files.TRAJECTORIES).mkdir(exist_ok=True)
     with run_lock(directory, patience):
         journal = Journal(directory, keep)
         try:

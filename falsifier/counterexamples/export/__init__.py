@@ -11,7 +11,7 @@ from falsifier.counterexamples.store import FILE_NAME, StoredCounterexample, sav
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel, System
 from falsifier.problem.problem import Problem
-from falsifier.record.files import can_be_a_folder
+from falsifier.record.files import make_folder
 
 
 def export_counterexample(
@@ -22,8 +22,7 @@ def export_counterexample(
     Files that do not apply are omitted: input.csv if the model has no inputs, the simulation scripts if the
     model is not an FMU. The evaluation is a current simulation of it. The directory is created if missing.
     """
-    with can_be_a_folder(directory):
-        directory.mkdir(parents=True, exist_ok=True)
+    make_folder(directory)
     candidate = evaluation.candidate
     table, start = tables.input_table(problem, candidate), tables.start_values(problem, candidate)
     files = [
@@ -41,7 +40,8 @@ def export_counterexample(
     if table.columns:
         files.append(tables.write_csv(table, directory / "input.csv", problem.model))
     if isinstance(problem.model, FmuModel):
-        files.append(copied_fmu(problem.model, directory))
+        # Next to the scripts, which then need nothing else of this machine.
+        files.append(shutil.copyfile(problem.model.path, directory / problem.model.path.name))
     if isinstance(problem.model, System):
         inside = {file.name: file for file in files if file.name in ("input.csv", "start_values.ssv")}
         target = directory / f"{file_name(problem.model.name)}.ssp"
@@ -57,11 +57,3 @@ def export_counterexample(
             (directory / name).write_text(text, encoding="utf-8")
             files.append(directory / name)
     return files
-
-
-def copied_fmu(model: FmuModel, directory: Path) -> Path:
-    """Copy the FMU next to the scripts, which then need nothing else of this machine."""
-    target = directory / model.path.name
-    if not target.exists() or not target.samefile(model.path):
-        shutil.copyfile(model.path, target)
-    return target
