@@ -68,13 +68,11 @@ def open_streams() -> None:
         except OSError:
             # It takes the lowest free number, which is this one, and is a stream of child processes, too.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # noqa: FBT003
-    if sys.stdout is None:
-        sys.stdout = open(1, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    if sys.stderr is None:
-        sys.stderr = open(2, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    for stream in (sys.stdout, sys.stderr):
+    for descriptor, name in ((1, "stdout"), (2, "stderr")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(descriptor, "w", encoding="utf-8", closefd=False))  # noqa: SIM115
         with suppress(AttributeError):
-            stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+            getattr(sys, name).reconfigure(errors="backslashreplace")
 
 
 def settle_streams() -> None:
@@ -83,13 +81,8 @@ def settle_streams() -> None:
         try:
             stream.flush()
         except (OSError, ValueError):
-            drop(stream.fileno())
-
-
-def drop(descriptor: int) -> None:
-    """Let everything written to a descriptor vanish from now on."""
-    with suppress(OSError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def stop_at_interrupts() -> None:
