@@ -117,8 +117,8 @@ def ranges_of(problem: Problem) -> dict[str, Interval]:
 
 def _constants(problem: Problem) -> dict[str, float]:
     """Return the values that stay the same: inputs and parameters that are not searched."""
-    values = {h.name: h.value for h in problem.held if h.name not in problem.info.starts}
-    return {name: value for name, value in values.items() if isinstance(value, float | int)}
+    held = (h for h in problem.held if h.name not in problem.info.starts)
+    return {h.name: h.value for h in held if isinstance(h.value, float | int)}
 
 
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:

@@ -51,8 +51,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}
-        items = [name for name in source.changes.parameters if name in problem.parameters]
-        given |= {name: problem.parameters[name] for name in items}
+        given |= {n: problem.parameters[n] for n in source.changes.parameters if n in problem.parameters}
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}

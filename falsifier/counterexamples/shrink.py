@@ -131,8 +131,7 @@ class _Hunt:
     demands_violation: bool = False
     demands_half_step: bool = False
     simulations: int = 0
-    _known: dict[object, Evaluation] = field(default_factory=dict)
-    _halved: dict[object, Evaluation] = field(default_factory=dict)
+    _known: dict[object, Evaluation] = field(default_factory=dict)  # by experiment and candidate
 
     def first(self, propose: Pass, best: Evaluation) -> Evaluation | None:
         """Find the first that keeps what is demanded among the simpler candidates that a pass proposes."""
@@ -148,7 +147,7 @@ class _Hunt:
 
     def kept(self, candidate: Candidate) -> Evaluation | None:
         """Simulate a candidate; return its evaluation if it has all that is demanded."""
-        found = self._simulated(self.problem, candidate, self._known)
+        found = self._simulated(self.problem, candidate)
         if found.robustness is None or found.robustness > self.at_most:
             return None
         if self.demands_violation and not found.violated:
@@ -156,17 +155,16 @@ class _Hunt:
         return None if self.demands_half_step and not self.violates_at_half_step(candidate) else found
 
     def violates_at_half_step(self, candidate: Candidate) -> bool:
-        return self._simulated(half_step(self.problem), candidate, self._halved).violated
+        return self._simulated(half_step(self.problem), candidate).violated
 
-    def _simulated(
-        self, problem: Problem, candidate: Candidate, known: dict[object, Evaluation]
-    ) -> Evaluation:
-        if candidate.key not in known:
+    def _simulated(self, problem: Problem, candidate: Candidate) -> Evaluation:
+        key = problem.experiment.step, candidate.key
+        if key not in self._known:
             if self.simulations >= self.budget:
                 raise _BudgetUsedUpError
             self.simulations += 1
-            known[candidate.key] = evaluate(problem, candidate)
-        return known[candidate.key]
+            self._known[key] = evaluate(problem, candidate)
+        return self._known[key]
 
 
 def at_rest(problem: Problem, candidate: Candidate) -> Iterator[Candidate]:

@@ -308,11 +308,9 @@ class _Loop:
             state.doubtful.append(confirmation)
             if isinstance(state.engine, FollowsRun):
                 state.engine.doubt(confirmation)
-        event = events.Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent)
-        if all(state.counterexample is not None for state in self.states):
-            self.emit_last(event)
-        else:
-            self.emit(event)
+        is_last = all(state.counterexample is not None for state in self.states)
+        emit = self.emit_last if is_last else self.emit
+        emit(events.Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""

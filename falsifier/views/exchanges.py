@@ -3,6 +3,7 @@
 Prompts are folded; nothing needs a script.
 """
 
+from itertools import takewhile
 from pathlib import Path
 
 from falsifier.core.words import counted, in_one_line, shell_word
@@ -53,9 +54,8 @@ def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
 
 def exchange_html(exchange: Exchange, before: tuple[Message, ...] = ()) -> Html:
     """One question and its reply; messages that the question before had are not repeated."""
-    known = 0
-    while known < min(len(before), len(exchange.messages)) and before[known] == exchange.messages[known]:
-        known += 1
+    pairs = zip(before, exchange.messages, strict=False)
+    known = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     usage, reply = exchange.usage, exchange.reply
     prompt = [el("summary", f"Prompt: {counted(usage.prompt_tokens, 'token')}")]
     if known:

@@ -10,17 +10,8 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import counted, readable
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
+from falsifier.search import events
 from falsifier.search.budget import Budget, Spent
-from falsifier.search.events import (
-    Asked,
-    Confirmed,
-    Evaluated,
-    Event,
-    Exchanged,
-    Listener,
-    RunEnded,
-    RunStarted,
-)
 from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
@@ -34,7 +25,7 @@ _QUIET, _QUIET_SHARE = 10.0, 0.1
 
 
 @contextmanager
-def make_display(*, quiet: bool = False) -> Iterator[Listener]:
+def make_display(*, quiet: bool = False) -> Iterator[events.Listener]:
     """Make a listener that shows progress: live on a terminal or in a notebook, otherwise lines on stderr."""
     console = error_console()
     if quiet:
@@ -52,7 +43,7 @@ def make_display(*, quiet: bool = False) -> Iterator[Listener]:
         yield progress()
 
 
-def progress() -> Listener:
+def progress() -> events.Listener:
     """Make a listener that shows the progress of a search: one live line in a notebook, else lines on stderr.
 
     >>> falsify("AT1", listeners=[progress()])  # doctest: +SKIP
@@ -62,9 +53,9 @@ def progress() -> Listener:
         return _Line(_show_in_notebook, keep=None)  # there is no place for more lines
     news, write = News(), line_writer(console)
 
-    def show(event: Event) -> None:
+    def show(event: events.Event) -> None:
         told = news.lines(event)
-        if isinstance(event, Evaluated):
+        if isinstance(event, events.Evaluated):
             told += news.pace(event.spent, told=bool(told))
         for line in told:
             write(line)
@@ -116,9 +107,9 @@ class _Line:
         rest = f", about {_duration(left)} left" if left >= 1 else ""
         return f"{of}{count}{rest}. {self._note}"
 
-    def __call__(self, event: Event) -> None:
+    def __call__(self, event: events.Event) -> None:
         """Show what an event has changed."""
-        if isinstance(event, RunStarted):
+        if isinstance(event, events.RunStarted):
             names = ", ".join(problem.name for problem in event.problems)
             self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget)
         for line in self._news.lines(event):
@@ -127,13 +118,13 @@ class _Line:
             else:
                 self._keep(line)
         match event:
-            case Asked():
+            case events.Asked():
                 return
-            case Evaluated(spent=spent):
+            case events.Evaluated(spent=spent):
                 self.done, self._seconds = spent.simulations, spent.seconds
-            case Exchanged(spent=spent):
+            case events.Exchanged(spent=spent):
                 self._note = f"LLM replied, {spent.tokens} tokens so far"
-            case RunEnded():
+            case events.RunEnded():
                 self._seconds, self._note = 0.0, f"{event.status}; {self._note}"  # no time is left
         self._show(self)
 
@@ -142,22 +133,22 @@ class News:
     """What is new with each event of a run, in lines; nothing is told twice."""
 
     def __init__(self) -> None:
-        self._started: RunStarted | None = None
+        self._started: events.RunStarted | None = None
         self._told: set[str] = set()
         self._least: dict[str, float] = {}
         self._since = Spent()
 
-    def lines(self, event: Event) -> list[str]:
+    def lines(self, event: events.Event) -> list[str]:
         """Return all that is new: choices, improvements, causes of failures, warnings and confirmations."""
         match event:
-            case RunStarted():
+            case events.RunStarted():
                 self._started, self._told, self._least, self._since = event, set(), {}, Spent()
                 known = counted(event.replayed, "evaluation")
                 replayed = f", {known} from the journal" if event.replayed else ""
                 formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
                 sent = f", prompts go to {event.server}" if event.server else ""
                 return [*formulas, f"engine {event.engines[0]}{sent}{replayed}", *_choices(event)]
-            case Evaluated(evaluation=ended, spent=spent):
+            case events.Evaluated(evaluation=ended, spent=spent):
                 told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
                     told.append(f"simulation {event.index + 1} {ended.outcome}")
@@ -170,13 +161,13 @@ class News:
                 if better := self._better(event):
                     told.append(f"simulation {event.index + 1}: {better}")
                 return told
-            case Confirmed(confirmation=found):
+            case events.Confirmed(confirmation=found):
                 # Several requirements may share the search, so it is named.
                 return [f"{found.problem.name}: violation {found.outcome}: {found.reason}"]
             case _:
                 return []
 
-    def _better(self, event: Evaluated) -> str:
+    def _better(self, event: events.Evaluated) -> str:
         """Tell the smallest robustness if it has changed, of several requirements by name; else nothing."""
         told = []
         for name, seen in event.judged.items():
@@ -213,13 +204,13 @@ class News:
         yield f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
 
 
-def log_fmu(path: Path) -> Listener:
+def log_fmu(path: Path) -> events.Listener:
     """Make a listener that writes the FMU's messages of each simulation to a file, which a run replaces."""
 
-    def append(event: Event) -> None:
-        if isinstance(event, RunStarted):
+    def append(event: events.Event) -> None:
+        if isinstance(event, events.RunStarted):
             path.write_text("", encoding="utf-8")
-        if isinstance(event, Evaluated):
+        if isinstance(event, events.Evaluated):
             evaluation = event.evaluation
             why = "" if evaluation.status == "ok" else f": {evaluation.reason}"
             lines = [f"simulation {event.index + 1}: {evaluation.status}{why}"]
@@ -230,7 +221,7 @@ def log_fmu(path: Path) -> Listener:
     return append
 
 
-def _choices(event: RunStarted) -> list[str]:
+def _choices(event: events.RunStarted) -> list[str]:
     """Return the parameterization, and what was chosen or ignored when the problems were loaded, once."""
     chosen = dict.fromkeys(note for problem in event.problems for note in problem.notes)
     parameterization = parameterization_note(event.searched)
