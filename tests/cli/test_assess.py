@@ -1,9 +1,8 @@
 from pathlib import Path
 
 from falsifier.record.run import falsify
+from tests.cli.support import HARD, NEVER
 from tests.command import falsifier
-
-HARD, NEVER = "python:tests.problems:hard", "python:tests.problems:impossible"
 
 
 def test_a_system_without_violations_gets_a_bound(tmp_path: Path) -> None:
@@ -52,8 +51,7 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
 
 
 def test_a_run_of_several_requirements_asks_which_one_is_assessed(tmp_path: Path) -> None:
-    problems = [f"python:tests.problems:{name}" for name in ("impossible", "hard")]
-    falsify(problems, "corners", budget=5, directory=tmp_path / "r")
+    falsify([NEVER, HARD], "corners", budget=5, directory=tmp_path / "r")
     asked = falsifier("assess", "r", "--budget", "20", "--quiet", cwd=tmp_path, code=2)
     assert "NEVER, HARD; choose one: --requirement NAME" in asked.err
     done = falsifier("assess", "r", "--requirement", "HARD", "--budget", "20", "--quiet", cwd=tmp_path)

@@ -3,7 +3,7 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.campaigns.analysis import load
-from tests.cli.support import bench
+from tests.cli.support import NEVER, bench
 from tests.command import falsifier
 
 
@@ -66,9 +66,6 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     unread = command("tools", "validate", "v.csv")
     assert "v.csv: cannot be read: expected a CSV file in UTF-8" in str(unread.exception)
     assert "v.csv: expected a file that ends in .toml, .fmu" in str(command("simulate", "v.csv").exception)
-
-
-NEVER = "python:tests.problems:impossible"
 
 
 def test_what_a_run_tried_is_printed_and_drawn(tmp_path: Path) -> None:

@@ -16,11 +16,11 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import open_journal
-from falsifier.record.records import ConfirmedRecord
 from falsifier.record.run import falsify
 from falsifier.search.budget import Spent
 from falsifier.testing import lag_problem
 from tests.problems import impossible, never
+from tests.record.test_summary import confirmed
 from tests.stepped import euler_problem
 
 SPEC = """
@@ -155,16 +155,8 @@ def test_a_run_without_it_is_read_from_its_journal(folder: Path, monkeypatch: py
 def test_a_journal_that_confirms_what_it_does_not_record_as_a_violation_is_named(tmp_path: Path) -> None:
     falsify(impossible(), "corners", budget=3, directory=tmp_path)
     with open_journal(tmp_path) as journal:
-        lost = ConfirmedRecord(
-            index=2,
-            requirement="NEVER",
-            outcome="confirmed",
-            robustness=-1.0,
-            reference=-1.0,
-            reason="",
-            spent=Spent(),
-        )
-        journal.write(lost)
+        lost = confirmed(2, "confirmed", "", Spent())
+        journal.write(lost.model_copy(update={"requirement": "NEVER"}))
         line = len(journal.records) + 1
     named = rf"journal\.jsonl: line {line} confirms .* NEVER, but simulation 3 "
     with pytest.raises(JournalError, match=named):

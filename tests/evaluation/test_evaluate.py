@@ -13,7 +13,7 @@ from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
 from falsifier.problem.loading import load_problem
-from falsifier.testing import START, Array, lag_problem
+from falsifier.testing import START, lag_problem
 from tests.problems import broken, never
 
 FULL = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
@@ -127,13 +127,8 @@ def test_a_component_whose_step_is_longer_than_an_output_step_is_no_hindrance() 
     problem.model.close()
 
 
-def _fails(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
-    raise ValueError("no start")
-
-
 def test_what_cannot_be_initialised_has_no_start() -> None:
-    problem = lag_problem()
-    assert start_values(replace(problem, model=FunctionModel(_fails, problem.info))) == {}
+    assert start_values(lag_problem(response=never)) == {}
 
 
 @pytest.mark.parametrize(

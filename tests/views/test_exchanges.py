@@ -14,6 +14,7 @@ from falsifier.views.report import html_report
 from tests.problems import impossible
 
 EVIL = "<script>alert(1)</script>"
+NAME = impossible().name
 
 
 def script(request: ChatRequest) -> ChatReply:
@@ -38,12 +39,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-def name() -> str:
-    return impossible().name
-
-
 def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path) -> None:
-    html = exchanges_html(run, name(), most=10)
+    html = exchanges_html(run, NAME, most=10)
     assert html.count('class="exchange"') == 6 and html.count('class="prompt"') == 7
     assert "2 questions before sample 2, 1500 tokens, 3 s: robustness +" in html
     assert "no idea" in html and "<b>Rejected: </b>" in html
@@ -53,7 +50,7 @@ def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path)
 
 
 def test_long_runs_are_cut_and_say_how_the_rest_is_seen(run: Path) -> None:
-    html = exchanges_html(run, name(), most=2)
+    html = exchanges_html(run, NAME, most=2)
     assert html.count('class="exchange"') == 2
     assert "Earlier questions are not shown" in html
     assert f"falsifier llm prompt {run} --at N" in html
@@ -71,5 +68,5 @@ def test_the_report_and_a_notebook_show_them(run: Path) -> None:
 
 def test_a_run_that_asked_nothing_shows_nothing(tmp_path: Path) -> None:
     falsify(impossible(), "uniform", budget=2, directory=tmp_path / "run")
-    assert exchanges_html(tmp_path / "run", name(), most=5) == ""
+    assert exchanges_html(tmp_path / "run", NAME, most=5) == ""
     assert "What was asked" not in html_report(tmp_path / "run")
