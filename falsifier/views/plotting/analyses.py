@@ -17,7 +17,7 @@ from falsifier.analyses.coverage import (
 )
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
-from falsifier.views.plotting.axes import OUTPUT, QUIET, VIOLATED, caption, new_figure, whole_ticks
+from falsifier.views.plotting.axes import Colour, caption, new_figure, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,7 +92,7 @@ def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -
 def _plot_output(ax: "Axes", o: OutputCoverage) -> None:
     ax.fill_between(o.times, o.lows, o.highs, color=_TRIED, linewidth=0)
     for line in (o.lows, o.highs):
-        ax.plot(o.times, line, color=OUTPUT, linewidth=0.8)
+        ax.plot(o.times, line, color=Colour.OUTPUT, linewidth=0.8)
     ax.set(xlabel="time [s]", ylabel=caption(with_unit(o.name, o.unit)))
     ax.set_title("smallest and largest value", fontsize=9)
 
@@ -131,12 +131,14 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     """Plot robustness over the size of the change, and over the two most influential inputs."""
     figure = new_figure(11, 4.4)
     left, right = figure.subplots(1, 2)
-    centre, colour = ("counterexample", VIOLATED) if found.original < 0 else ("nearest miss", OUTPUT)
-    violates = found.robustness < 0
-    for mask, color, label in ((violates, VIOLATED, "violated"), (~violates, OUTPUT, "satisfied")):
+    centre, colour = "nearest miss", Colour.OUTPUT
+    if found.original < 0:
+        centre, colour = "counterexample", Colour.VIOLATED
+    below = found.robustness < 0
+    for mask, color, label in ((below, Colour.VIOLATED, "violated"), (~below, Colour.OUTPUT, "satisfied")):
         if mask.any():
             left.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
-    left.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+    left.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
     left.set(xlabel="largest change of an input, share of its range", ylabel="robustness")
     left.plot(0.0, found.original, "o", color=colour, label=centre)
     left.legend()
@@ -144,9 +146,9 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         _plot_map(right, found)
     else:
         coordinate = found.coordinates[found.axes[0]]
-        right.plot(found.grid[0], found.surface[0], color=OUTPUT, linewidth=1.2)
+        right.plot(found.grid[0], found.surface[0], color=Colour.OUTPUT, linewidth=1.2)
         right.plot(coordinate.value, found.original, "o", color=colour)
-        right.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+        right.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
         right.set(xlabel=caption(coordinate.label), ylabel="robustness")
     figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure

@@ -16,9 +16,13 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-# Red is kept for violations. What came nearest to one has not the colour of an alarm.
-OUTPUT, INPUT, VIOLATED, NEAREST = "#1f5fa8", "#2f7d4f", "#b3261e", "#b35900"
-LIMIT, QUIET, EACH = "#333333", "#8a8a8a", "#9aa7b5"
+
+class Colour:
+    """Red is kept for violations. What came nearest to one has not the colour of an alarm."""
+
+    OUTPUT, INPUT, VIOLATED, NEAREST = "#1f5fa8", "#2f7d4f", "#b3261e", "#b35900"
+    LIMIT, QUIET, EACH = "#333333", "#8a8a8a", "#9aa7b5"
+
 
 # Maximum number of characters of a title or label.
 _LONGEST_CAPTION = 120

@@ -8,16 +8,7 @@ from numpy.typing import NDArray
 
 from falsifier.campaigns.analysis import Run, group, statistics
 from falsifier.core.words import counted
-from falsifier.views.plotting.axes import (
-    EACH,
-    OUTPUT,
-    QUIET,
-    VIOLATED,
-    caption,
-    figure_of,
-    own_axes,
-    whole_ticks,
-)
+from falsifier.views.plotting.axes import Colour, caption, figure_of, own_axes, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,15 +28,16 @@ def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
     """
     ax = ax if ax is not None else own_axes(9.0, 3.2)
     for run in runs:
-        ax.plot(*thinned(run.robustness, _MOST_DRAWN), ".", color=EACH, markersize=4, label="robustness")
+        each = thinned(run.robustness, _MOST_DRAWN)
+        ax.plot(*each, ".", color=Colour.EACH, markersize=4, label="robustness")
         numbers, smallest = improvements(run.robustness)
         last = smallest[-1:]  # until the end; none if no simulation was judged
         until = (np.append(numbers, np.full(len(last), len(run.robustness))), np.append(smallest, last))
-        ax.step(*until, where="post", color=OUTPUT, linewidth=1.4, label="smallest so far")
+        ax.step(*until, where="post", color=Colour.OUTPUT, linewidth=1.4, label="smallest so far")
         if run.counterexample is not None:
             found = run.counterexample
-            ax.plot(found + 1, run.robustness[found], "o", color=VIOLATED, label="counterexample")
-    ax.axhline(0, color=QUIET, linewidth=0.8, linestyle="--")
+            ax.plot(found + 1, run.robustness[found], "o", color=Colour.VIOLATED, label="counterexample")
+    ax.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
     ax.set(xlabel="simulation", ylabel="robustness")
     whole_ticks(ax.xaxis, {})
     if runs:

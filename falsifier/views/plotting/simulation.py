@@ -15,20 +15,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl.margins import signed
 from falsifier.stl.monitor import Verdict
-from falsifier.views.plotting.axes import (
-    INPUT,
-    LIMIT,
-    NEAREST,
-    OUTPUT,
-    QUIET,
-    VIOLATED,
-    caption,
-    figure_of,
-    new_figure,
-    own_axes,
-    whole_ticks,
-    wrapped,
-)
+from falsifier.views.plotting.axes import Colour, caption, figure_of, new_figure, whole_ticks, wrapped
 from falsifier.views.plotting.panels import Bound, Panel, panels
 
 if TYPE_CHECKING:
@@ -136,7 +123,7 @@ def _decided(verdict: Verdict) -> list[str]:
 
 
 def _decided_colour(verdict: Verdict | None) -> str:
-    return VIOLATED if verdict is None or verdict.violated else NEAREST
+    return Colour.VIOLATED if verdict is None or verdict.violated else Colour.NEAREST
 
 
 def _mark_moment(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
@@ -163,7 +150,7 @@ def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None"
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    ax = ax if ax is not None else own_axes(8, 3)
+    ax = ax if ax is not None else new_figure(8, 3).subplots()
     decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
     plot_panel(ax, decisive, verdict)
     _mark_moment(ax, decisive, verdict)
@@ -213,21 +200,15 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     """Draw a quantity with its bounds, windows and critical point, or an input with its control points."""
     critical = _decided_colour(verdict)
     marked = "farthest off" if verdict is not None and verdict.violated else "nearest to a violation"
-    color = INPUT if panel.limits is not None else OUTPUT
+    color = Colour.INPUT if panel.limits is not None else Colour.OUTPUT
     style = "steps-post" if panel.steps else "default"
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
-        ax.plot(
-            panel.times[within],
-            bound.values[within],
-            color=LIMIT,
-            linewidth=1.2,
-            linestyle="--",
-            label="limit",
-        )
+        limit = panel.times[within], bound.values[within]
+        ax.plot(*limit, "--", color=Colour.LIMIT, linewidth=1.2, label="limit")
         counts = "time in which it counts" if not within.all() else None
-        ax.axvspan(bound.start, bound.end, color=QUIET, alpha=0.08, linewidth=0, label=counts)
+        ax.axvspan(bound.start, bound.end, color=Colour.QUIET, alpha=0.08, linewidth=0, label=counts)
     for start, end in panel.broken:
         ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0, label="violated (worst interval)")
     decided = "decided the robustness"
@@ -238,13 +219,13 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
             ax.plot(*at, "o", color=critical, markersize=5, markerfacecolor=filling, label=label)
     if panel.points:
         points = zip(*panel.points, strict=True)
-        ax.plot(*points, "o", color=INPUT, markersize=3.5, label="control point of an input")
+        ax.plot(*points, "o", color=Colour.INPUT, markersize=3.5, label="control point of an input")
     if panel.limits is not None:
         low, high = panel.limits
         margin = 0.06 * (high - low)
         ax.set_ylim(low - margin, high + margin)
-        for limit in panel.limits:
-            ax.axhline(limit, color=QUIET, linewidth=0.6, linestyle=":")
+        for end in panel.limits:
+            ax.axhline(end, color=Colour.QUIET, linewidth=0.6, linestyle=":")
     if panel.labels is not None:
         whole_ticks(ax.yaxis, panel.labels)
     for bound in panel.bounds[:_LABELLED]:
@@ -261,7 +242,7 @@ def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
     low, high = ax.get_ylim()
     side, offset = ("top", -3) if at[1] > low + _TOP * (high - low) else ("bottom", 2)
     text, where = caption(bound.predicate), (3, offset)
-    ax.annotate(text, at, where, textcoords="offset points", va=side, color=LIMIT, fontsize=8)
+    ax.annotate(text, at, where, textcoords="offset points", va=side, color=Colour.LIMIT, fontsize=8)
 
 
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":
