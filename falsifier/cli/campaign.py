@@ -13,15 +13,7 @@ from typing import Any, NoReturn
 
 import click
 
-from falsifier.campaigns import (
-    CampaignEnd,
-    CampaignRequest,
-    Follower,
-    cross,
-    resume_campaign as _resume,
-    run_campaign,
-    suite,
-)
+from falsifier.campaigns import CampaignEnd, CampaignRequest, Follower, cross, run_campaign, suite
 from falsifier.campaigns.analysis import load, not_begun, read_published
 from falsifier.campaigns.archcomp import PROTOCOL_PARAMETERIZATION, PROTOCOL_SIMULATIONS, SUITES
 from falsifier.campaigns.directory import is_campaign
@@ -191,13 +183,6 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shell_word(directory)}")
-
-
-def resume_campaign(directory: Path, *, jobs: int, limits: Budget | None, quiet: bool, as_json: bool) -> None:
-    """Continue a campaign, for ``falsifier resume``."""
-    with campaign_display(quiet=quiet) as show:
-        outcome = _resume(directory, jobs=jobs, limits=limits, listeners=[show])
-    finish(directory, outcome, table="main", as_json=as_json)
 
 
 def finish(directory: Path, outcome: CampaignEnd, *, table: str, as_json: bool) -> NoReturn:

@@ -134,17 +134,20 @@ def resume(
     --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost include
     what was spent before.
     """
+    from falsifier.campaigns import resume_campaign
     from falsifier.campaigns.directory import is_campaign
-    from falsifier.cli.campaign import resume_campaign
+    from falsifier.cli.campaign import finish
     from falsifier.record.run import resume as resume_run, runs_in
+    from falsifier.views.campaign_progress import campaign_display
     from falsifier.views.progress import make_display
 
     if is_campaign(directory):
         refuse(
             "the runs of a campaign keep their limit; --total simulations=N limits all of them", budget=budget
         )
-        resume_campaign(directory, jobs=jobs, limits=totals, quiet=quiet, as_json=as_json)
-        return
+        with campaign_display(quiet=quiet) as show:
+            outcome = resume_campaign(directory, jobs=jobs, limits=totals, listeners=[show])
+        finish(directory, outcome, table="main", as_json=as_json)
     places = runs_in(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
