@@ -232,12 +232,3 @@ def test_an_empty_sentence_is_not_sent(server: Server, target: str) -> None:
     with pytest.raises(SpecError, match="expected a sentence"):
         ask(server, target, sentence=" ")
     assert server.received == []
-
-
-def test_readings_are_judged_on_a_nominal_simulation(target: str) -> None:
-    good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
-    found = formalize(target, "It is slow.", ScriptedChat([json.dumps({"readings": [good]})]))
-    nominal = found.readings[0].nominal
-    assert nominal is not None
-    assert nominal.robustness is not None
-    assert 0 < nominal.robustness <= 120

@@ -128,13 +128,6 @@ def test_what_is_wrong_in_an_edited_file_is_named(
         load_counterexample(save(stored.model_copy(), tmp_path / "n2.json"))
 
 
-def test_what_is_not_there_is_said(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match="not a run directory"):
-        load_counterexample(tmp_path)
-    with pytest.raises(SpecError, match="no such file"):
-        load_counterexample(tmp_path / "gone.json")
-
-
 def test_a_run_without_it_is_read_from_its_journal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     result = falsify("my.toml:R", "corners", budget=5, directory="run")

@@ -6,7 +6,6 @@ import pytest
 
 from falsifier.core.model import Experiment
 from falsifier.core.trajectory import Trajectory
-from falsifier.engines import make_engine
 from falsifier.errors import MonitorError, SimulationError, SpecError
 from falsifier.evaluation.confirm import (
     Movement,
@@ -20,7 +19,6 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
 from falsifier.fmu import Frame
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
-from falsifier.record.run import falsify
 from falsifier.stl import second_monitor
 from falsifier.testing import lag_problem
 from tests.fmu.fixtures import isolated, ramp
@@ -57,15 +55,6 @@ def test_a_violation_that_vanishes_at_half_the_step_is_fragile_and_says_by_how_m
     assert found.halved == pytest.approx(0.65 - FINE)
     assert f"does not violate: robustness {0.65 - FINE:+.6g}" in found.reason
     assert f"a change of {COARSE - FINE:+.4g}" in found.reason
-
-
-def test_fragile_violations_do_not_count_and_are_listed_apart() -> None:
-    problem = euler_problem("G[1,1] (x <= 0.65)")
-    result = falsify(problem, make_engine("corners", problem, seed=0), budget=2)
-    assert result.status == "not falsified"
-    assert result.counterexample is None
-    assert result.refuted == ()
-    assert [c.evaluation.candidate.signals["u"].values for c in result.fragile] == [(1.0,) * 4]
 
 
 def test_a_model_without_a_communication_step_says_so() -> None:

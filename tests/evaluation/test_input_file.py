@@ -77,8 +77,3 @@ def test_what_is_wrong_is_named(text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(SpecError, match=said) as raised:
         read_inputs(written(tmp_path, text), INFO)
     assert "u.csv" in str(raised.value)
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"none\.csv"):
-        read_inputs(tmp_path / "none.csv", INFO)

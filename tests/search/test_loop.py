@@ -27,7 +27,7 @@ from falsifier.search.steps import Steps
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
-from tests.problems import mostly_broken, never
+from tests.problems import mostly_broken
 from tests.record.support import run
 from tests.searches import Wrapped, stop_after
 
@@ -90,13 +90,6 @@ def test_a_run_in_which_most_simulations_fail_has_failed() -> None:
     assert "'x' is nan at t = 0.5 s" in result.reason
     assert result.best is not None
     assert result.spent.simulations_text == f"20 simulations, {failures} of them failed"
-
-
-def test_a_model_that_always_fails_ends_the_run_early() -> None:
-    result = run(lag_problem(response=never), budget=1000)
-    assert result.status == "failed"
-    assert result.spent.simulations == 10
-    assert "RuntimeError: out of order" in result.reason
 
 
 def test_the_time_of_a_question_that_is_interrupted_is_the_engines() -> None:

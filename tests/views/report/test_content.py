@@ -47,7 +47,8 @@ def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -
 def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) -> None:
     problem = euler_problem("G[1,1] (x <= 0.65)")
     result = falsify(problem, make_engine("corners", problem, seed=0), budget=2, directory=tmp_path)
-    assert result.fragile and result.counterexample is None
+    assert (result.status, result.counterexample, result.refuted) == ("not falsified", None, ())
+    assert [c.candidate.signals["u"].values for c in result.fragile] == [(1.0,) * 4]
     (tmp_path / "explanation.txt").write_text("Of the nearest miss.\n")
     for text in (markdown_report(tmp_path), html_report(tmp_path)):
         assert "was violated" in text and "Of the nearest miss." not in text
