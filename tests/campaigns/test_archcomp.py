@@ -121,10 +121,3 @@ def test_names_of_the_competition_are_understood(tmp_path: Path) -> None:
 )
 def test_tolerances(requirement: str, expected: float) -> None:
     assert tolerance(requirement) == expected
-
-
-def test_another_tools_counterexample_of_the_bundled_transmission_holds(tmp_path: Path) -> None:
-    """Full throttle without braking, as a tool with piecewise constant inputs writes it."""
-    line = 'AT,AT1,2,"[0 100 0; 5 100 0; 25 100 0]",[],1,7,1,1,-1.0,30'
-    (finding,) = validate(read_rows(rows(tmp_path, line)))
-    assert (finding.holds, finding.reason) == (True, "reproduced")

@@ -36,16 +36,6 @@ def test_a_run_is_its_own_only_one_and_a_folder_has_those_in_it(tmp_path: Path) 
         run_directories(tmp_path / "notes")
 
 
-def test_one_process_works_on_a_campaign_and_others_can_see_it(tmp_path: Path) -> None:
-    directory = tmp_path / "c"
-    assert not is_worked_on(directory)
-    with campaign_lock(directory):
-        assert is_worked_on(directory)
-        with pytest.raises(JournalError, match="another process"), campaign_lock(directory):
-            pass
-    assert not is_worked_on(directory)
-
-
 def test_a_lock_that_may_only_be_read_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     directory, refused = tmp_path / "c", PermissionError("read-only")
     with campaign_lock(directory):

@@ -54,9 +54,9 @@ def test_directories_are_compared_in_one_page(command: Any, tmp_path: Path) -> N
 
 def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path: Path) -> None:
     (tmp_path / "v.csv").write_text(
-        "system,property,instance,input,parameters,falsified,simulations\n"
-        'AT,AT2,2,"[0 100 0]",[],1,2\n'
-        'AT,AT2,2,"[0 0 0]",[],1,2\n'
+        "system,property,instance,input,parameters,falsified,simulations,stop time\n"
+        'AT,AT2,2,"[0 100 0; 5 100 0; 25 100 0]",[],1,2,30\n'
+        'AT,AT2,2,"[0 0 0]",[],1,2,\n'
     )
     result = command("tools", "validate", "v.csv", code=1)
     assert "row 1, AT2: reproduced, robustness -" in result.stdout

@@ -18,7 +18,7 @@ from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.record.journal import read_journal
-from falsifier.record.records import AskedRecord, EndedRecord, EvaluatedRecord
+from falsifier.record.records import AskedRecord, EndedRecord
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
@@ -29,7 +29,7 @@ from falsifier.stl.margins import is_on_limit
 from falsifier.testing import lag_problem
 from tests.problems import mostly_broken
 from tests.record.support import run
-from tests.searches import Wrapped, stop_after
+from tests.searches import Wrapped
 
 
 def test_stops_at_the_first_confirmed_violation() -> None:
@@ -100,17 +100,6 @@ def test_the_time_of_a_question_that_is_interrupted_is_the_engines() -> None:
 
     result = falsify(lag_problem(), Asked(lag_problem()))
     assert result.status == "interrupted" and result.spent.engine_seconds >= 0.05
-
-
-def test_interruption_loses_nothing(tmp_path: Path) -> None:
-    problem = lag_problem("G[0,10] (x <= 2)")
-    result = falsify(problem, "uniform", seed=1, budget=20, directory=tmp_path, listeners=stop_after(5))
-    assert result.status == "interrupted"
-    assert sum(isinstance(r, EvaluatedRecord) for r in read_journal(tmp_path)) == 5
-    resumed = run(problem, tmp_path)
-    assert [e.candidate.key for e in resumed.evaluations] == [
-        e.candidate.key for e in run(problem).evaluations
-    ]
 
 
 def test_batches_are_told_in_the_order_of_asking() -> None:

@@ -75,11 +75,13 @@ def dead(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -
 
 
 def test_a_requirement_that_nothing_moves_is_told() -> None:
-    (found,) = findings(lag_problem("G[0,10] (x <= 0.1)", response=dead))
+    problem = lag_problem("G[0,10] (x <= 0.1)", response=dead)
+    (found,) = findings(problem)
     assert found.kind == "constant"
     assert found.text.startswith(
         "Nothing that was searched had an effect on x: the same in 5 simulations, with robustness +0.1."
     )
+    assert "constant" not in [f.kind for f in findings(problem, budget=1)], "one simulation is too few"
 
 
 def test_a_robustness_that_does_not_change_is_told_although_signals_do() -> None:
@@ -96,11 +98,6 @@ def test_a_boolean_that_hides_the_margin_is_told() -> None:
     told = {f.kind: f.text for f in falsify(problem, "sobol", budget=3).findings}["margin"]
     assert told.startswith("The robustness has few values, because limp is Boolean")
     assert "compare the numbers of which limp is made instead (the model has temperature and" in told
-
-
-def test_one_simulation_is_too_few_to_call_the_robustness_constant() -> None:
-    found = findings(lag_problem("G[0,10] (x <= 0.1)", response=dead), budget=1)
-    assert "constant" not in [f.kind for f in found]
 
 
 def test_a_falsified_requirement_has_no_findings() -> None:
