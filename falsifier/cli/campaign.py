@@ -66,12 +66,8 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
 @llm_options.variant_option(multiple=True)
 @llm_options.asking_options
 @llm_options.context_option
-@click.option(
-    "--runs",
-    type=click.IntRange(1),
-    default=10,
-    show_default=True,
-    help="Number of runs per requirement and method, each with its own seed.",
+@options.count_option(
+    "--runs", "Number of runs per requirement and method, each with its own seed.", default=10
 )
 @options.seed_option("Random seed of the first run; the others count up.")
 @options.budget_option(shown=f"{DEFAULT_SIMULATIONS}; with --suite {PROTOCOL_SIMULATIONS}", note=" per run")

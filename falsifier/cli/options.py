@@ -306,18 +306,16 @@ total_option = click.option(
 )
 
 
+def count_option(flag: str, text: str, *, default: int = 1, least: int = 1) -> Decorator:
+    return click.option(flag, type=click.IntRange(least), default=default, show_default=True, help=text)
+
+
 def seed_option(text: str = "Random seed.") -> Decorator:
-    return click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help=text)
+    return count_option("--seed", text, default=0, least=0)
 
 
 def jobs_option(what: str) -> Decorator:
-    return click.option(
-        "--jobs",
-        type=click.IntRange(1),
-        default=1,
-        show_default=True,
-        help=f"Number of {what} at a time on this machine.",
-    )
+    return count_option("--jobs", f"Number of {what} at a time on this machine.")
 
 
 def inputs_option(text: str, *, multiple: bool = False) -> Decorator:

@@ -101,10 +101,8 @@ class Vacuity:
         if not self._count:
             return ()
         constant = tuple(self._constant())
-        never = [
-            part for part in self._parts if isinstance(part.formula, Implies) and part.highest.margin < 0
-        ]
-        always = [part for part in self._parts if isinstance(part.formula, Or) and part.lowest.margin > 0]
+        never = [p for p in self._parts if isinstance(p.formula, Implies) and p.highest.margin < 0]
+        always = [p for p in self._parts if isinstance(p.formula, Or) and p.lowest.margin > 0]
         said = {predicate for part in never for predicate in part.part.predicates}
         # A requirement whose signals do not move at all has no predicate that could be nearer.
         moving = [part for part in self._parts if part.formula.signals and not constant]

@@ -161,11 +161,7 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     best = None if run.shown is None else watched.candidates.get(run.shown)
     shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
     count = len(run.robustness)
-    tried = [
-        (Candidate.from_json(candidate), None)
-        for i, candidate in sorted(watched.candidates.items())
-        if i < count
-    ]
+    tried = [(Candidate.from_json(c), None) for i, c in sorted(watched.candidates.items()) if i < count]
     history = drawn(partial(plot_history, run), "Robustness over simulations")
     covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
     facts = [("time", seconds_text(run.spent))]
