@@ -19,6 +19,7 @@ from falsifier.core.arguments import path_of, whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError
 from falsifier.evaluation.workers import open_workers
+from falsifier.llm.model_file import is_model_file, served
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -172,7 +173,6 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         ModelError: if an FMU cannot be used.
     """
     from falsifier.llm.client import preflight
-    from falsifier.llm.model_file import is_model_file, served
 
     runs = tuple(request.named().values())
     for run in runs:

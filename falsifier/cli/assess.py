@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from falsifier.analyses.assess import assess as assess_problem
 from falsifier.cli import options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
@@ -48,7 +49,6 @@ def assess(
     Exit codes: 0 no violation among the draws, 1 at least one, 2 wrong usage or spec, 3 the simulations
     failed, 130 interrupted, after which the draws so far count.
     """
-    from falsifier.analyses.assess import assess as assess_problem
 
     def said(count: int) -> None:
         if not quiet and count % _SAID_EVERY == 0:

@@ -16,6 +16,7 @@ from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
+from falsifier.counterexamples.explain import explain as explain_case
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET, robustness_map
 from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET, shrink
@@ -242,12 +243,10 @@ def _shrink(
 
 def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
     """Tell what broke, and what resetting each input alone comes to."""
-    from falsifier.counterexamples.explain import explain
-
     pictures: list[Path] = []
     with _loaded(case, rights) as problem:
         evaluation = case.simulated(problem)
-        explanation = explain(problem, evaluation)
+        explanation = explain_case(problem, evaluation)
         if case.is_miss:
             pictures = files.draw_evaluation(problem, evaluation, beside(case.file, "nearest-miss.png"))
         about = "\n".join([*case.changes(problem), explanation.text])  # reports repeat it

@@ -5,7 +5,7 @@ from dataclasses import asdict, replace
 from math import isinf
 from os.path import relpath
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -20,7 +20,8 @@ from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import shell_word
 from falsifier.errors import MachineError, ModelError, SpecError
-from falsifier.fmu import is_package, read_package, rights_text
+from falsifier.evaluation.confirm import step_convergence, sufficient_step
+from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
 from falsifier.problem.models import default_interface, make_system, rights_of
@@ -28,9 +29,6 @@ from falsifier.problem.sections import ModelSection
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
 from falsifier.views.model_text import info_text, model_json, simulink_text
-
-if TYPE_CHECKING:
-    from falsifier.fmu import System
 
 # Maximum number of variables that are compared if the FMU declares no outputs.
 _CHECKED_VARIABLES = 50
@@ -56,7 +54,6 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     last two, their FMU or system is shown. A Simulink file (.slx, .mdl) is shown as blocks, lines and charts.
     """
     from falsifier.context.simulink import read_diagram
-    from falsifier.fmu import read_info
 
     if fmu.suffix.lower() in SIMULINK:
         refuse("applies to FMUs only", all=everything, check=checked)
@@ -105,7 +102,6 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
 
 
 def _starter(fmus: tuple[Path, ...], path: Path) -> str:
-    from falsifier.fmu import FmuModel, System, read_info
     from falsifier.problem.writing import starter_spec
 
     if len(fmus) > 1:
@@ -126,15 +122,13 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
 
 
 def _print_convergence(
-    source: "Path | System",
+    source: Path | System,
     found: ModelInfo,
     stated: ModelSection,
     allow: tuple[str, ...],
     deny: tuple[str, ...],
 ) -> None:
     """Print what halving the step, a spec's if it states one, changes while each input goes up and down."""
-    from falsifier.evaluation.confirm import step_convergence
-    from falsifier.fmu import FmuModel, System
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
     interface = stated.interface or default_interface(found)
@@ -179,10 +173,8 @@ def _print_convergence(
         say(f"  {advice}")
 
 
-def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Signal]) -> str:
+def _step_advice(system: System, experiment: Experiment, signals: dict[str, Signal]) -> str:
     """Say which step keeps the error of the coupling small."""
-    from falsifier.evaluation.confirm import sufficient_step
-
     share = f"{100 * _COUPLING_SHARE:g} % of its range"
     step = sufficient_step(system, experiment, signals, share=_COUPLING_SHARE, halvings=_HALVINGS)
     if step is None:
@@ -197,7 +189,7 @@ def _step_advice(system: "System", experiment: Experiment, signals: dict[str, Si
     return f"step_size = {step:g} {kept}; set it in [model]"
 
 
-def _named(given: Path) -> "Path | System":
+def _named(given: Path) -> Path | System:
     """Return the FMU that is given, or the FMU or system of the spec or bundled name that is given."""
     if is_package(given):
         return read_package(given)

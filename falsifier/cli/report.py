@@ -18,6 +18,7 @@ from falsifier.core.words import counted
 from falsifier.record import manifest
 from falsifier.search.result import Columns
 from falsifier.views.analyses_text import coverage_json, coverage_text
+from falsifier.views.plotting import plot_coverage
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.terminal import warn
 
@@ -88,8 +89,6 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     This covers ranges of inputs and parameters, how fast inputs changed, combinations of two at the same
     time, values that outputs reached, modes and changes of mode. Nothing is simulated.
     """
-    from falsifier.views.plotting import plot_coverage
-
     picture = directory / "coverage.png" if out is None else files.checked_picture(out)
     found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
     drawn = files.draw(lambda: plot_coverage(found, name), picture)

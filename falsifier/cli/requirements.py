@@ -17,6 +17,7 @@ from falsifier.core.words import counted, parameterization_text, readable, shell
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
+from falsifier.problem.templates import TEMPLATES
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # writing specs takes a package that check does not need
@@ -89,7 +90,6 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
     checked, restated in words, distinguished from the others by an example and judged on one simulation.
     Without one, templates serve: --stl 'NAME argument=value ...' of run and other commands.
     """
-    from falsifier.problem.templates import TEMPLATES
     from falsifier.problem.writing import subject_of
     from falsifier.views.analyses_text import formalized_text
 

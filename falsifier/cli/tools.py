@@ -18,6 +18,7 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import counted
 from falsifier.counterexamples.store import load_counterexample
 from falsifier.errors import JournalError, SpecError
+from falsifier.fmu.build import compile_sources
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
 from falsifier.record.journal import holds_run, repair as repair_run, simulated
@@ -75,8 +76,6 @@ def _repair_run(directory: Path) -> list[str]:
 @out_option("FMU to write; default: NAME-PLATFORM.fmu in the same directory.")
 def build(*, fmu: Path, out: Path | None) -> None:
     """Compile an FMU's C sources for this platform and write a copy of the FMU with the binary."""
-    from falsifier.fmu.build import compile_sources
-
     source = one_fmu(fmu)
     target = in_existing_folder(out or fmu.with_name(f"{fmu.stem}-{sys.platform}.fmu"))
     check_out(target, begins=b"PK", kept=source)

@@ -18,7 +18,9 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate_any
+from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
+from falsifier.stl import second_monitor
 from falsifier.stl.margins import signed
 
 if TYPE_CHECKING:
@@ -114,8 +116,6 @@ def half_step(problem: Problem) -> Problem:
 
 def other_interface(problem: Problem) -> Problem:
     """Return the problem with the other interface of its FMU; SpecError if that has only one, or is none."""
-    from falsifier.fmu import FmuModel
-
     model = problem.model
     if not isinstance(model, FmuModel):
         raise SpecError(f"{problem.info.name} is not an FMU and has no second interface")
@@ -134,8 +134,6 @@ def _repeated(problem: Problem, candidate: Candidate) -> Evaluation:
 
 def _second_opinion(problem: Problem, again: Evaluation) -> tuple[float | None, str]:
     """Return the second monitor's robustness, and why a repetition is not a violation (empty if it is)."""
-    from falsifier.stl import second_monitor
-
     if again.trajectory is None:
         return None, f"failed: {again.reason}"
     reference, doubt = None, ""

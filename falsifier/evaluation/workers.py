@@ -1,23 +1,26 @@
 """Executors for evaluations: this process, its threads or other processes."""
 
 import logging
+import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
+from multiprocessing import Pipe, get_context, parent_process
+from multiprocessing.connection import wait
+from multiprocessing.resource_tracker import ensure_running
 from pathlib import Path
-from threading import get_ident
-from typing import TYPE_CHECKING, Any, TypeVar
+from threading import Thread, get_ident
+from typing import Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
 from falsifier.errors import Reader, reader, speak_to
 from falsifier.evaluation.evaluate import Evaluation, evaluate_any
+from falsifier.fmu import stop_simulations
 from falsifier.problem.problem import Problem
-
-if TYPE_CHECKING:
-    from concurrent.futures import ProcessPoolExecutor
 
 T = TypeVar("T")
 # One end of a Pipe, whose class differs between systems, or None.
@@ -75,8 +78,6 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
 
 @contextmanager
 def _threads(jobs: int) -> Iterator[Executor]:
-    from falsifier.fmu import stop_simulations
-
     started: list[int] = []
     executor = ThreadPoolExecutor(jobs, initializer=lambda: started.append(get_ident()))
     try:
@@ -89,8 +90,6 @@ def _threads(jobs: int) -> Iterator[Executor]:
 
 @contextmanager
 def _processes(jobs: int) -> Iterator[Executor]:
-    from multiprocessing import Pipe
-
     ending, end = Pipe(duplex=False)
     executor = LastingExecutor(lambda: _process_pool(jobs, ending))
     try:
@@ -146,10 +145,7 @@ def death(error: BrokenExecutor) -> str:
     return f"the worker process died: {error}"
 
 
-def _process_pool(jobs: int, ending: _End = None) -> "ProcessPoolExecutor":
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
-
+def _process_pool(jobs: int, ending: _End = None) -> ProcessPoolExecutor:
     _start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
     return ProcessPoolExecutor(
@@ -163,8 +159,6 @@ def _start_silent_tracker() -> None:
     It still frees semaphores left behind by a killed process. Its warning would reach the terminal after the
     command has ended, and the user could do nothing about it.
     """
-    from multiprocessing.resource_tracker import ensure_running
-
     sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
     try:
         ensure_running()
@@ -178,12 +172,6 @@ def _prepare_worker(log_level: int, ending: _End, told: Reader) -> None:
     ``log_level`` is the parent's for simulations, ``told`` reads what the parent says, and ``ending`` is
     closed at the other end if the worker is to end in the middle of a simulation.
     """
-    import os
-    import signal
-    from multiprocessing import parent_process
-    from multiprocessing.connection import wait
-    from threading import Thread
-
     speak_to(told)
     logging.getLogger(_FMU_LOGGER).setLevel(log_level)
     for number in (signal.SIGINT, signal.SIGHUP):

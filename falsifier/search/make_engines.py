@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from falsifier.context.values import Context
 from falsifier.core.files import cache_directory
@@ -10,13 +9,13 @@ from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import SpecError, setting
 from falsifier.llm.messages import Chat
+from falsifier.llm.model_file import is_model_file
+from falsifier.llm.providers import check_recorded
+from falsifier.llm.usage import Price
 from falsifier.problem.context import with_context
 from falsifier.problem.problem import Problem
 from falsifier.search.budget import unknown_price
 from falsifier.search.request import LLMSettings, RunRequest
-
-if TYPE_CHECKING:
-    from falsifier.llm.usage import Price
 
 # Engines that ask a language model.
 LLM_ENGINES = ("llm", "hybrid")
@@ -103,8 +102,6 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         ChatError: for an unknown provider, a missing key, or another server than that of the settings.
     """
     from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, connect
-    from falsifier.llm.providers import check_recorded
-    from falsifier.llm.usage import Price
 
     check_recorded(llm.name, llm.api_base)
     chat = connect(
@@ -127,11 +124,9 @@ def check_price(llm: LLMSettings, max_cost: float | None) -> None:
         raise unknown_price(llm.name)
 
 
-def price_of(llm: LLMSettings) -> "Price | None":
+def price_of(llm: LLMSettings) -> Price | None:
     """Return what a language model costs: as stated, otherwise as listed; None if unknown."""
     from falsifier.llm.litellm_adapter import listed_price
-    from falsifier.llm.model_file import is_model_file
-    from falsifier.llm.usage import Price
 
     if llm.price:
         return Price(*llm.price)

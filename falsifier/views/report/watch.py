@@ -31,6 +31,7 @@ from falsifier.record.summary import RunFollower
 from falsifier.views.campaign_progress import overall_line, run_line
 from falsifier.views.exchanges import exchange_html
 from falsifier.views.html import Html, el, join
+from falsifier.views.plotting import plot_coverage, plot_history
 from falsifier.views.report.content import section_of, shown_of
 from falsifier.views.report.page import card_html, document, drawn, facts_html
 from falsifier.views.text import llm_use, seconds_text
@@ -156,8 +157,6 @@ def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
 
 def _run_html(run: Run, watched: _Watched) -> Html:
     """One requirement of a run: the card of the report, then how the search goes."""
-    from falsifier.views.plotting import plot_coverage, plot_history
-
     best = None if run.shown is None else watched.candidates.get(run.shown)
     shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
     count = len(run.robustness)
