@@ -109,6 +109,10 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)
+        if given["parameterization"].shortest_piece:
+            raise click.UsageError(
+                "--parameterization free:SECONDS: the fixed control points are drawn; drop :SECONDS"
+            )
         try:
             return load_source(options.problem_source(given)), {}
         except SpecError:
