@@ -56,8 +56,8 @@ class Method:
 
     @property
     def label(self) -> str:
-        """Name in tables, e.g. ``surrogate`` or ``gpt-5-mini high MP4, free, instance2``."""
-        llm = " ".join(p for p in (self.llm.rpartition("/")[2], self.effort, self.variant) if p)
+        """Name in tables, e.g. ``surrogate`` or ``openai/gpt-5-mini high MP4, free, instance2``."""
+        llm = " ".join(p for p in (self.llm, self.effort, self.variant) if p)
         name = " + ".join(p for p in (self.engine, llm) if p) or DEFAULT_ENGINE
         apart = {
             self.parameterization: self.parameterization != "fixed",

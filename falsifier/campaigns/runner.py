@@ -17,7 +17,7 @@ from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
 from falsifier.core.arguments import path_of, whole
 from falsifier.counterexamples.store import keep_recorded
-from falsifier.errors import SpecError
+from falsifier.errors import SpecError, written
 from falsifier.evaluation.workers import open_workers
 from falsifier.llm.model_file import is_model_file, served
 from falsifier.problem.loading import load_source
@@ -88,13 +88,13 @@ def resume_campaign(
     with campaign_lock(directory):
         record = read_campaign(directory)
         manifest.check_in_sight(directory, (run.problems[0] for run in record.request.runs))
+        manifest.check_files(directory, record.hashes)
         problems = _load(record.request.runs)
-        manifest.check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}
             )
-            _check_prices(record.request)
+            _check_limits(record.request)
         return _work(directory, record, problems, jobs, tuple(listeners))
 
 
@@ -181,16 +181,20 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         preflight(llm.name, api_base=llm.api_base, options=llm.options)
         if is_model_file(llm.name):
             served(llm.name)  # by this process, so that those that it starts share the server
-    _check_prices(request)
+    _check_limits(request)
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
         told_problems(run, [problems[run.problems[0]]], {})
     return problems
 
 
-def _check_prices(request: CampaignRequest) -> None:
-    """Reject limits of the cost of language models whose price is unknown, before anything is paid for."""
-    total = request.limits.cost if request.limits else None
+def _check_limits(request: CampaignRequest) -> None:
+    """Reject limits that could not be kept, before anything is paid for."""
+    limits = request.limits
+    if limits and (limits.tokens or limits.cost) and not any(run.llm for run in request.runs):
+        stated = written("--total", "limits")
+        raise SpecError(f"{stated}: tokens and cost limit language models, and none is named; drop the limit")
+    total = limits.cost if limits else None
     asked = {repr((run.llm, run.budget.cost)): run for run in request.runs}.values()
     for run in asked:
         if run.llm is not None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,12 @@ _CONFIDENCE = 0.95
 _RESAMPLES = 2000
 # Fewer runs say so little that an interval would look like more.
 _FEWEST_RUNS = 5
+# What of a request is no setting of the search, or is told apart otherwise.
+_NO_SETTINGS: Any = {
+    **dict.fromkeys(("engine", "seed", "budget", "jobs", "keep", "start_from"), True),
+    "problems": {"__all__": {"target", "record"}},
+    "llm": {"cache", "timeout", "price"},
+}
 Interval = tuple[float, float]
 R = TypeVar("R", bound=RunProgress)
 
@@ -45,6 +51,7 @@ class Statistics:
         budgets: the different limits on the simulations of a run, in ascending order.
         known: number of runs that began with known inputs.
         repeated: number of runs without a language model that have the seed of another one: nothing new.
+        settings: number of different settings (ranges, options, context files) of the runs.
     """
 
     runs: int
@@ -66,6 +73,7 @@ class Statistics:
     budgets: tuple[int, ...]
     known: int
     repeated: int
+    settings: int
 
 
 def statistics(runs: Iterable[RunProgress]) -> Statistics:
@@ -96,6 +104,7 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
         budgets=tuple(sorted({limit for run in runs if (limit := run.request.budget.simulations)})),
         known=sum(bool(run.request.start_from) for run in finished),
         repeated=len(seeds) - len(set(seeds)),
+        settings=len({run.request.model_dump_json(exclude=_NO_SETTINGS) for run in finished}),
     )
 
 

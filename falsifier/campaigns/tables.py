@@ -274,6 +274,9 @@ _COUNTED: Mapping[str, Callable[[Statistics], str]] = {
     "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.kept or ""),
     "Runs that began with known inputs": lambda s: f"{s.known} of {s.runs}" if s.known else "",
     "Runs with the seed of another one, so intervals are too narrow": lambda s: str(s.repeated or ""),
+    "Different ranges, options or context files, counted together": lambda s: (
+        str(s.settings) if s.settings > 1 else ""
+    ),
 }
 
 

@@ -109,6 +109,10 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
     place = Path(given["target"])
     if not (place.is_dir() and holds_run(place)):
         refuse("applies to run directories only; TARGET is not one", requirement=requirement)
+        if given["parameterization"].shortest_piece:
+            raise click.UsageError(
+                "--parameterization free:SECONDS: the fixed control points are drawn; drop :SECONDS"
+            )
         try:
             return load_source(options.problem_source(given)), {}
         except SpecError:
@@ -135,9 +139,9 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
     manifest.check_in_sight(place, [source])
-    problem = load_source(source)
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
-    manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
+    manifest.check_files(place, described.hashes, remedy)
+    problem = load_source(source)
     records = read_journal(place)
     evaluations = recorded_evaluations(place, records, problem.name, with_trajectories=False)
     doubtful = doubtful_confirmations(problem, records, evaluations)

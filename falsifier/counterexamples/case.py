@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from pathlib import Path
 
 from falsifier.core.arguments import utf_8
@@ -16,7 +17,7 @@ from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import FmuModel, System
-from falsifier.problem.loading import load_source
+from falsifier.problem.loading import load_source, source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
@@ -77,7 +78,14 @@ class Case:
             )
         remedy = "put it there, or correct problem.target in this file and delete its last key, sum"
         manifest.check_in_sight(self.place, [self.source], remedy)
-        problem = load_source(self.source)
+        try:
+            problem = load_source(self.source)
+        except SpecError as error:
+            spec = source_file(self.source)
+            if spec is None or sha256(spec.read_bytes()).hexdigest() != self.origin.spec_sha256:
+                raise
+            message = f"{self.place}: {spec.name} is as it was then, so its FMU has changed: {error}"
+            raise SpecError(message) from None
         model = problem.model
         if not isinstance(model, FmuModel | System):
             return problem, ()
@@ -105,7 +113,7 @@ class Case:
         except CandidateError as error:
             raise CandidateError(
                 f"{self.place}: does not fit what is searched now: {error}; undo what has changed in the "
-                "spec, or search again"
+                "spec or the FMU, or search again"
             ) from None
 
     def content(self, confirmation: Confirmation) -> StoredCounterexample:

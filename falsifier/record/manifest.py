@@ -28,6 +28,8 @@ from falsifier.search.request import RunRequest, Strict
 MANIFEST = "manifest.json"
 # What to do where a run's files, whose paths are relative, are not seen.
 _GO_THERE = "change to the folder in which it was started, and name its directory from there"
+# What to do where files have changed since a run was started.
+_START_ANEW = "start a new run instead"
 # Runs of a folder that are named where one of them is expected.
 _NAMED = 3
 _RECORDED_PACKAGES = ("litellm", "numpy", "rtamt", "scipy")
@@ -225,12 +227,19 @@ def file_hashes(problem: Problem) -> dict[str, str]:
 
 
 def check_unchanged(
-    directory: Path, recorded: dict[str, str], found: dict[str, str], remedy: str = "start a new run instead"
+    directory: Path, recorded: dict[str, str], found: dict[str, str], remedy: str = _START_ANEW
 ) -> None:
     """Refuse to go on if hashes by path, or fingerprints by requirement, changed; JournalError naming one."""
     for name, digest in found.items():
         if recorded.get(name, digest) != digest:
             raise JournalError(f"{directory}: {name} has changed since the start; {remedy}")
+
+
+def check_files(directory: Path, recorded: dict[str, str], remedy: str = _START_ANEW) -> None:
+    """Check that files are as they were when their hashes were recorded, before they are loaded."""
+    files = (Path(name) for name in recorded)
+    found = {str(f): sha256(f.read_bytes()).hexdigest() for f in files if f.is_file()}
+    check_unchanged(directory, recorded, found, remedy)
 
 
 def _modes(problem: Problem) -> Iterator[ModeRecord]:

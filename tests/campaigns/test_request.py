@@ -50,7 +50,7 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     assert len(others | {base}) == 7
     assert name() == base
     unsafe = name(LLMSettings(name="ollama_chat/gpt-oss:20b", variant="MP4"), parameterization="fixed")
-    assert unsafe.startswith("AT1-gpt-oss-20b-MP4-0-")
+    assert unsafe.startswith("AT1-ollama_chat-gpt-oss-20b-MP4-0-")
     assert name(target="specs/AT.toml:Öl druck").startswith("Öl-druck-surrogate-free-0-")
 
 
@@ -59,8 +59,8 @@ def test_free_and_fixed_parameterizations_are_different_methods() -> None:
     assert fixed != free
     assert (fixed.label, free.label) == ("uniform", "uniform, free")
     assert Method("hybrid", "openai/gpt-5-mini", "high", "MP4", "fixed", "instance2").label == (
-        "hybrid + gpt-5-mini high MP4, instance2"
+        "hybrid + openai/gpt-5-mini high MP4, instance2"
     )
     named = LLMSettings(name="openai/gpt-5-mini", anonymous=True)
     (run,) = cross([AT1], [named], seeds=[0], budget=Budget(1))
-    assert method_of(run).label == "gpt-5-mini, free, neutral names"
+    assert method_of(run).label == "openai/gpt-5-mini, free, neutral names"

@@ -68,6 +68,8 @@ def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> Non
     assert 0 < stopped.progress.spent.simulations < 8000
     assert stopped.progress.counts == {"interrupted": 1, "waiting": 3}
     assert not (directory / "stop").exists()
+    with pytest.raises(SpecError, match="limits: tokens and cost limit language models, and none is named"):
+        resume_campaign(directory, limits=Budget(cost=1.0))
     again = resume_campaign(directory)
     assert again.reason == stopped.reason
     assert again.progress.spent.simulations == stopped.progress.spent.simulations

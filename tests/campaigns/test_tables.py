@@ -78,6 +78,9 @@ def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
     assert cells(table.rows, table.header, "budget") == ["20, 60"]
     assert "Runs that began with known inputs: HARD uniform 1 of 3." in table.notes
     assert "Runs with the seed of another one, so intervals are too narrow: HARD uniform 1." in table.notes
+    assert not any("counted together" in note for note in table.notes), "the place of a spec is no setting"
+    table = main_table([replace(runs[0], request=changed), *runs[1:2]], PUBLISHED)
+    assert "Different ranges, options or context files, counted together: HARD uniform 2." in table.notes
     assert not any("seed" in n for n in main_table([asked(runs[0], "MP1")] * 2, PUBLISHED).notes), (
         "asked anew"
     )
@@ -106,14 +109,19 @@ def asked(run: Run, variant: str) -> Run:
 def test_the_ablation_table_has_a_column_a_variant(runs: list[Run]) -> None:
     hard = [run for run in runs if run.requirement == "HARD"]
     table = ablation_table([asked(run, variant=v) for v in ("MP1", "MP5") for run in hard[:2]], PUBLISHED)
-    assert table.header == ("requirement", "MP1 (gpt-5-nano low)", "MP5 (gpt-5-nano low)", "MP1 published")
+    assert table.header == (
+        "requirement",
+        "MP1 (openai/gpt-5-nano low)",
+        "MP5 (openai/gpt-5-nano low)",
+        "MP1 published",
+    )
     assert table.rows == (("HARD", "2/2 / 1.5", "2/2 / 1.5", "9/10 / 25.2"),)
 
 
 def test_the_models_table_has_a_column_a_model(runs: list[Run]) -> None:
     hard = [run for run in runs if run.requirement == "HARD"]
     table = llms_table([*(asked(run, variant="MP4") for run in hard[:2]), *hard[2:]], PUBLISHED)
-    assert table.header == ("requirement", "gpt-5-nano low MP4", "gpt-5-mini-high published")
+    assert table.header == ("requirement", "openai/gpt-5-nano low MP4", "gpt-5-mini-high published")
     assert table.rows == (("HARD", "2/2 / 1.5", "10/10 / 1.0"),)
 
 

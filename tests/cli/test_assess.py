@@ -46,6 +46,8 @@ def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path)
     assert done.json["searched"]["simulations"] == 5 and 0.99 < done.json["searched"]["smallest"] < 1.01
     assert "drop --stl" in falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path, code=2).err
     falsify("python:tests.stepped:euler_problem", "corners", budget=2, directory=tmp_path / "fragile")
+    refused = falsifier("assess", NEVER, "--parameterization", "free:2", cwd=tmp_path)
+    assert refused.code == 2 and "free:SECONDS: the fixed control points are drawn; drop" in refused.err
     doubted = falsifier("assess", "fragile", "--budget", "5", "--quiet", cwd=tmp_path)
     assert " (1 violation, not confirmed)." in doubted.out
 

@@ -103,7 +103,7 @@ def test_methods_are_all_combinations(command: Any, requested: list[Any]) -> Non
     asked = {(r.llm.name, r.llm.effort, r.llm.variant, r.problems[0].parameterization) for r in request.runs}
     # With a prompt or a problem that offers no control points to choose, the fixed ones are searched once.
     assert (len(asked), len(request.runs)) == (6, 10)
-    assert "gpt-5-nano low MP5, neutral names: free parameterization of AT1\n" in done.stderr
+    assert "openai/gpt-5-nano low MP5, neutral names: free parameterization of AT1\n" in done.stderr
     assert ("openai/gpt-5-nano", "low", "MP5", "free") in asked
     assert ("x/y@2024", "high", "MP4", "fixed") in asked
     assert {(r.seed, r.budget.cost, r.budget.simulations) for r in request.runs} == {(5, 2.0, 100)}

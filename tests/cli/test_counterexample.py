@@ -215,7 +215,12 @@ def test_what_is_of_another_model_is_said_and_does_not_stand_for_the_run(changea
     for command in (("explain",), ("explain", "--shrink"), ("explain", "--map"), ("export",), ("replay",)):
         done = run(folder, command[0], "rw/counterexample.json", *command[1:], code=2)
         assert "rw/counterexample.json: does not fit what is searched now: input 'throttle'" in done.err
-        assert "undo what has changed in the spec, or search again" in done.err
+        assert "undo what has changed in the spec or the FMU, or search again" in done.err
+    (folder / "w.toml").write_text(SPEC)
+    shutil.copy(bundled("fmus") / "CC.fmu", folder / "AT.fmu")
+    told = run(folder, "explain", "rw").err, run(folder, "resume", "rw", "--budget", "9").err
+    assert "w.toml is as it was then, so its FMU has changed: " in told[0]
+    assert "AT.fmu has changed since the start; start a new run instead" in told[1]
 
 
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:

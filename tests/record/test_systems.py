@@ -72,6 +72,9 @@ def test_from_a_spec_to_the_counterexample_and_back(spec: Path, tmp_path: Path) 
     assert "an FMU of the system has changed" in replay(stored, load_problem("loop.toml")).text
     with pytest.raises(JournalError, match=r"Gain_2\.fmu has changed since the start"):
         resume(tmp_path / "run")
+    (tmp_path / "Gain_2.fmu").write_bytes(path("Echo_2").read_bytes())  # what the spec connects is missing
+    with pytest.raises(JournalError, match=r"Gain_2\.fmu has changed since the start"):
+        resume(tmp_path / "run")
 
 
 def test_a_command_that_needs_one_fmu_names_those_of_the_system(spec: Path, tmp_path: Path) -> None:
