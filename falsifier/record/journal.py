@@ -173,7 +173,7 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
         JournalError: if another process still writes here after that time, or a line is damaged.
     """
     files.make_folder(directory)
-    (directory / files.TRAJECTORIES).mkdir(exist_ok=True)
+    files.make_folder(directory / files.TRAJECTORIES)
     with run_lock(directory, patience):
         journal = Journal(directory, keep)
         try:
