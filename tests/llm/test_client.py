@@ -176,6 +176,7 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
+@pytest.mark.usefixtures("keys")
 def test_reasoning_and_refusals_are_told_apart() -> None:
     refusal = Step(None, extra={"refusal": "I would rather not"})
     counts: dict[str, Any] = {
@@ -185,15 +186,16 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
     }
     counts["completion_tokens_details"] = {"reasoning_tokens": 12}
     ended = "model_context_window_exceeded"
-    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
-    with serving(answer, refusal) as server:
+    answer = Step(ended, extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
+    with serving(answer, refusal, answer) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         first, second = chat.send(REQUEST), chat.send(REQUEST)
+        other = LiteLLMChat("anthropic/claude-sonnet-4-5", api_base=server.root).send(REQUEST)
     assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
-    assert first.finish_reason == "length", "it was cut off"
+    for reply in (first, other):
+        assert (reply.finish_reason, reply.text) == ("length", ended), "it was cut off, and says what it says"
     assert (first.usage.cached_tokens, (first.usage + first.usage).cached_tokens) == (64, 128)
     assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
-    assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
 
 
 def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> None:
