@@ -436,7 +436,7 @@ def _message(item: pytest.Item, checked: "Checked", database: "Database") -> str
 
 def _command(item: pytest.Item, file: Path, database: "Database") -> str:
     """Command that replays the counterexample; the test itself if its file cannot load this problem."""
-    from falsifier.core.words import shell_word
+    from falsifier.core.literals import shell_word
     from falsifier.counterexamples.store import load_counterexample
 
     stored = load_counterexample(file)

@@ -14,7 +14,7 @@ from pathlib import Path
 from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
-from falsifier.core.words import shell_word
+from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
 from falsifier.record.journal import holds_run

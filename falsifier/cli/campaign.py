@@ -24,7 +24,8 @@ from falsifier.cli import llm_options, options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import FAILED, conclude, say
 from falsifier.core.files import write_whole
-from falsifier.core.words import counted, shell_word
+from falsifier.core.literals import shell_word
+from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.problem.loading import sources_of
 from falsifier.problem.source import Parameterization, ProblemSource

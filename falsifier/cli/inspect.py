@@ -16,9 +16,9 @@ from falsifier.cli.output import as_shown, say
 from falsifier.context.values import SIMULINK
 from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
+from falsifier.core.literals import shell_word
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
-from falsifier.core.words import shell_word
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.evaluation.confirm import step_convergence, sufficient_step
 from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text

@@ -12,8 +12,8 @@ from falsifier.cli.command import command
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
-from falsifier.core.literals import one_line
-from falsifier.core.words import counted, parameterization_text, readable, shell_word
+from falsifier.core.literals import one_line, shell_word
+from falsifier.core.words import counted, parameterization_text, readable
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text

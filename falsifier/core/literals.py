@@ -1,12 +1,13 @@
 """Any text, written so that a terminal or another language reads this text and nothing else.
 
 Names come from spec files, FMUs and journals that others wrote. Whatever stands in one, it must not become
-code in a script, a formula in a spreadsheet, or markup in a report. ``repr``, ``shlex`` and the JSON and XML
-libraries do the rest.
+code in a script, a formula in a spreadsheet, or markup in a report. ``repr`` and the JSON and XML libraries
+do the rest.
 """
 
 import csv
 import re
+import shlex
 from collections.abc import Iterable
 from decimal import Decimal
 from io import StringIO
@@ -65,6 +66,15 @@ def one_line(text: str) -> str:
     'a b c'
     """
     return plain(" ".join(text.splitlines()))
+
+
+def shell_word(word: object) -> str:
+    """Return a word of a command to copy: quoted where it must be, and no option if it begins with a dash.
+
+    >>> shell_word("my run"), shell_word("-run")
+    ("'my run'", './-run')
+    """
+    return shlex.quote(f"./{word}" if str(word).startswith("-") else str(word))
 
 
 def python_docstring(text: str) -> str:

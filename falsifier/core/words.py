@@ -1,6 +1,5 @@
 """Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
-import shlex
 from collections.abc import Collection, Iterable, Sequence
 from math import inf
 from typing import Literal
@@ -124,15 +123,6 @@ def aligned(
         padded = (cell.rjust(w) if k in right else cell.ljust(w) for k, (cell, w) in cells)
         lines.append("  ".join(padded).rstrip())
     return lines
-
-
-def shell_word(word: object) -> str:
-    """Return a word of a command to copy: quoted where it must be, and no option if it begins with a dash.
-
-    >>> shell_word("my run"), shell_word("-run")
-    ("'my run'", './-run')
-    """
-    return shlex.quote(f"./{word}" if str(word).startswith("-") else str(word))
 
 
 def without_full_stop(text: str) -> str:

@@ -8,7 +8,8 @@ from pathlib import Path
 from falsifier.core.arguments import utf_8
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import Fitted, fit
-from falsifier.core.words import counted, shell_word
+from falsifier.core.literals import shell_word
+from falsifier.core.words import counted
 from falsifier.counterexamples import store
 from falsifier.counterexamples.store import StoredCounterexample
 from falsifier.engines.protocol import KNOWN

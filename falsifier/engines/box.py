@@ -22,10 +22,9 @@ class Proposal:
 
 
 class BoxEngine(ABC):
-    """An engine on the unit box: subclasses propose points and learn costs.
+    """An engine on the unit box: subclasses propose points and learn from the evaluations of points.
 
-    The cost is the robustness; for a failed evaluation it is None. Evaluations of candidates that the box
-    cannot represent are ignored.
+    Evaluations of candidates that the box cannot represent are ignored.
     """
 
     name: ClassVar[str]
@@ -50,7 +49,7 @@ class BoxEngine(ABC):
         """Learn from the evaluations whose candidates have the fixed parameterization."""
         for evaluation in evaluations:
             if self.box.represents(evaluation.candidate):
-                self._learn(self.box.point(evaluation.candidate), evaluation.robustness)
+                self._learn(self.box.point(evaluation.candidate), evaluation)
 
     def _is_same(self, told: Array, own: Array) -> bool:
         """Whether a point that was told is one that was proposed; its candidate has settled values."""
@@ -60,5 +59,5 @@ class BoxEngine(ABC):
     def _propose(self, rng: np.random.Generator) -> Proposal:
         """Return the next point; ``rng`` is the only source of randomness to use."""
 
-    def _learn(self, point: Array, cost: float | None) -> None:  # noqa: B027 - most engines do not learn
-        """Learn the cost of a point; None if its evaluation failed."""
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:  # noqa: B027 - some learn nothing
+        """Learn from the evaluation of a point, which may have failed."""

@@ -5,7 +5,7 @@ predicts all before one is simulated, and uses them as starts of its own search.
 """
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,10 +17,8 @@ from falsifier.engines.llm import LLMEngine, reason_in_remark
 from falsifier.engines.surrogate import Settings as SurrogateSettings, Surrogate
 from falsifier.engines.surrogate.planning import is_seen
 from falsifier.errors import ChatError
-from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
-from falsifier.llm.conversation import NoValidReplyError, OnExchange
-from falsifier.llm.messages import Chat
+from falsifier.llm.conversation import NoValidReplyError
 from falsifier.problem.problem import Problem
 
 _LOG = logging.getLogger(__name__)
@@ -90,6 +88,8 @@ class Hybrid:
         surrogate_settings: SurrogateSettings = ADVISED,
     ) -> None:
         self.adviser = adviser
+        # What a run tells an engine that asks a language model concerns the adviser, which has the chat.
+        self.attach, self.begin, self.doubt = adviser.attach, adviser.begin, adviser.doubt
         self.surrogate = Surrogate(problem, seed=seed, settings=surrogate_settings)
         self.turns = Turns()
         self._best: tuple[float, Candidate] | None = None
@@ -103,18 +103,6 @@ class Hybrid:
         self._reasons: list[str] = []
         self._repeats: list[str] = []
         self._unanswered: list[str] = []
-
-    def attach(self, on_exchange: OnExchange, wrap: Callable[[Chat], Chat]) -> None:
-        """Connect the adviser, which has the chat, to a run."""
-        self.adviser.attach(on_exchange, wrap)
-
-    def begin(self, simulations: int | None) -> None:
-        """Be told the maximum number of simulations, and tell the adviser."""
-        self.adviser.begin(simulations)
-
-    def doubt(self, confirmation: Confirmation) -> None:
-        """Tell the adviser that a violation does not count."""
-        self.adviser.doubt(confirmation)
 
     def ask(self, n: int = 1) -> list[Candidate]:
         """Return n candidates of the LLM or the surrogate, whichever has its turn.

@@ -6,6 +6,7 @@ import numpy as np
 
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
 # A corner: whether each input and parameter is constant at its highest value, 1, or its lowest one, 0.
@@ -79,10 +80,10 @@ class Corners(BoxEngine):
         words = [f"{n} {'high' if level else 'low'}" for n, level in zip(self._groups, levels, strict=True)]
         return Proposal(point, f"constant extremes: {', '.join(words) or 'nothing varies'}")
 
-    def _learn(self, point: Array, cost: float | None) -> None:
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:
         levels = self._levels(point)
         if levels is not None:
-            self._costs[levels] = inf if cost is None else cost
+            self._costs[levels] = inf if evaluation.robustness is None else evaluation.robustness
 
     def _next(self, rng: np.random.Generator) -> Levels | None:
         """Return the levels of the next corner; None if all were tried."""

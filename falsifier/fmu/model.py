@@ -130,7 +130,7 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
 
 @lru_cache(maxsize=64)
 def _order(model: FmuModel) -> Order:
-    description = describe(model.path, model.sha256)
+    description = model._description
     through_wine = model.windows or description.needs_wine(model.interface)
     member = Member("", model.path, model.sha256, description, None, model.interface)
     places = {name: Place(0, name) for name in description.slots}
@@ -144,10 +144,9 @@ def _order(model: FmuModel) -> Order:
 
 
 def _check_interface(model: FmuModel) -> None:
-    description = describe(model.path, model.sha256)
-    info = description.info
+    info = model.info
     if model.interface in info.interfaces:
-        if model.windows and model.interface not in description.libraries.windows:
+        if model.windows and model.interface not in model._description.libraries.windows:
             raise ModelError(
                 f"{model.path}: the FMU has no library for {WINDOWS}, only "
                 f"{', '.join(info.platforms) or 'no binaries at all'}"

@@ -41,6 +41,8 @@ _GIVEN_UP: WeakSet[Thread] = WeakSet()
 _REDIRECTS = frozenset({301, 302, 303, 307, 308})
 _TOO_LONG = f"the reply has more than {_MOST_BYTES >> 20} MiB"
 
+# A finish reason that client libraries take for a proper end, and where it stands in replies.
+_EXCEEDED, _REASONS = "model_context_window_exceeded", ("finish_reason", "stop_reason")
 # Maximum number of characters of a reply that an error repeats.
 _LONGEST_BEGINNING = 80
 # Malformed replies to a question after which no other is to be expected; each takes time and tokens.
@@ -374,8 +376,14 @@ def _mended(body: bytes) -> bytes:
     if "usage" in sent:
         sent["usage"] = _possible(usage) if isinstance(usage, dict) else None
     if isinstance(choices, list):
-        sent["choices"] = list(map(_with_one_text, choices))
-    return json.dumps(sent).replace('"model_context_window_exceeded"', '"length"').encode()
+        sent["choices"] = [_with_known_end(_with_one_text(choice)) for choice in choices]
+    return json.dumps(_with_known_end(sent)).encode()
+
+
+def _with_known_end(part: Any) -> Any:
+    """A reply, or a choice of it, whose reason is that of all that were cut off, if its context was full."""
+    is_full = isinstance(part, dict) and any(part.get(key) == _EXCEEDED for key in _REASONS)
+    return {k: "length" if k in _REASONS else v for k, v in part.items()} if is_full else part
 
 
 def _with_one_text(choice: Any) -> Any:

@@ -16,9 +16,8 @@ from traceback import extract_tb
 from falsifier.context.values import Named
 from falsifier.core.arguments import texts
 from falsifier.core.files import bundled
-from falsifier.core.literals import one_line
+from falsifier.core.literals import one_line, shell_word
 from falsifier.core.model import Interface
-from falsifier.core.words import shell_word
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, written
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context

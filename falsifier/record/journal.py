@@ -26,7 +26,8 @@ from time import monotonic
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
-from falsifier.core.words import counted, shell_word
+from falsifier.core.literals import shell_word
+from falsifier.core.words import counted
 from falsifier.errors import JournalError, written
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record import files, manifest

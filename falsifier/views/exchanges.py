@@ -6,7 +6,8 @@ Prompts are folded; nothing needs a script.
 from itertools import takewhile
 from pathlib import Path
 
-from falsifier.core.words import counted, in_one_line, shell_word
+from falsifier.core.literals import shell_word
+from falsifier.core.words import counted, in_one_line
 from falsifier.llm.messages import Exchange, Message
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, iterations

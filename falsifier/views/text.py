@@ -8,8 +8,8 @@ from typing import Any
 from falsifier.analyses.assess import Assurance
 from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
-from falsifier.core.literals import one_line
-from falsifier.core.words import candidate_facts, counted, readable, shell_word
+from falsifier.core.literals import one_line, shell_word
+from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation

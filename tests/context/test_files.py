@@ -1,4 +1,3 @@
-import zipfile
 from pathlib import Path
 
 import pytest
@@ -6,6 +5,7 @@ import pytest
 from falsifier.context import files
 from falsifier.context.files import Sentry, inside, text_of
 from falsifier.errors import SpecError
+from tests.fixtures.archives import packed
 
 
 def write(path: Path, **more: str) -> Path:
@@ -19,10 +19,7 @@ def write(path: Path, **more: str) -> Path:
         "resources/map.csv": "1,2",
         "binaries/linux64/m.so": "x",
     } | more
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, text in files.items():
-            archive.writestr(name, text)
-    return path
+    return packed(path, files)
 
 
 def test_only_what_may_say_something_is_opened(tmp_path: Path) -> None:

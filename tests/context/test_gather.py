@@ -1,5 +1,4 @@
 import os
-import zipfile
 from hashlib import sha256
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from falsifier.context.values import Context
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from tests.fixtures import simulink
+from tests.fixtures.archives import packed
 
 SIGNALS = ("trips", "temperature", "power", "limp", "disagreement")
 LIMP = bundled("fmus").parent / "modelica" / "Faults" / "HeaterLimpHome.mo"
@@ -99,10 +99,7 @@ def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
 
 
 def fmu_with(path: Path, **entries: bytes) -> Path:
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in entries.items():
-            archive.writestr(f"documentation/{name}.md", content)
-    return path
+    return packed(path, {f"documentation/{name}.md": content for name, content in entries.items()})
 
 
 def test_binary_data_inside_an_fmu_is_left_out_with_a_note(tmp_path: Path) -> None:

@@ -88,8 +88,8 @@ class Noting(BoxEngine):
     def _propose(self, rng: np.random.Generator) -> Proposal:
         return Proposal(rng.random(self.box.dimension), "a reason")
 
-    def _learn(self, point: Array, cost: float | None) -> None:
-        self.learnt.append((point, cost))
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:
+        self.learnt.append((point, evaluation.robustness))
 
 
 def test_an_engine_is_told_points_and_costs_and_no_candidates_of_another_form() -> None:

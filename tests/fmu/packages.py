@@ -1,8 +1,8 @@
 """SSP files made by hand, by the standard: what tools write, and what is wrong with some."""
 
-import zipfile
 from pathlib import Path
 
+from tests.fixtures.archives import packed
 from tests.fmu.fixtures import path
 
 NAMESPACES = " ".join(
@@ -65,7 +65,4 @@ def write(file: Path, ssd: str, *fmus: str, more: dict[str, str | bytes] | None 
             target.parent.mkdir(exist_ok=True)
             target.write_bytes(content if isinstance(content, bytes) else content.encode())
         return file
-    with zipfile.ZipFile(file, "w") as archive:
-        for name, content in {"SystemStructure.ssd": ssd, **resources}.items():
-            archive.writestr(name, content)
-    return file
+    return packed(file, {"SystemStructure.ssd": ssd, **resources})

@@ -13,7 +13,8 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
 from falsifier.fmu.build import compile_sources
-from falsifier.fmu.description.archive import this_platform
+from falsifier.fmu.description.archive import read_entry, this_platform
+from tests.fixtures.archives import packed
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ramp, run
 
@@ -32,17 +33,13 @@ def test_an_fmu_without_sources_is_refused(tmp_path: Path) -> None:
 def rearranged(tmp_path: Path, name: str, files: Mapping[str, str | None]) -> Path:
     """A copy of an FMU in which the text of some files is another one or (None) is missing."""
     target = tmp_path / "rearranged.fmu"
-    with zipfile.ZipFile(fixtures.path(name)) as source, zipfile.ZipFile(target, "w") as made:
+    with zipfile.ZipFile(fixtures.path(name)) as source:
         texts: dict[str, str | None] = {e: source.read(e).decode() for e in source.namelist()}
-        for entry, text in {**texts, **files}.items():
-            if text is not None:
-                made.writestr(entry, text)
-    return target
+    return packed(target, {entry: text for entry, text in {**texts, **files}.items() if text is not None})
 
 
 def text_of(name: str, entry: str) -> str:
-    with zipfile.ZipFile(fixtures.path(name)) as source:
-        return source.read(entry).decode()
+    return read_entry(fixtures.path(name), entry).decode()
 
 
 PREFIXED = '#define FMI{0}_FUNCTION_PREFIX Lag_\n#define MODEL "lag.h"\n#include "shell{0}.c"\n'
@@ -89,10 +86,10 @@ def test_sources_become_a_working_fmu(tmp_path: Path, name: str, files: dict[str
 def test_sources_that_declare_the_standards_types_on_their_own_are_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source, known = tmp_path / "AT.fmu", bundled("fmus") / "AT.fmu"
-    with zipfile.ZipFile(known) as packed, zipfile.ZipFile(source, "w") as without_libraries:
-        for entry in (name for name in packed.namelist() if not name.startswith("binaries/")):
-            without_libraries.writestr(entry, packed.read(entry))
+    known = bundled("fmus") / "AT.fmu"
+    with zipfile.ZipFile(known) as fmu:
+        kept = {name: fmu.read(name) for name in fmu.namelist() if not name.startswith("binaries/")}
+    source = packed(tmp_path / "AT.fmu", kept)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tempfile.tempdir", ".")  # as of TMPDIR
     target = compile_sources(source, tmp_path / "out.fmu")

@@ -78,17 +78,14 @@ def run(behaviour: Behaviour, **budget: Any) -> tuple[Result, int]:
         return result, len(server.requests)
 
 
-def test_nothing_is_asked_again_beyond_the_limit_on_the_tokens() -> None:
-    result, requests = run(answers("no candidate"), tokens=130)
-    assert (result.status, requests) == ("failed", 1)
-    assert "130 tokens" in result.reason
+NEGATIVE = {"prompt_tokens": -1000, "completion_tokens": -1000, "total_tokens": -2000}
 
 
-def test_negative_counts_of_a_server_do_not_extend_a_run() -> None:
-    result, requests = run(
-        answers("no candidate", prompt_tokens=-1000, completion_tokens=-1000, total_tokens=-2000), tokens=1
-    )
+@pytest.mark.parametrize(("reported", "limit"), [({}, 130), (NEGATIVE, 1)])
+def test_nothing_is_asked_again_beyond_the_limit_on_the_tokens(reported: dict[str, int], limit: int) -> None:
+    result, requests = run(answers("no candidate", **reported), tokens=limit)
     assert (result.status, requests) == ("failed", 1)
+    assert f"{limit} token" in result.reason
     assert result.spent.tokens > 0
 
 

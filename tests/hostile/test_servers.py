@@ -11,7 +11,6 @@ import pytest
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat, connect
-from falsifier.llm.messages import ChatRequest, Message
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result
@@ -28,9 +27,9 @@ from tests.hostile.servers import (
     sends,
     trickles,
 )
+from tests.llm.support import PLAIN
 from tests.patience import HANG
 
-REQUEST = ChatRequest(messages=(Message(role="user", content="a question"),))
 HEAD = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\n"
 CHUNKED = HEAD + b"transfer-encoding: chunked\r\n\r\n"
 
@@ -54,7 +53,7 @@ ENDLESS: dict[str, Behaviour] = {
 def _warm_up() -> None:
     """The first request imports much, which takes seconds."""
     with misbehaving(answers()) as server:
-        LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
+        LiteLLMChat("openai/m", api_base=server.url).send(PLAIN)
 
 
 def ended(action: Callable[[], Any]) -> list[Any]:
@@ -77,7 +76,7 @@ def ended(action: Callable[[], Any]) -> list[Any]:
 def test_a_request_ends_in_time_and_is_cut(behaviour: str) -> None:
     with misbehaving(ENDLESS[behaviour]) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, timeout=0.5)
-        (error,) = ended(lambda: chat.send(REQUEST))
+        (error,) = ended(lambda: chat.send(PLAIN))
         assert isinstance(error, ChatError)
         assert server.gone.wait(HANG)
 
@@ -118,7 +117,7 @@ def test_the_seconds_of_a_run_hold_if_the_server_asks_to_wait(refusal: bytes) ->
 def test_a_reply_that_never_ends_is_refused_by_its_size() -> None:
     with misbehaving(in_turn(sends(HEAD + b"\r\n"), trickles_of(b" " * 65536))) as server:
         chat = LiteLLMChat("openai/m", api_base=server.url, timeout=HANG)
-        (error,) = ended(lambda: chat.send(REQUEST))
+        (error,) = ended(lambda: chat.send(PLAIN))
         assert "more than 16 MiB" in str(error)
         assert server.gone.wait(HANG)
 
@@ -133,7 +132,7 @@ def trickles_of(block: bytes) -> Behaviour:
 
 def test_a_compressed_reply_is_not_unpacked() -> None:
     with misbehaving(sends(response(b"\x1f\x8b", headers="content-encoding: gzip\r\n"))) as server:
-        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url).send(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=server.url).send(PLAIN))
     assert "the reply is compressed (gzip)" in str(error)
 
 
@@ -146,7 +145,7 @@ def test_no_prompt_follows_a_redirect(status: int, path: str) -> None:
         place = f"{other.root}{path}" if path == "/v2/chat/completions" else path
         header = f"location: {place}\r\n" if path else ""
         with misbehaving(sends(response(b"", status=f"{status} Moved", headers=header))) as server:
-            (error,) = ended(lambda: connect("openai/m", api_base=server.url).complete(REQUEST))
+            (error,) = ended(lambda: connect("openai/m", api_base=server.url).complete(PLAIN))
             assert len(server.requests) == 1
         assert not other.requests
     assert isinstance(error, ChatError)
@@ -196,7 +195,7 @@ BROKEN: dict[str, tuple[Behaviour, str]] = {
 def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: str, llm: str) -> None:
     behaviour, cause = BROKEN[what]
     with misbehaving(behaviour) as server:
-        (error,) = ended(lambda: LiteLLMChat(llm, api_base=server.url, timeout=HANG).send(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat(llm, api_base=server.url, timeout=HANG).send(PLAIN))
         assert isinstance(error, ChatError)
         told = str(error)
         assert told.startswith(f"{llm} at {server.url}: ") and "\n" not in told
@@ -208,7 +207,7 @@ def test_a_reply_that_is_none_is_told_with_its_cause_and_cure_in_one_line(what: 
 
 def test_a_reply_with_bytes_that_are_no_characters_is_read() -> None:
     with misbehaving(sends(response(completion("QQ").replace(b"QQ", b"10 \xb0C")))) as server:
-        reply = LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
+        reply = LiteLLMChat("openai/m", api_base=server.url).send(PLAIN)
     assert reply.text == "10 \N{REPLACEMENT CHARACTER}C"
 
 
@@ -223,6 +222,6 @@ def test_https_to_a_server_without_tls_is_told() -> None:
 
         threading.Thread(target=answer, daemon=True).start()
         address = f"https://127.0.0.1:{listening.getsockname()[1]}/v1"
-        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=address, timeout=HANG).send(REQUEST))
+        (error,) = ended(lambda: LiteLLMChat("openai/m", api_base=address, timeout=HANG).send(PLAIN))
     assert isinstance(error, ChatError)
     assert "does not speak TLS" in str(error) and "http or https in the server's address" in str(error)

@@ -1,6 +1,5 @@
 """Spec files, formulas and model descriptions of any size and content: one clear error, and soon."""
 
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from random import Random
@@ -10,10 +9,12 @@ import pytest
 
 from falsifier.core.files import bundled
 from falsifier.errors import FalsifierError, FormulaError, ModelError, SpecError
+from falsifier.fmu.description.archive import read_entry
 from falsifier.fmu.description.model_description import Description, parse, read_description
 from falsifier.problem.loading import load_problem
 from falsifier.problem.spec import read_spec
 from falsifier.stl import parse as parse_formula
+from tests.fixtures.archives import packed
 
 FMU = bundled("fmus") / "AT.fmu"
 MINIMAL = f"""
@@ -154,9 +155,7 @@ def test_descriptions_of_any_size_are_refused_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("falsifier.fmu.description.archive._MAX_TEXT_BYTES", 2 << 20)
-    path = tmp_path / "a.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", b"<" * (3 << 20))
+    path = packed(tmp_path / "a.fmu", {"modelDescription.xml": b"<" * (3 << 20)})
     with pytest.raises(ModelError, match="has 3 MiB, more than 2") as error:
         read_description(path)
     clear(error)
@@ -184,12 +183,10 @@ def larger(content: bytes, random: Random) -> bytes:
 def test_damaged_descriptions_are_read_or_named(
     damage: Callable[[bytes, Random], bytes], tmp_path: Path
 ) -> None:
-    with zipfile.ZipFile(FMU) as archive:
-        whole = archive.read("modelDescription.xml")
+    whole = read_entry(FMU, "modelDescription.xml")
     random, path = Random(8), tmp_path / "a.fmu"
     for _ in range(100):
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("modelDescription.xml", damage(whole, random))
+        packed(path, {"modelDescription.xml": damage(whole, random)})
         try:
             read_description(path)
         except ModelError as error:

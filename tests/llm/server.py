@@ -152,7 +152,7 @@ def _anthropic(step: Step, body: dict[str, Any]) -> dict[str, Any]:
         "role": "assistant",
         "model": body["model"],
         "content": [{"type": "text", "text": step.content}],
-        "stop_reason": "end_turn",
+        "stop_reason": "end_turn" if step.finish == "stop" else step.finish,
         "usage": {"input_tokens": 100, "output_tokens": 20},
     }
 

@@ -1,4 +1,4 @@
-"""A question whose reply follows a schema, and a chat whose server is a script."""
+"""Questions, one of which wants a reply that follows a schema, and a chat whose server is a script."""
 
 from dataclasses import dataclass, field
 
@@ -7,6 +7,7 @@ from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatReply, ChatRequest, Message
 from falsifier.llm.scripted import ScriptedChat
 
+PLAIN = ChatRequest(messages=(Message(role="user", content="?"),))
 QUESTION = ChatRequest(
     messages=(Message(role="user", content="what is 1 + 2?"),),
     reply_schema=schema_of_object(sum={"type": "number"}),

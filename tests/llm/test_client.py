@@ -176,6 +176,7 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
+@pytest.mark.usefixtures("keys")
 def test_reasoning_and_refusals_are_told_apart() -> None:
     refusal = Step(None, extra={"refusal": "I would rather not"})
     counts: dict[str, Any] = {
@@ -185,15 +186,16 @@ def test_reasoning_and_refusals_are_told_apart() -> None:
     }
     counts["completion_tokens_details"] = {"reasoning_tokens": 12}
     ended = "model_context_window_exceeded"
-    answer = Step("answer", extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
-    with serving(answer, refusal) as server:
+    answer = Step(ended, extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
+    with serving(answer, refusal, answer) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)
         first, second = chat.send(REQUEST), chat.send(REQUEST)
+        other = LiteLLMChat("anthropic/claude-sonnet-4-5", api_base=server.root).send(REQUEST)
     assert (first.reasoning, first.usage.reasoning_tokens) == ("first I thought", 12)
-    assert first.finish_reason == "length", "it was cut off"
+    for reply in (first, other):
+        assert (reply.finish_reason, reply.text) == ("length", ended), "it was cut off, and says what it says"
     assert (first.usage.cached_tokens, (first.usage + first.usage).cached_tokens) == (64, 128)
     assert (second.finish_reason, second.text) == ("refusal", "I would rather not")
-    assert lowered(server.received[0])["authorization"] == "Bearer none", "a server of ones own needs no key"
 
 
 def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> None:
@@ -381,3 +383,39 @@ def test_what_the_next_question_begins_with_is_marked_where_a_provider_keeps_not
         {"role": "system", "content": "standing"},
         {"role": "user", "content": "samples and news"},
     ]
+
+
+def test_ladder_finds_the_form_that_a_server_takes_and_remembers_it() -> None:
+    refused = Step(status=400, message="response_format is not supported")
+    with serving(refused, refused, Step("in words"), Step("again")) as server:
+        chat = LiteLLMChat("openai/m", api_base=server.url)
+        first, second = chat.complete(REQUEST), chat.complete(REQUEST)
+    kinds = [r.body.get("response_format", {}).get("type") for r in server.received]
+    assert kinds == ["json_schema", "json_object", None, None]
+    assert first.parameters["mode"] == "prompt"
+    assert second.text == "again"
+
+
+UNPARSED = [
+    Step(status=500, message="The model produced output that does not match the expected peg-native format"),
+    Step(status=500, message="Failed to parse input at pos 12: <tool_call>{"),
+    Step(status=400, message='Failed to generate JSON. See {"failed_generation": {"top_k": 1}}'),
+]
+
+
+@pytest.mark.parametrize("unparsed", UNPARSED, ids=lambda step: step.message)
+def test_what_a_server_cannot_parse_twice_is_asked_for_more_plainly(unparsed: Step) -> None:
+    with serving(unparsed, Step("one"), unparsed, unparsed, Step("two")) as server:
+        chat = LiteLLMChat("openai/m", api_base=server.url, options={"top_k": 3})  # which it may write of
+        texts = [chat.complete(REQUEST).text for _ in range(5)]
+    assert texts == ["", "one", "", "", "two"]
+    kinds = [r.body["response_format"]["type"] for r in server.received]
+    assert kinds == ["json_schema"] * 4 + ["json_object"]
+
+
+def test_ladder_ends_at_its_last_rung() -> None:
+    refused = Step(status=400, message="grammar is not supported")
+    samplers = Step(status=400, message="Failed to initialize samplers: std::exception")
+    with serving(samplers, refused, refused) as server, pytest.raises(ChatError, match="grammar"):
+        LiteLLMChat("openai/m", api_base=server.url).complete(REQUEST)
+    assert len(server.received) == 3

@@ -8,13 +8,13 @@ from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm import litellm_adapter
 from falsifier.llm.client import LiteLLMChat, connect, preflight
 from falsifier.llm.conversation import converse
-from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.messages import ChatReply, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.make_engines import open_chat, price_of
 from falsifier.search.request import LLMSettings
 from tests.llm.server import Step, serving
-from tests.llm.support import Served
+from tests.llm.support import PLAIN, Served
 
 
 @pytest.fixture(autouse=True)
@@ -134,7 +134,7 @@ def test_prompts_are_sent_to_the_server_that_is_meant(
     monkeypatch.setenv(variable, value)
     monkeypatch.setattr(litellm_adapter, "completed", sent)
     with pytest.raises(ChatError, match=f"^{llm} at {address}: .*to {address}$"):
-        connect(llm, attempts=1).send(QUESTION)  # type: ignore[attr-defined]
+        connect(llm, attempts=1).send(PLAIN)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("provider", ["hosted_vllm", "custom_openai", "litellm_proxy", "xinference"])
@@ -148,9 +148,7 @@ def test_a_server_of_the_users_own_must_be_named(provider: str, monkeypatch: pyt
 def test_a_short_text_in_place_of_the_key_of_openai_hinders_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "key")
     with serving(Step("an answer")) as server:  # litellm sends it "fake-api-key"
-        assert (
-            connect("hosted_vllm/x", api_base=server.url, attempts=1).complete(QUESTION).text == "an answer"
-        )
+        assert connect("hosted_vllm/x", api_base=server.url, attempts=1).complete(PLAIN).text == "an answer"
 
 
 @pytest.mark.parametrize(
@@ -165,7 +163,7 @@ def test_the_key_of_openai_goes_to_no_other_provider(
     with serving(Step("an answer")) as server:
         refused = rf"sent to 127\.0\.0\.1: it would have got {whose}; set .*_API_KEY"
         with pytest.raises(ChatError, match=refused) as caught:
-            connect(llm, api_base=server.url, attempts=1).complete(QUESTION)
+            connect(llm, api_base=server.url, attempts=1).complete(PLAIN)
         assert not server.received and "sk-openai" not in str(caught.value)
 
 
@@ -176,8 +174,8 @@ def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyP
         monkeypatch.setenv(variable, "account")
     monkeypatch.setenv("OPENAI_CUSTOM_HEADERS", "X-Account: account")
     with serving(Step("an answer"), Step("an answer")) as server:
-        assert connect(llm, api_base=server.url, attempts=1).complete(QUESTION).text == "an answer"
-        connect("openai/x", api_base=server.url).complete(QUESTION)
+        assert connect(llm, api_base=server.url, attempts=1).complete(PLAIN).text == "an answer"
+        connect("openai/x", api_base=server.url).complete(PLAIN)
     assert [r.headers["Authorization"] for r in server.received] == [f"Bearer {NO_KEY}", "Bearer sk-openai"]
     assert [list(r.headers.values()).count("account") for r in server.received] == [0, 3]
 
@@ -185,9 +183,9 @@ def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyP
 def test_a_missing_key_that_only_litellm_misses_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FIREWORKS_API_KEY", raising=False)
     with pytest.raises(ChatError, match=r"^nvidia_nim/x: no API key: set NVIDIA_NIM_API_KEY in the env"):
-        connect("nvidia_nim/x").complete(QUESTION)
+        connect("nvidia_nim/x").complete(PLAIN)
     with pytest.raises(ChatError, match=r"^fireworks_ai/x: FIREWORKS_API_KEY is not set"):
-        connect("fireworks_ai/x").complete(QUESTION)
+        connect("fireworks_ai/x").complete(PLAIN)
 
 
 def test_keys_of_providers_that_are_not_listed_are_checked(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,6 +238,13 @@ def test_an_address_of_the_environment_is_recorded_and_priced(monkeypatch: pytes
     assert LLMSettings.model_validate_json(own.model_dump_json()) == own  # what was recorded stays
     with pytest.raises(ChatSetupError, match=r"names http://127\.0\.0\.1:1/v1 now: unset OPENAI_BASE_URL"):
         open_chat(own)
+
+
+def test_prices_that_are_listed_and_true_are_known() -> None:
+    listed = litellm_adapter.listed_price("openai/gpt-5-mini")
+    assert listed is not None and 0 < listed.prompt < listed.completion
+    for llm in ("huggingface/openai/gpt-oss-20b", "openai/never-heard-of"):
+        assert litellm_adapter.listed_price(llm) is None
 
 
 @pytest.mark.parametrize(
@@ -297,7 +302,6 @@ def test_the_first_way_of_asking_is_the_strictest_that_works(llm: str, mode: str
     assert first_mode(llm) == mode
 
 
-QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
 PAID = ChatReply(text="answer", usage=Usage(prompt_tokens=10, completion_tokens=5, cost=0.01), seconds=3.0)
 
 
@@ -310,46 +314,46 @@ class TestCache:
             monkeypatch.setenv("OPENAI_API_BASE", f"http://{server}/v1")
             chat = connect("openai/mine", cache=tmp_path)
             assert isinstance(chat, LiteLLMChat)
-            places.append(chat._place(tmp_path, QUESTION))
+            places.append(chat._place(tmp_path, PLAIN))
         assert len(set(places)) == 4
 
     def test_valid_replies_are_kept_and_cost_nothing_again(self, tmp_path: Path) -> None:
         inner = ScriptedChat([PAID, "never"])
         chat = Served(server=inner, cache=tmp_path / "new" / "folder")
-        reply = chat.complete(QUESTION)
+        reply = chat.complete(PLAIN)
         for _ in range(2):
-            chat.accepted(QUESTION, reply)
-        again = chat.complete(QUESTION)
+            chat.accepted(PLAIN, reply)
+        again = chat.complete(PLAIN)
         assert (again.text, again.source, again.usage) == ("answer", "cache", Usage(cost=0.0, kept=1))
         assert len(inner.requests) == 1
         assert [p.suffix for p in tmp_path.rglob("*") if p.is_file()] == [".json"]
 
     def test_rejected_replies_are_not_kept_and_damaged_ones_asked_for_again(self, tmp_path: Path) -> None:
         chat = Served(server=ScriptedChat(["bad", PAID, "anew"]), cache=tmp_path)
-        assert chat.complete(QUESTION).text == "bad"
-        chat.accepted(QUESTION, chat.complete(QUESTION))
+        assert chat.complete(PLAIN).text == "bad"
+        chat.accepted(PLAIN, chat.complete(PLAIN))
         (file,) = tmp_path.rglob("*.json")
         file.write_text("{")
-        assert chat.complete(QUESTION).text == "anew"
+        assert chat.complete(PLAIN).text == "anew"
 
     def test_where_nothing_can_be_written_the_reply_counts_all_the_same(
         self, tmp_path: Path, caplog: pytest.LogCaptureFixture
     ) -> None:
         (tmp_path / "file").write_text("")
         chat = Served(server=ScriptedChat([PAID]), cache=tmp_path / "file" / "replies")
-        assert converse(chat, QUESTION, str, lambda _: None) == "answer"
+        assert converse(chat, PLAIN, str, lambda _: None) == "answer"
         assert f"cannot write to {tmp_path / 'file' / 'replies'}" in caplog.text
 
     def test_everything_that_is_sent_is_part_of_the_question(self, tmp_path: Path) -> None:
         kept = Served("a", server=ScriptedChat(["one"]), cache=tmp_path)
-        kept.accepted(QUESTION, kept.complete(QUESTION))
+        kept.accepted(PLAIN, kept.complete(PLAIN))
         others = [
-            (Served("a"), QUESTION.model_copy(update={"sample": 1})),
-            (Served("a"), QUESTION.model_copy(update={"reply_schema": {"type": "object"}})),
-            (Served("a"), QUESTION.model_copy(update={"messages": (Message(role="system", content="?"),)})),
-            (Served("a", effort="low"), QUESTION),
-            (Served("a", options={"temperature": 0}), QUESTION),
-            (Served("b"), QUESTION),
+            (Served("a"), PLAIN.model_copy(update={"sample": 1})),
+            (Served("a"), PLAIN.model_copy(update={"reply_schema": {"type": "object"}})),
+            (Served("a"), PLAIN.model_copy(update={"messages": (Message(role="system", content="?"),)})),
+            (Served("a", effort="low"), PLAIN),
+            (Served("a", options={"temperature": 0}), PLAIN),
+            (Served("b"), PLAIN),
         ]
         for chat, other in others:
             chat.cache, chat.server = tmp_path, ScriptedChat(["two"])

@@ -109,3 +109,14 @@ def test_more_can_follow_a_reason_that_ends_with_a_full_stop() -> None:
     with pytest.raises(NoValidReplyError, match=r"attack systems$"):
         converse(chat, QUESTION, str, lambda _: None)
     assert "attack systems.\nReply again" in chat.requests[1].messages[-1].content
+
+
+def test_a_script_may_be_a_function_and_says_when_it_ends() -> None:
+    assert (
+        ScriptedChat(lambda request: request.messages[0].content).complete(QUESTION).text
+        == "a number, please"
+    )
+    chat = ScriptedChat(["only"])
+    chat.complete(QUESTION)
+    with pytest.raises(ChatError, match="contains only 1 line, but request 2 was made"):
+        chat.complete(QUESTION)

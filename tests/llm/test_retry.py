@@ -7,13 +7,11 @@ import pytest
 from falsifier.errors import ChatError
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import TransientChatError
-from falsifier.llm.messages import ChatReply, ChatRequest, Message, Usage
+from falsifier.llm.messages import ChatReply, ChatRequest, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
 from tests.llm.server import Step, serving
-from tests.llm.support import Served
-
-QUESTION = ChatRequest(messages=(Message(role="user", content="?"),))
+from tests.llm.support import PLAIN, Served
 
 
 @pytest.fixture(autouse=True)
@@ -26,7 +24,7 @@ def naps(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 def asked(chat: ScriptedChat, *, attempts: int = 7, within: float | None = None) -> ChatReply:
     deadline = None if within is None else monotonic() + within
-    question = QUESTION.model_copy(update={"deadline": deadline})
+    question = PLAIN.model_copy(update={"deadline": deadline})
     return Served(attempts=attempts, server=chat).complete(question)
 
 
@@ -62,14 +60,14 @@ def test_it_ends_where_waiting_does_not_help(failure: ChatError, said: str, aske
 def test_malformed_replies_are_asked_for_three_times(raw: str) -> None:
     with serving(*[Step(status=503)] * 3, *[Step(raw=raw)] * 4) as server:
         with pytest.raises(ChatError, match=r"6 attempts failed, the last one so: .*the reply"):
-            LiteLLMChat("openai/mine", api_base=server.url).complete(QUESTION)
+            LiteLLMChat("openai/mine", api_base=server.url).complete(PLAIN)
         assert len(server.received) == 6
 
 
 @pytest.mark.parametrize("step", [Step(status=503), Step(raw='{"error": {"message": "busy"}}')], ids=str)
 def test_a_server_that_says_it_is_busy_is_given_more_time(step: Step) -> None:
     with serving(*[step] * 6, Step("done")) as server:
-        assert LiteLLMChat("openai/mine", api_base=server.url).complete(QUESTION).text == "done"
+        assert LiteLLMChat("openai/mine", api_base=server.url).complete(PLAIN).text == "done"
 
 
 def test_a_wait_beyond_the_deadline_is_not_begun(naps: list[float]) -> None:
@@ -84,7 +82,7 @@ def test_requests_that_timed_out_are_counted_as_paid() -> None:
     late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
     usage = asked(ScriptedChat([late, late, "yes"])).usage
     assert (usage.without_reply, usage.estimated) == (2, True)
-    plain = ScriptedChat(["yes"]).complete(QUESTION).usage
+    plain = ScriptedChat(["yes"]).complete(PLAIN).usage
     assert usage.prompt_tokens == plain.prompt_tokens + 100
     assert usage.cost == (None if plain.cost is None else plain.cost + 1.0)
     with pytest.raises(ChatError) as caught:
@@ -93,7 +91,7 @@ def test_requests_that_timed_out_are_counted_as_paid() -> None:
     for limit, told in ((Budget(tokens=80), "80 tokens"), (Budget(cost=0.8), "0.8 US dollars")):
         server = ScriptedChat([late] * 3)
         with pytest.raises(LimitReached, match=f"{told} is used up"):
-            RunChat(Served(server=server), limit, Spent, iter(())).complete(QUESTION)
+            RunChat(Served(server=server), limit, Spent, iter(())).complete(PLAIN)
         assert len(server.requests) == 2
 
 

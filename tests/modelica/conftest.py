@@ -1,7 +1,5 @@
 """Runs the exporter in its own environment; FMUs are built once a session, for this platform only."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """delay and spatialDistribution: values, jumps, short delays, saved states, both interfaces."""
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

@@ -1,7 +1,5 @@
 """modelDescription.xml, the contents of the archives, reproducible builds."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import subprocess

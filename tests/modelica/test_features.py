@@ -1,7 +1,5 @@
 """One small model for each feature of the language, with a solution that is known in closed form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The FMI runtime: state, reset, several instances, model exchange, errors."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,8 +1,6 @@
 """The bundled automatic transmission against golden figures: an independent integration, publications."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -11,21 +9,21 @@ import pytest
 from falsifier.core.model import Experiment
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
-from tests.systems.driving import ROOT, Array, evenly, robustness
+from tests.systems.driving import ROOT, Array, evenly, golden, robustness
 
-GOLDEN: dict[str, Any] = json.loads((Path(__file__).parent / "golden" / "AT.json").read_text())
+GOLDEN = golden("AT")
 NAMES = ("speed", "rpm", "gear")
 STOP, STEP = 50.0, 0.01
 FMU = ROOT / "fmus" / "AT.fmu"
 Kind = Literal["held", "continuous"]
 
 
-def driven(case: dict[str, Any], kind: Kind = "held", path: Path = FMU) -> Trajectory:
+def driven(case: dict[str, Any], kind: Kind = "held") -> Trajectory:
     """Simulate with pchip inputs: held for 0.05 s by co-simulation, or continuous by model exchange."""
     inputs = {name: evenly(case[name], STOP) for name in ("throttle", "brake")}
     if kind == "held":
         inputs = {name: replace(signal, hold=0.05) for name, signal in inputs.items()}
-    model = FmuModel(path, "co-simulation" if kind == "held" else "model-exchange")
+    model = FmuModel(FMU, "co-simulation" if kind == "held" else "model-exchange")
     found = model.simulate(inputs, {}, Experiment(STOP, STEP, NAMES))
     model.close()
     return found

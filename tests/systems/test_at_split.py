@@ -1,6 +1,5 @@
 """Car and shift logic as two FMUs against the same as one."""
 
-import json
 from dataclasses import replace
 from typing import Any
 
@@ -12,12 +11,12 @@ from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import Component, Coupling, System
 from tests.systems.coupling import distances, owned, problems, simulated
-from tests.systems.driving import ROOT, Array, evenly
+from tests.systems.driving import Array, evenly, golden
 
 ONE, TWO = problems("AT"), problems("ATsplit")
 NAMES = {"speed": "car.speed", "rpm": "car.rpm", "gear": "shift.gear"}
 TICK, STOP = 0.04, 50.0
-GOLDEN: dict[str, Any] = json.loads((ROOT / "tests" / "systems" / "golden" / "AT.json").read_text())
+FALSIFYING = golden("AT")["falsifying"]
 
 
 def driven(times: list[float], throttle: list[float], brake: list[float]) -> Candidate:
@@ -67,7 +66,7 @@ def test_the_share_of_late_shifts_is_proportional_to_the_step() -> None:
         assert delays.mean() == pytest.approx(step / TICK, abs=0.08)
 
 
-@pytest.mark.parametrize("case", GOLDEN["falsifying"], ids=lambda case: case["requirement"])
+@pytest.mark.parametrize("case", FALSIFYING, ids=lambda case: case["requirement"])
 def test_each_requirement_is_violated_by_the_same_inputs(case: dict[str, Any]) -> None:
     signals = {name: replace(evenly(case[name], STOP), hold=0.05) for name in ("throttle", "brake")}
     candidate = Candidate(signals, {})

@@ -4,8 +4,6 @@ The region follows TuRBO (Eriksson et al., NeurIPS 2019): around the best point,
 and shrinks while they fail; when it is small, the search starts again elsewhere.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from falsifier.engines.box import BoxEngine, Proposal
@@ -93,14 +91,8 @@ class Bayesian(BoxEngine):
         bounds = (centre + spread * (means + side) for side in (-margin, margin))
         return np.asarray(candidates[np.argmin(self._conditions.lowest(*bounds))])
 
-    def tell(self, evaluations: Sequence[Evaluation]) -> None:
-        """Learn from the evaluations whose candidates have the fixed parameterization."""
-        for evaluation in evaluations:
-            if self.box.represents(evaluation.candidate):
-                self._add(self.box.point(evaluation.candidate), self._conditions.values(evaluation))
-
-    def _add(self, point: Array, values: Array | None) -> None:
-        improved = False
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:
+        values, improved = self._conditions.values(evaluation), False
         if values is not None:
             self._points.append(point)
             self._values.append(values)

@@ -5,6 +5,7 @@ from cma import CMAEvolutionStrategy
 
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
 # Initial standard deviation as a share of the ranges: the authors recommend about a third.
@@ -65,7 +66,8 @@ class CMA(BoxEngine):
         why = "uniform random: what the evolution strategy proposes was simulated"
         return Proposal(rng.random(self.box.dimension), why)
 
-    def _learn(self, point: Array, cost: float | None) -> None:
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:
+        cost = evaluation.robustness
         if cost is not None:
             self._worst = max(self._worst, cost)
         # A failed simulation counts as the worst cost so far: the strategy needs a number for every point.

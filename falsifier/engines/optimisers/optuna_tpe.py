@@ -7,6 +7,7 @@ import optuna
 
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
+from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
 
@@ -34,7 +35,8 @@ class TPE(BoxEngine):
         self._open.append((trial, point))
         return Proposal(point, f"trial {trial.number + 1} of the tree-structured Parzen estimator")
 
-    def _learn(self, point: Array, cost: float | None) -> None:
+    def _learn(self, point: Array, evaluation: Evaluation) -> None:
+        cost = evaluation.robustness
         for i, (trial, own) in enumerate(self._open):
             if self._is_same(point, own):
                 del self._open[i]

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from falsifier.core.literals import shell_word
 from falsifier.core.model import Interface
-from falsifier.core.words import shell_word
 from falsifier.errors import ModelError
 from falsifier.fmu.description import archive
 

@@ -102,7 +102,7 @@ def merged(
     Raises:
         SpecError: if two variables would have the same name.
     """
-    fed = {_location(members, link.target): link for link in links}
+    fed = {location(members, link.target): link for link in links}
     values = dict(frame.values)
     variables = [replace(v, start=values.get(v.name, v.start)) for v in frame.inputs]
     slots = {v.name: Slot(0, v.type or "Real") for v in frame.inputs}
@@ -116,7 +116,7 @@ def merged(
                     f"two variables of the system are named {title!r}; rename the component", key="components"
                 )
             slot = member.description.slots[variable.name]
-            link = fed.get(_location(members, place)) if variable.causality == "input" else None
+            link = fed.get(location(members, place)) if variable.causality == "input" else None
             alias = variable.alias_of and f"{member.name}.{variable.alias_of}"
             shown = replace(variable, name=title, alias_of=alias, start=values.get(title, variable.start))
             if link is not None:
@@ -156,7 +156,8 @@ def merged(
     return Description(info, "", {}, slots), places
 
 
-def _location(members: Sequence[Member], place: Place) -> tuple[int, int, int]:
+def location(members: Sequence[Member], place: Place) -> tuple[int, int, int]:
+    """Return what all names of a variable of a component have in common: where its value is."""
     slot = members[place.member].description.slots[place.name]
     return place.member, slot.reference, slot.offset
 

@@ -8,7 +8,7 @@ from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description.model_description import describe
 from falsifier.fmu.description.structure import Structure, conversion, read_structure
 from falsifier.fmu.process.network import SYSTEM, Coupling, Link, Member, Network, Place, full_name
-from falsifier.fmu.systems.components import Component, Connection, Frame, merged
+from falsifier.fmu.systems.components import Component, Connection, Frame, location, merged
 from falsifier.fmu.systems.step_order import Dependencies, direct_loop, iterated_order, late_links, step_order
 
 
@@ -114,8 +114,7 @@ class _Joiner:
                 )
             for source, end in zip(sources, targets, strict=True):
                 # Whichever of its names is stated, an input has one source.
-                slot = self._members[end.member].description.slots[end.name]
-                known = self._fed.setdefault((end.member, slot.reference, slot.offset), title)
+                known = self._fed.setdefault(location(self._members, end), title)
                 if known != title:
                     raise SpecError(f"this input is already connected: {known}; remove one of the two")
                 link, note = self._link(source, end, connection)

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.files import file_name
-from falsifier.core.words import counted, shell_word
+from falsifier.core.literals import shell_word
+from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html

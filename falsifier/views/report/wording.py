@@ -9,8 +9,9 @@ import numpy as np
 
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
+from falsifier.core.literals import shell_word
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed, readable, shell_word, with_unit
+from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text

@@ -8,6 +8,7 @@ from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu import read_info
 from falsifier.fmu.description import libraries
+from tests.fixtures.archives import packed
 from tests.fmu.fixtures import FOLDER, path
 
 DESCRIPTION = """<?xml version="1.0"?>
@@ -31,14 +32,11 @@ def here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def notes(folder: Path, *libraries: tuple[str, str], sources: bool = False) -> tuple[str, ...]:
     """What is said of an FMU with files below ``binaries`` and their content by its name."""
-    packed = folder / "my.fmu"
-    with zipfile.ZipFile(packed, "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
-        for name, content in libraries:
-            archive.writestr(f"binaries/{name}", LIBRARIES[content])
-        if sources:
-            archive.writestr("sources/all.c", b"")
-    return read_info(packed).notes
+    contents: dict[str, str | bytes] = {"modelDescription.xml": DESCRIPTION}
+    contents |= {f"binaries/{name}": LIBRARIES[content] for name, content in libraries}
+    if sources:
+        contents["sources/all.c"] = b""
+    return read_info(packed(folder / "my.fmu", contents)).notes
 
 
 def test_nothing_is_said_of_the_fmus_of_this_project() -> None:

@@ -1,4 +1,3 @@
-import zipfile
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -8,6 +7,7 @@ from falsifier.core.files import bundled
 from falsifier.errors import ModelError
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.structure import Structure, conversion, read_structure, read_units
+from tests.fixtures.archives import packed
 from tests.fmu.fixtures import path
 
 FMI2 = """<fmiModelDescription fmiVersion="2.0"><ModelVariables>
@@ -51,10 +51,7 @@ def test_wrong_references_are_one_clear_error(wrong: str, tmp_path: Path) -> Non
 
 
 def written(folder: Path, description: str) -> Path:
-    file = folder / "a.fmu"
-    with zipfile.ZipFile(file, "w") as fmu:
-        fmu.writestr("modelDescription.xml", description)
-    return file
+    return packed(folder / "a.fmu", {"modelDescription.xml": description})
 
 
 def test_inputs_reach_outputs_through_states(tmp_path: Path) -> None:

@@ -1,6 +1,5 @@
 """SSP packages as systems."""
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package
 from falsifier.fmu.ssp import reader as ssp
+from tests.fixtures.archives import packed
 from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
 from tests.fmu.small_systems import run, sampled_loop
@@ -313,8 +313,7 @@ def test_what_is_no_archive_or_has_no_description_is_said(tmp_path: Path) -> Non
     file.write_bytes(b"no zip")
     with pytest.raises(SpecError, match=r"a\.ssp: not a readable SSP package, which is a zip archive"):
         read_package(file)
-    with zipfile.ZipFile(file, "w") as package:
-        package.writestr("readme.txt", "")
+    packed(file, {"readme.txt": ""})
     with pytest.raises(SpecError, match=r"a\.ssp: the package contains no SystemStructure\.ssd"):
         read_package(file)
 
