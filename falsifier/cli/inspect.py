@@ -60,6 +60,11 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
         diagram = read_diagram(fmu)
         say(as_shown(simulink_text(diagram), as_json and asdict(diagram), as_json=as_json))
         return
+    refuse(
+        "the comparison is printed as text only; drop one of them",
+        check=checked and as_json,
+        json=checked and as_json,
+    )
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     spec = _spec_of(fmu)
@@ -70,7 +75,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
         note = f"FMUs cannot be simulated now: {error}"
     found = replace(found, notes=(*found.notes, note))
     say(as_shown(info_text(found, everything=everything), as_json and model_json(found), as_json=as_json))
-    if checked and not as_json:
+    if checked:
         _print_convergence(source, found, read_spec(spec).model if spec else ModelSection(), *rights)
 
 
