@@ -27,7 +27,7 @@ _MOST_LINES = 4
 # Maximum number of names beside an axis; of more, only numbers are shown. And of characters of such a name.
 _MOST_TICKS, _LONGEST_TICK = 12, 24
 # Width in inches of a character of a label, more or less.
-_CHARACTER = 0.072
+_CHARACTER = 0.07
 
 
 def caption(text: str) -> str:
