@@ -42,14 +42,9 @@ _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
 _SEEN, _FEWEST_SAMPLES = 0.2, 5
 # Places for the enlarged part: left, bottom, width and height as shares of the panel.
-_CORNERS = (
-    (0.62, 0.12, 0.35, 0.42),
-    (0.62, 0.52, 0.35, 0.42),
-    (0.07, 0.52, 0.35, 0.42),
-    (0.07, 0.12, 0.35, 0.42),
-    (0.35, 0.52, 0.25, 0.42),
-    (0.35, 0.12, 0.25, 0.42),
-)
+_CORNERS = [
+    (x, y, width, 0.42) for x, width in ((0.62, 0.35), (0.07, 0.35), (0.35, 0.25)) for y in (0.12, 0.52)
+]
 # Maximum number of bounds in a panel whose predicates are written beside them.
 _LABELLED = 3
 # Share of a panel's height above which a predicate is written below its line, and below which the predicates
@@ -228,16 +223,8 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
-        ax.plot(
-            panel.times[within],
-            bound.values[within],
-            color=LIMIT,
-            linewidth=1.2,
-            linestyle="--",
-            marker="_" if within.sum() == 1 else None,
-            markersize=16,
-            label="limit",
-        )
+        line: dict[str, Any] = {"linestyle": "--"} if within.sum() > 1 else {"marker": "_", "markersize": 16}
+        ax.plot(panel.times[within], bound.values[within], color=LIMIT, linewidth=1.2, label="limit", **line)
         counts = "time in which it counts" if not within.all() else None
         _shade(ax, panel, (bound.start, bound.end), color=QUIET, alpha=0.08, label=counts)
     for interval in panel.broken:
@@ -253,7 +240,7 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
         ax.plot(*points, "o", color=INPUT, markersize=3.5, label="control point of an input")
     if panel.limits is not None:
         low, high = panel.limits
-        margin = 0.06 * (high - low)
+        margin = 0.06 * (high - low) or 1.0
         ax.set_ylim(low - margin, high + margin)
         for limit in panel.limits:
             ax.axhline(limit, color=QUIET, linewidth=0.6, linestyle=":")
