@@ -137,10 +137,10 @@ def csv_text(rows: Iterable[Iterable[object]]) -> str:
 def markdown_text(text: str) -> str:
     r"""Return a text as one line of Markdown without markup, also within a table.
 
-    >>> print(markdown_text("a|b <img>"))
-    a\|b \<img>
+    >>> print(markdown_text("a|b <img> _x_ the_mass $m$"))
+    a\|b \<img> \_x\_ the_mass \$m\$
     """
-    return re.sub(r"([\\`*\[\]<|])", r"\\\1", one_line(text))
+    return re.sub(r"([\\`*\[\]<|~$]|(?<![^\W_])_|_(?![^\W_]))", r"\\\1", one_line(text))
 
 
 def markdown_code(text: str) -> str:

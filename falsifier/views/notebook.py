@@ -13,7 +13,7 @@ from typing import Any
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import candidate_facts, counted
+from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.explain import Explanation
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -43,6 +43,15 @@ def register() -> None:
     formatter = shell.display_formatter.formatters["text/html"]
     for shown, html in _FORMATTERS.items():
         formatter.for_type_by_name(shown.__module__, shown.__name__, html)
+    pictures = shell.display_formatter.formatters["image/png"]
+    if "matplotlib.figure.Figure" not in pictures:  # neither pyplot nor %matplotlib draws them
+        pictures.for_type_by_name("matplotlib.figure", "Figure", _figure_png)
+
+
+def _figure_png(figure: Any) -> bytes:
+    from falsifier.views.plotting import png
+
+    return png(figure, dpi=_DPI)
 
 
 def problem_html(problem: Problem) -> str:
@@ -53,16 +62,14 @@ def problem_html(problem: Problem) -> str:
         ("in words", requirement.description or in_words(requirement.formula)),
         ("model", ": ".join(part for part in (problem.info.name, problem.info.description) if part)),
         ("simulated", f"for {experiment.stop_time:.10g} s, recorded every {experiment.output_interval:g} s"),
-        *((f"fixed {name}", f"{value:g}") for name, value in problem.parameters.items()),
+        *((f"fixed {name}", readable(value)) for name, value in problem.parameters.items()),
     ]
     header = ("searched", "unit", "range", "control points", "description")
+    bounds = {r.name: f"{readable(r.low)} to {readable(r.high)}" for r in problem.space.ranges}
+    points = {r.name: f"{r.control_points}, {r.interpolation}" for r in problem.space.inputs}
     rows = [
-        (r.name, r.unit, f"{r.low:g} to {r.high:g}", f"{r.control_points}, {r.interpolation}", r.description)
-        for r in problem.space.inputs
-    ]
-    rows += [
-        (p.name, p.unit, f"{p.low:g} to {p.high:g}", "one value", p.description)
-        for p in problem.space.parameters
+        (r.name, r.unit, bounds[r.name], points.get(r.name, "one value"), r.description)
+        for r in problem.space.ranges
     ]
     return join(el("b", problem.name), table((), facts), table(header, rows))
 
@@ -83,7 +90,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
     header = ("signal", "unit", "first", "smallest", "largest", "last")
     rows = [
-        (name, trajectory.units.get(name, ""), *(f"{v:.5g}" for v in (c[0], c.min(), c.max(), c[-1])))
+        (name, trajectory.units.get(name, ""), *(readable(v, 5) for v in (c[0], c.min(), c.max(), c[-1])))
         for name, c in trajectory.columns.items()
     ]
     end = trajectory.times[-1]

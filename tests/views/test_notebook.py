@@ -7,9 +7,11 @@ from typing import Any
 import pytest
 from IPython.core.formatters import DisplayFormatter
 
-from falsifier import Evaluation, evaluate, explain, falsify
+from falsifier import Evaluation, ParameterRange, evaluate, explain, falsify
 from falsifier.core.candidate import Candidate
+from falsifier.testing import lag_problem
 from falsifier.views.notebook import register
+from falsifier.views.plotting import plot
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import hard, impossible
 
@@ -41,6 +43,13 @@ def test_a_problem_shows_its_formula_escaped_and_what_is_searched(notebook: Note
     html = notebook.html(hard())
     assert "&lt;=" in html or "&gt;=" in html
     assert all(name in html for name in hard().space.names)
+    whole = lag_problem(parameters=[ParameterRange("x0", 1234567000, 1234567999)])
+    assert "1234567000 to 1234567999" in notebook.html(whole)
+
+
+def test_figures_are_drawn_also_without_pyplot(notebook: Notebook) -> None:
+    shown, _ = notebook.display_formatter.format(plot(falsify(hard())))  # type: ignore[no-untyped-call]
+    assert OUTPUT in colours(shown["image/png"])
 
 
 def test_a_violating_result_shows_its_robustness_and_a_picture(notebook: Notebook) -> None:

@@ -17,7 +17,7 @@ from falsifier.analyses.coverage import (
 )
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
-from falsifier.views.plotting.axes import Colour, caption, new_figure, whole_ticks
+from falsifier.views.plotting.axes import Colour, caption, fit_labels, new_figure, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,6 +51,7 @@ def plot_coverage(found: Coverage, title: str = "") -> "Figure":
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, draw in zip(axes, drawn, strict=False):
         draw(ax)
+        fit_labels(ax)
     for ax in axes[len(drawn) :]:
         ax.set_axis_off()
     tried = counted(found.simulations, "simulation")
@@ -150,6 +151,7 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         right.plot(coordinate.value, found.original, "o", color=colour)
         right.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
         right.set(xlabel=caption(coordinate.label), ylabel="robustness")
+    fit_labels(right)
     figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure
 
@@ -162,7 +164,8 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     low, high = (float(end(known, initial=found.original)) for end in (np.min, np.max))
     # Red, for violations, begins at 0 and is seen however small they are.
     largest = max(-low, high) or 1.0
-    norm = TwoSlopeNorm(0.0, low if low < 0 else -largest, high if high > 0 else largest)
+    ends = low if low < 0 else -largest, high if high > 0 else largest
+    norm = TwoSlopeNorm(0.0, *ends)
     mesh = ax.pcolormesh(*found.grid, found.surface, shading="nearest", cmap="RdBu", norm=norm)
     if low < 0 <= high:
         ax.contour(*found.grid, found.surface, levels=[0.0], colors="black", linewidths=1.0)
@@ -170,4 +173,5 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
         ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
     ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
-    ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)")
+    ticks = [ends[0], ends[0] / 2, 0.0, ends[1] / 2, ends[1]]  # on both halves, whose scales differ
+    ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)", ticks=ticks, format="%.3g")

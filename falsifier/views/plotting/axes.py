@@ -28,8 +28,10 @@ class Colour:
 _LONGEST_CAPTION = 120
 # Maximum number of lines of a text that is wrapped.
 _MOST_LINES = 4
-# Maximum number of names beside an axis; of more, only numbers are shown.
-_MOST_TICKS = 12
+# Maximum number of names beside an axis; of more, only numbers are shown. And of characters of such a name.
+_MOST_TICKS, _LONGEST_TICK = 12, 24
+# Width in inches of a character of a label, more or less.
+_CHARACTER = 0.07
 
 
 def caption(text: str) -> str:
@@ -49,9 +51,21 @@ def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:
     from matplotlib.ticker import MaxNLocator
 
     if 0 < len(labels) <= _MOST_TICKS:
-        axis.set_ticks(sorted(labels), labels=[caption(labels[number]) for number in sorted(labels)])
+        names = [caption(shortened(labels[number], _LONGEST_TICK)) for number in sorted(labels)]
+        axis.set_ticks(sorted(labels), labels=names)
     else:
         axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+
+
+def fit_labels(ax: "Axes") -> None:
+    """Put labels longer than their axis on several small lines; of a very long one, both ends are kept."""
+    box, dpi = ax.get_window_extent(), figure_of(ax).dpi
+    for label, length in ((ax.xaxis.label, box.width / dpi), (ax.yaxis.label, box.height / dpi)):
+        text, width = label.get_text().replace(r"\$", "$"), max(8, int(length / _CHARACTER))
+        if len(text) > width:
+            half = (_MOST_LINES - 1) * width // 2
+            kept = text if len(text) <= 2 * half else f"{text[:half]} ... {text[-half:]}"
+            label.set(text=wrapped(kept, width), fontsize=8)
 
 
 def new_figure(width: float, height: float) -> "Figure":

@@ -113,8 +113,11 @@ def judged_windows(
     if isinstance(formula, Always | Eventually | Until):
         window = formula.window
         begin, finish = (window.start, window.end) if window else (0.0, np.inf)
-        # Until evaluates its left operand from its own time on, not only inside its window.
-        start, end = (start if isinstance(formula, Until) else start + begin), end + finish
+        if isinstance(formula, Until):  # its left operand counts from its own time on
+            yield from judged_windows(formula.left, start, end + finish)
+            yield from judged_windows(formula.right, start + begin, end + finish)
+            return
+        start, end = start + begin, end + finish
     for child in formula.children:
         yield from judged_windows(child, start, end)
 

@@ -52,11 +52,12 @@ def plot_rates(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
     """Plot the share of falsified runs over the number of simulations, one curve per method."""
     ax = ax if ax is not None else own_axes()
     runs = list(runs)
-    for method in dict.fromkeys(run.method for run in runs):
+    for k, method in enumerate(dict.fromkeys(run.method for run in runs)):
         members = [run for run in runs if run.method == method]
         counts, shares = falsification_curve(members)
         name = caption(f"{method.label} ({counted(sum(run.counts for run in members), 'run')})")
-        ax.step(counts, shares, where="post", linewidth=1.6, label=name)
+        style = ("-", "--", "-.", ":")[k % 4]  # also seen without colours, and upon another
+        ax.step(counts, shares, where="post", linewidth=1.6, linestyle=style, label=name)
     ax.set(xlabel="simulations", ylabel="share of falsified runs", ylim=(-0.03, 1.03))
     whole_ticks(ax.xaxis, {})
     if runs:

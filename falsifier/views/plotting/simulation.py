@@ -8,15 +8,23 @@ import numpy as np
 from falsifier.analyses.coverage import labels_of
 from falsifier.core.arguments import instance
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import readable, with_unit
+from falsifier.core.words import readable, shortened, with_unit
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
-from falsifier.stl.margins import signed
+from falsifier.stl.margins import is_on_limit, signed
 from falsifier.stl.monitor import Verdict
-from falsifier.views.plotting.axes import Colour, caption, figure_of, new_figure, whole_ticks, wrapped
-from falsifier.views.plotting.panels import Bound, Panel, panels
+from falsifier.views.plotting.axes import (
+    Colour,
+    caption,
+    figure_of,
+    fit_labels,
+    new_figure,
+    whole_ticks,
+    wrapped,
+)
+from falsifier.views.plotting.panels import Panel, panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,17 +36,17 @@ _PANEL_HEIGHT, _LOW_HEIGHT, _LINE_HEIGHT, _TITLE_WIDTH = 1.9, 1.3, 0.18, 110
 _HIDDEN, _ENLARGED = 0.02, 0.1
 # There, the margin should be at least this share of what the quantity does, over at least so many samples.
 _SEEN, _FEWEST_SAMPLES = 0.2, 5
-# Corners for the enlarged part: left, bottom, width and height as shares of the panel.
-_CORNERS = (
-    (0.62, 0.12, 0.35, 0.42),
-    (0.62, 0.52, 0.35, 0.42),
-    (0.07, 0.52, 0.35, 0.42),
-    (0.07, 0.12, 0.35, 0.42),
-)
+# Places for the enlarged part: left, bottom, width and height as shares of the panel.
+_CORNERS = [
+    (x, y, width, 0.42) for x, width in ((0.62, 0.35), (0.07, 0.35), (0.35, 0.25)) for y in (0.12, 0.52)
+]
 # Maximum number of bounds in a panel whose predicates are written beside them.
 _LABELLED = 3
-# Share of a panel's height above which a predicate is written below its line.
-_TOP = 0.85
+# Share of a panel's height above which a predicate is written below its line, and below which the predicates
+# of two lines are written together; width of a character in inches.
+_TOP, _TOGETHER, _CHARACTER = 0.85, 0.12, 0.07
+# Shorter intervals, as a share of the simulated time, are drawn as a line: a single sample has no width.
+_SHORT = 0.003
 
 
 def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
@@ -64,7 +72,9 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    parameters = ", ".join(f"{name} = {value:.6g}" for name, value in evaluation.candidate.parameters.items())
+    parameters = ", ".join(
+        f"{name} = {readable(value)}" for name, value in evaluation.candidate.parameters.items()
+    )
     first, *more = _decided(verdict)
     lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
     return plot_panels(drawn, verdict, "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line))
@@ -138,7 +148,7 @@ def _margin(verdict: Verdict) -> float:
     """How far the marked quantity is from its limit."""
     if verdict.breach is not None:
         return abs(verdict.breach.main.value - verdict.breach.main.limit)
-    return abs(verdict.robustness)
+    return 0.0 if is_on_limit(verdict.robustness) else abs(verdict.robustness)
 
 
 def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None" = None) -> "Figure":
@@ -172,13 +182,18 @@ def _enlarged(panel: Panel, verdict: Verdict) -> float:
 def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     """Draw the panel again, enlarged around the marked time, in the emptiest corner."""
     critical, length = verdict.moment, _enlarged(panel, verdict)
-    inside = ax.inset_axes(min(_CORNERS, key=lambda corner: _covered(ax, panel, corner)))
+    inside = ax.inset_axes(min(_CORNERS, key=lambda corner: _covered(ax, corner)))
     plot_panel(inside, panel, verdict)
     for text in inside.texts:
         text.set_visible(False)
     inside.set(xlim=(critical - length / 2, critical + length / 2), ylabel="")
-    near = abs(panel.times - critical) <= length / 2
-    values = [panel.values[near], *(b.values[near & (panel.times <= b.end)] for b in panel.bounds)]
+    near, k = abs(panel.times - critical) <= length / 2, abs(panel.times - critical).argmin()
+    # Of several limits, the one that has this margin: others may be far off.
+    bound = min(panel.bounds, key=lambda b: abs(abs(b.values[k] - panel.values[k]) - _margin(verdict)))
+    values = (
+        panel.values[near],
+        bound.values[near & (bound.start <= panel.times) & (panel.times <= bound.end)],
+    )
     low, high = min(v.min() for v in values if v.size), max(v.max() for v in values if v.size)
     margin = 0.1 * (high - low) or 1.0
     inside.set_ylim(low - margin, high + margin)
@@ -186,14 +201,13 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     ax.indicate_inset_zoom(inside)
 
 
-def _covered(ax: "Axes", panel: Panel, corner: tuple[float, float, float, float]) -> int:
-    """Return how many samples of a panel, and of its bounds, an inset in a corner would cover."""
+def _covered(ax: "Axes", corner: tuple[float, float, float, float]) -> int:
+    """Return how many samples of a panel, and of its bounds, an inset would cover; the curve counts most."""
     left, bottom, width, height = corner
-    drawn = (panel.values, *(bound.values for bound in panel.bounds))
-    points = np.concatenate([np.column_stack([panel.times, values]) for values in drawn])
+    points = np.concatenate([line.get_xydata() for line in (*ax.get_lines()[:1] * 2, *ax.get_lines())])
     x, y = ax.transLimits.transform(points).T  # as shares of the panel
     beside = (x >= left - 0.05) & (x <= left + width + 0.02)
-    return int((beside & (y >= bottom - 0.1) & (y <= bottom + height + 0.05)).sum())
+    return int((beside & (y >= bottom - 0.2) & (y <= bottom + height + 0.05)).sum())
 
 
 def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
@@ -205,12 +219,19 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     ax.plot(panel.times, panel.values, color=color, linewidth=1.2, drawstyle=style)
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
-        limit = panel.times[within], bound.values[within]
-        ax.plot(*limit, "--", color=Colour.LIMIT, linewidth=1.2, label="limit")
+        line: dict[str, Any] = {"linestyle": "--"} if within.sum() > 1 else {"marker": "_", "markersize": 16}
+        ax.plot(
+            panel.times[within],
+            bound.values[within],
+            color=Colour.LIMIT,
+            linewidth=1.2,
+            label="limit",
+            **line,
+        )
         counts = "time in which it counts" if not within.all() else None
-        ax.axvspan(bound.start, bound.end, color=Colour.QUIET, alpha=0.08, linewidth=0, label=counts)
-    for start, end in panel.broken:
-        ax.axvspan(start, end, color=critical, alpha=0.15, linewidth=0, label="violated (worst interval)")
+        _shade(ax, panel, (bound.start, bound.end), color=Colour.QUIET, alpha=0.08, label=counts)
+    for interval in panel.broken:
+        _shade(ax, panel, interval, color=critical, alpha=0.15, label="violated (worst interval)")
     decided = "decided the robustness"
     for time, filling, label in ((panel.critical, critical, marked), (panel.decided, "none", decided)):
         if time is not None:
@@ -222,27 +243,47 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
         ax.plot(*points, "o", color=Colour.INPUT, markersize=3.5, label="control point of an input")
     if panel.limits is not None:
         low, high = panel.limits
-        margin = 0.06 * (high - low)
+        margin = 0.06 * (high - low) or 1.0
         ax.set_ylim(low - margin, high + margin)
         for end in panel.limits:
             ax.axhline(end, color=Colour.QUIET, linewidth=0.6, linestyle=":")
     if panel.labels is not None:
         whole_ticks(ax.yaxis, panel.labels)
-    for bound in panel.bounds[:_LABELLED]:
-        _name_bound(ax, panel, bound)
+    _name_bounds(ax, panel)
     ax.set_ylabel(caption(panel.title))
+    fit_labels(ax)
 
 
-def _name_bound(ax: "Axes", panel: Panel, bound: Bound) -> None:
-    """Write a predicate beside the line of its bound, on the side on which there is room."""
-    within = (panel.times >= bound.start) & (panel.times <= bound.end)
-    if not within.any():
-        return
-    at = float(panel.times[within][0]), float(bound.values[within][0])
-    low, high = ax.get_ylim()
-    side, offset = ("top", -3) if at[1] > low + _TOP * (high - low) else ("bottom", 2)
-    text, where = caption(bound.predicate), (3, offset)
-    ax.annotate(text, at, where, textcoords="offset points", va=side, color=Colour.LIMIT, fontsize=8)
+def _shade(ax: "Axes", panel: Panel, interval: tuple[float, float], **look: Any) -> None:
+    """Shade an interval of time, so that it is seen also if it is very short."""
+    start, end = interval
+    ax.axvspan(start, end, linewidth=3 if end - start < _SHORT * panel.times[-1] else 0, **look)
+
+
+def _name_bounds(ax: "Axes", panel: Panel) -> None:
+    """Write predicates beside the lines of their bounds, on the side on which there is room.
+
+    Those of lines that lie close to each other are written together.
+    """
+    from matplotlib.patheffects import withStroke
+
+    (first, last), (low, high) = ax.get_xlim(), ax.get_ylim()
+    inches = ax.get_window_extent().width / figure_of(ax).dpi
+    named: dict[tuple[float, float], dict[str, float]] = {}  # predicates and ends of windows by place
+    for bound in panel.bounds[:_LABELLED]:
+        within = (panel.times >= bound.start) & (panel.times <= bound.end)
+        if within.any():
+            x, y, end = panel.times[within][0], bound.values[within][0], panel.times[within][-1]
+            near = ((u, v) for u, v in named if u == x and abs(v - y) < _TOGETHER * (high - low))
+            named.setdefault(next(near, (x, y)), {})[bound.predicate] = end
+    for (x, y), ends in named.items():
+        side, offset = ("top", -3) if y > low + _TOP * (high - low) else ("bottom", 2)
+        text = shortened(", ".join(ends), int(inches / _CHARACTER))
+        is_late = len(text) * _CHARACTER > (last - x) / (last - first) * inches
+        at, where, align = ((max(ends.values()), y), -3, "right") if is_late else ((x, y), 3, "left")
+        look: dict[str, Any] = {"va": side, "ha": align, "color": Colour.LIMIT, "fontsize": 8}
+        look["path_effects"] = [withStroke(linewidth=2, foreground="white", alpha=0.7)]
+        ax.annotate(caption(text), at, (where, offset), textcoords="offset points", **look)
 
 
 def plot_trajectory(trajectory: Trajectory, names: Sequence[str] | None = None) -> "Figure":

@@ -206,7 +206,7 @@ def _drawn(
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
     described, drawn = run.manifest, list[Panel]()
-    labels = {r.name: labels_of(r.kind, r.items) for r in searched}
+    labels = {r.name: labels_of(r.kind, r.items) for r in searched if r.kind != "real"}
     labels |= {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
     if trajectory is not None:
         formula, components = parse(described.requirement.formula), described.components

@@ -82,14 +82,15 @@ def document(title: str, *body: str) -> str:
 def overview(side: Side) -> str:
     """Say in one line what a directory contains."""
     runs, spent = side.runs, spent_on(side.runs)
-    failed = sum(run.status == "failed" for run in runs)
-    open_ = sum(not run.finished for run in runs) - failed
+    # Requirements that share a search are one run.
+    failed = {run.directory for run in runs if run.status == "failed"}
+    open_ = {run.directory for run in runs if not run.finished} - failed
     violated = sum(section.status == "violated" for section in side.sections)
     parts = [
         f"{side.title}: {violated} of {counted(len(side.sections), 'requirement')} violated",
-        counted(len(runs), "run"),
-        *([f"{failed} failed"] if failed else []),
-        *([f"{open_} not finished"] if open_ else []),
+        counted(len({run.directory for run in runs}), "run"),
+        *([f"{len(failed)} failed"] if failed else []),
+        *([f"{len(open_)} not finished"] if open_ else []),
         spent.simulations_text,
         *([f"language model: {llm_use(spent)}"] if spent.questions else []),
     ]
@@ -174,7 +175,10 @@ def _found(shown: Shown) -> list[str]:
         facts_html(parameters) if parameters else "",
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
         facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
-        *(el("p", f"{what}: ", el("code", how), class_="note") for what, how in wording.advice(shown)),
+        *(
+            el("p", f"{what}: ", el("code", whole_options(how)), class_="note")
+            for what, how in wording.advice(shown)
+        ),
     ]
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from secrets import compare_digest, token_urlsafe
 from time import monotonic
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run
@@ -129,7 +130,7 @@ class Watch:
             state = "reading the journal" if behind else "running" if working else "not running"
             parts.append(el("p", f"{chosen}: {state}.", class_="result"))
             if working:
-                still = el("a", "keep it as it is", href=f"?run={chosen}&still")
+                still = el("a", "keep it as it is", href=f"?run={quote(chosen)}&still")
                 parts.append(el("p", "This page reloads itself; to read on, ", still, "."))
             if working and self.token:
                 token = el("input", type="hidden", name="token", value=self.token)
@@ -146,7 +147,9 @@ def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
     """The runs to choose from, those of a campaign with what came of them so far, running ones first."""
     order = sorted(rows, key=lambda run: (run.status != "running", run.finished))[:_MOST_RUNS]
     told = {run.name: run_line(run) for run in order} or {name: name for name in places}
-    runs = [el("a", text, href=f"?run={name}") if name in places else text for name, text in told.items()]
+    runs = [
+        el("a", text, href=f"?run={quote(name)}") if name in places else text for name, text in told.items()
+    ]
     return el(
         "details",
         el("summary", f"{len(told)} of {counted(len(rows or places), 'run')}"),

@@ -29,7 +29,7 @@ def drawn(formula: str) -> list[Panel]:
         ("G (x <= 1)", [(0.0, np.inf)]),
         ("(G[0,4] (x <= 1)) -> (F[2,6] (x > 0))", [(0.0, 4.0), (2.0, 6.0)]),
         # The left side of until counts from its own time on.
-        ("(x >= 0) U[2,5] (u >= 1)", [(0.0, 5.0), (0.0, 5.0)]),
+        ("(x >= 0) U[2,5] (u >= 1)", [(0.0, 5.0), (2.0, 5.0)]),
     ],
 )
 def test_predicates_count_within_all_windows_around_them(

@@ -160,3 +160,42 @@ def test_a_trajectory_has_a_panel_for_each_signal_with_its_unit() -> None:
     assert [ax.get_xlabel() for ax in figure.axes] == ["", "time [s]"]
     (ax,) = plot_trajectory(trajectory, ["u"]).axes
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("u [V]", "time [s]")
+
+
+def test_names_that_are_longer_than_a_panel_are_on_several_lines_with_both_ends() -> None:
+    times, long = np.linspace(0.0, 1.0, 3), "speed_$of$_the_vehicle_ahead_" * 3
+    short, wrapped = (
+        ax.get_ylabel() for ax in plot_trajectory(Trajectory(times, {"x": times, f"{long}12": times})).axes
+    )
+    lines = wrapped.splitlines()
+    assert short == "x" and len(lines) == 4 and max(map(len, lines)) < 20
+    assert lines[0].startswith("speed_") and lines[-1].endswith("_12") and "..." in wrapped
+    assert wrapped.count("$") == wrapped.count(r"\$"), "no mathematical notation"
+
+
+def test_a_window_of_one_sample_is_seen() -> None:
+    problem = lag_problem("F[10,10] (x >= 0.5)")
+    output = plot_evaluation(problem, evaluate(problem, problem.space.decode([-1.0] * 4))).axes[0]
+    bound = output.get_lines()[1]
+    assert (xs(bound).tolist(), bound.get_marker()) == ([10.0], "_")
+    assert [patch.get_linewidth() > 0 for patch in output.patches] == [True, True]
+    (name,) = output.texts
+    assert name.get_horizontalalignment() == "right", "beyond the panel there is no room"
+
+
+def test_limits_that_lie_close_to_each_other_are_named_together() -> None:
+    problem = lag_problem("G (-0.001 <= x <= 0.001 and x <= 0.8)")
+    output = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4))).axes[0]
+    assert [text.get_text() for text in output.texts] == ["-0.001 <= x, x <= 0.001", "x <= 0.8"]
+
+
+def test_of_several_limits_the_one_with_the_small_margin_is_enlarged() -> None:
+    problem = lag_problem("G (x <= 0.99998 and x >= -1000)")
+    (inside,) = (
+        plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4))).axes[0].child_axes
+    )
+    assert np.ptp(inside.get_ylim()) < 0.2
+    on_limit = lag_problem("G (x >= 0)")
+    assert (
+        not plot_evaluation(on_limit, evaluate(on_limit, on_limit.space.decode([0.0] * 4))).axes[0].child_axes
+    )

@@ -44,6 +44,12 @@ def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -
         assert f"{place}: falsifier " in text, "its versions"
 
 
+def test_real_inputs_are_drawn_as_they_were_and_not_as_whole_numbers(tmp_path: Path) -> None:
+    falsify(lag_problem(), "uniform", budget=1, directory=tmp_path)
+    output, given = gather(tmp_path)[0].sections[0].shown[0].panels
+    assert (output.steps, given.steps, output.labels, given.labels) == (False, False, None, None)
+
+
 def test_the_margin_is_told_of_violations_that_do_not_count_too(tmp_path: Path) -> None:
     problem = euler_problem("G[1,1] (x <= 0.65)")
     result = falsify(problem, make_engine("corners", problem, seed=0), budget=2, directory=tmp_path)

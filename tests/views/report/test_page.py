@@ -69,6 +69,11 @@ def test_links_lead_somewhere_and_ids_are_unique(page: Element) -> None:
         assert link.attrib["href"][1:] in ids
 
 
+def test_requirements_that_share_a_search_are_one_run(tmp_path: Path) -> None:
+    falsify([hard(), lag_problem()], "uniform", budget=2, directory=tmp_path)
+    assert " of 2 requirements violated, 1 run, " in html_report(tmp_path)
+
+
 def test_each_requirement_has_a_card_with_its_verdict_first(page: Element) -> None:
     assert "1 of 2 requirements violated, 8 runs" in content(every(page, "header")[0])
     violated, held = every(page, "article")

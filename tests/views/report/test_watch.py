@@ -121,6 +121,12 @@ def test_of_a_campaign_each_run_can_be_chosen(campaign: Path) -> None:
     assert f"{names[0]}: not running" in chosen[2]
 
 
+def test_the_link_to_a_run_has_its_name_also_with_special_characters(tmp_path: Path) -> None:
+    for name in ("a", "b&c #1+"):
+        falsify(hard(), "uniform", budget=1, directory=tmp_path / name)
+    assert 'href="?run=b%26c%20%231%2B"' in Watch(tmp_path).look()[0]
+
+
 def test_the_page_is_served_to_this_machine_and_loaded_again_only_while_more_comes(tmp_path: Path) -> None:
     falsify(hard(), "uniform", budget=20, directory=tmp_path / "run")
     with served(tmp_path / "run") as port:
