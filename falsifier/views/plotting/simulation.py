@@ -21,6 +21,7 @@ from falsifier.views.plotting.axes import (
     figure_of,
     fit_labels,
     new_figure,
+    own_axes,
     whole_ticks,
     wrapped,
 )
@@ -160,7 +161,7 @@ def plot_requirement(problem: Problem, evaluation: Evaluation, ax: "Axes | None"
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    ax = ax if ax is not None else new_figure(8, 3).subplots()
+    ax = ax if ax is not None else own_axes(8, 3)
     decisive = next(panel for panel in drawn if panel.critical == verdict.moment)
     plot_panel(ax, decisive, verdict)
     _mark_moment(ax, decisive, verdict)
@@ -190,10 +191,8 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     near, k = abs(panel.times - critical) <= length / 2, abs(panel.times - critical).argmin()
     # Of several limits, the one that has this margin: others may be far off.
     bound = min(panel.bounds, key=lambda b: abs(abs(b.values[k] - panel.values[k]) - _margin(verdict)))
-    values = (
-        panel.values[near],
-        bound.values[near & (bound.start <= panel.times) & (panel.times <= bound.end)],
-    )
+    within = near & (panel.times >= bound.start) & (panel.times <= bound.end)
+    values = panel.values[near], bound.values[within]
     low, high = min(v.min() for v in values if v.size), max(v.max() for v in values if v.size)
     margin = 0.1 * (high - low) or 1.0
     inside.set_ylim(low - margin, high + margin)
@@ -220,14 +219,8 @@ def plot_panel(ax: "Axes", panel: Panel, verdict: Verdict | None) -> None:
     for bound in panel.bounds:
         within = (panel.times >= bound.start) & (panel.times <= bound.end)
         line: dict[str, Any] = {"linestyle": "--"} if within.sum() > 1 else {"marker": "_", "markersize": 16}
-        ax.plot(
-            panel.times[within],
-            bound.values[within],
-            color=Colour.LIMIT,
-            linewidth=1.2,
-            label="limit",
-            **line,
-        )
+        limit = panel.times[within], bound.values[within]
+        ax.plot(*limit, color=Colour.LIMIT, linewidth=1.2, label="limit", **line)
         counts = "time in which it counts" if not within.all() else None
         _shade(ax, panel, (bound.start, bound.end), color=Colour.QUIET, alpha=0.08, label=counts)
     for interval in panel.broken:
