@@ -266,5 +266,7 @@ def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) ->
         value = problem.parameters.get(variable.name, variable.start_number)
         if variable.name not in columns and value is not None:
             columns[variable.name] = np.full(outputs.times.shape, float(value))
+        if variable.type == "Float32" and variable.name in columns:  # the FMU gets no more digits
+            columns[variable.name] = columns[variable.name].astype(np.float32).astype(np.float64)
     units = {v.name: v.unit for v in problem.info.inputs if v.unit}
     return replace(outputs, columns={**outputs.columns, **columns}, units={**outputs.units, **units})
