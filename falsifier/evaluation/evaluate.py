@@ -87,9 +87,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     experiment = problem.experiment
     started = perf_counter()
     try:
-        outputs = problem.model.simulate(
-            candidate.signals, {**problem.parameters, **candidate.parameters}, experiment
-        )
+        outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
     except SimulationError as error:
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
@@ -215,9 +213,7 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     for corner in space.bounds.T:
         try:
             candidate = space.decode(corner)
-            outputs = problem.model.simulate(
-                candidate.signals, {**problem.parameters, **candidate.parameters}, brief
-            )
+            outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), brief)
         except (CandidateError, ModelError, SimulationError):
             continue
         found.append(outputs.at(0.0))
@@ -257,6 +253,16 @@ def monitor_for(problem: Problem) -> Monitor:
 def compiled(formula: Formula, step: float, samples: int) -> Monitor:
     """Return the monitor of a formula on samples that are a step in s apart, compiled once per process."""
     return Monitor(formula, step=step, samples=samples)
+
+
+def numbers(problem: Problem, candidate: Candidate) -> dict[str, float]:
+    """Return the parameters of a simulation and the values of inputs that keep theirs, by name.
+
+    Also those that the model declares: an FMU may hold another one, of which nobody would be told.
+    """
+    inputs = (v for v in problem.info.inputs if v.name not in candidate.signals and not v.is_clocked)
+    starts = {v.name: v.start_number for v in inputs if v.start_number is not None}
+    return {**starts, **problem.parameters, **candidate.parameters}
 
 
 def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:
