@@ -88,9 +88,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     experiment = problem.experiment
     started = perf_counter()
     try:
-        outputs = problem.model.simulate(
-            candidate.signals, {**problem.parameters, **candidate.parameters}, experiment
-        )
+        outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
     except SimulationError as error:
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
@@ -212,8 +210,8 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     for corner in space.bounds.T:
         with suppress(CandidateError, ModelError, SimulationError):
             candidate = space.decode(corner)
-            parameters = {**problem.parameters, **candidate.parameters}
-            found.append(problem.model.simulate(candidate.signals, parameters, brief).at(0.0))
+            outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), brief)
+            found.append(outputs.at(0.0))
     names = [name for name in experiment.outputs if found and name in found[0]]
     return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
@@ -247,6 +245,16 @@ def compiled(formula: Formula, step: float, samples: int) -> Monitor:
     return Monitor(formula, step=step, samples=samples)
 
 
+def numbers(problem: Problem, candidate: Candidate) -> dict[str, float]:
+    """Return the parameters of a simulation and the values of inputs that keep theirs, by name.
+
+    Also those that the model declares: an FMU may hold another one, of which nobody would be told.
+    """
+    inputs = (v for v in problem.info.inputs if v.name not in candidate.signals and not v.is_clocked)
+    starts = {v.name: v.start_number for v in inputs if v.start_number is not None}
+    return {**starts, **problem.parameters, **candidate.parameters}
+
+
 def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) -> Trajectory:
     """Return the trajectory with columns of the inputs, so that formulas and plots can use them."""
     columns = {name: signal.sample(outputs.times) for name, signal in candidate.signals.items()}
@@ -254,5 +262,7 @@ def _with_inputs(problem: Problem, candidate: Candidate, outputs: Trajectory) ->
         value = problem.parameters.get(variable.name, variable.start_number)
         if variable.name not in columns and value is not None:
             columns[variable.name] = np.full(outputs.times.shape, float(value))
+        if variable.type == "Float32" and variable.name in columns:  # the FMU gets no more digits
+            columns[variable.name] = columns[variable.name].astype(np.float32).astype(np.float64)
     units = {v.name: v.unit for v in problem.info.inputs if v.unit}
     return replace(outputs, columns={**outputs.columns, **columns}, units={**outputs.units, **units})

@@ -13,7 +13,9 @@ from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.testing import START, lag_problem
+from tests.fmu.fixtures import altered, path as fmu_path
 from tests.problems import broken, never
 
 FULL = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
@@ -41,6 +43,23 @@ def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> No
 def test_a_parameter_of_the_candidate_goes_before_the_problems() -> None:
     problem = replace(lag_problem("G[0,0] (x <= 0.2)", parameters=[START]), parameters={"x0": 0.9})
     assert evaluate(problem, Candidate(FULL.signals, {"x0": 0.1})).robustness == pytest.approx(0.1)
+
+
+def test_an_input_of_single_precision_is_judged_as_the_fmu_gets_it() -> None:
+    same = Problem.from_fmu(
+        fmu_path("Echo_3"), "G (out_Float32 == in_Float32)", inputs={"in_Float32": (-1, 1)}
+    )
+    found = simulate(same, {"in_Float32": 0.1})
+    assert not found.violated and found.verdict and found.verdict.values["in_Float32"] == np.float32(0.1)
+
+
+def test_inputs_that_nobody_drives_have_the_start_value_that_the_fmu_declares(tmp_path: Path) -> None:
+    lying = altered(  # it holds 0
+        fmu_path("Lag_2"), tmp_path / "Lag.fmu", lambda text: text.replace(b'start="0.0"', b'start="4.0"', 1)
+    )
+    problem = Problem.from_fmu(lying, "G (y <= 0.1 or u <= 3)", parameters={"T": (1, 2)})
+    found = simulate(problem)
+    assert found.trajectory is not None and found.trajectory["y"][-1] == pytest.approx(4.0, abs=0.1)
 
 
 @pytest.mark.parametrize("response", [broken, never])

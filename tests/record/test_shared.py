@@ -87,7 +87,7 @@ def test_the_table_has_a_row_for_each_and_no_published_numbers(runs: dict[str, R
 
 def test_reports_have_each(directory: Path, runs: dict[str, Run]) -> None:
     page = html_report(directory)
-    assert f"2 of 3 requirements violated, 3 runs, {BUDGET} simulations" in page
+    assert f"2 of 3 requirements violated, 1 run, {BUDGET} simulations" in page
     for name, run in runs.items():
         part = page.partition(f'id="requirement-{name}"')[2].partition("</section>")[0]
         assert run.manifest.requirement.formula.replace("<", "&lt;") in part

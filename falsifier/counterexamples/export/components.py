@@ -28,6 +28,7 @@ from falsifier.core.model import INTERFACE_TAGS, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.tables import InputTable
+from falsifier.evaluation.evaluate import numbers
 from falsifier.fmu import FmuModel, System
 from falsifier.fmu.process.network import SYSTEM, Link, Member, Network, Place
 from falsifier.fmu.systems.step_order import late_links
@@ -68,7 +69,7 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
     step = experiment.stop_time / round(experiment.stop_time / experiment.step)
     recorded = system.simulate(
         candidate.signals,
-        {**problem.parameters, **candidate.parameters},
+        numbers(problem, candidate),
         replace(experiment, outputs=tuple(map(network.title, places)), output_interval=step, step_size=None),
     )
     given = {**dict(system.frame.values), **tables.start_values(problem, candidate)}

@@ -3,10 +3,12 @@
 import shlex
 from collections.abc import Iterable, Mapping
 from importlib.resources import files
+from math import ceil
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.core.model import INTERFACE_TAGS, Model
 from falsifier.core.words import readable
+from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import Evaluation
@@ -17,6 +19,8 @@ from falsifier.stl.margins import signed
 
 # Rows that replay.py prints before and after the one at which what broke was farthest off.
 _SHOWN_ROWS = 3
+# Fewest rows that FMPy records in model exchange if an input moves between them.
+_MOVING_STEPS = 10_000
 
 _REPLAY_ABOUT = """\
 Simulates a counterexample with FMPy only; writes outputs.csv and prints the rows around what broke.
@@ -41,6 +45,8 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     # FMPy uses the output interval as communication step. If the problem's step is smaller, the script
     # records at that step and keeps every n-th row.
     step = (is_co_simulation and experiment.step_size) or experiment.output_interval
+    if not is_co_simulation and any(map(tables.is_curve, evaluation.candidate.signals.values())):
+        step /= ceil(_MOVING_STEPS * step / experiment.stop_time)  # FMPy holds inputs between two rows
     about = _REPLAY_ABOUT.format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),

@@ -14,9 +14,14 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
 from falsifier.core.model import Kind, Model, ModelInfo, Variable
+from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel
 from falsifier.problem.problem import Problem
 
+# Times that are less than this apart, in s, are one.
+_TIME_ROUNDING = 1e-9
+# Rows of a curve that a solver follows, at least.
+_CURVE_ROWS = 1000
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 
 
@@ -31,12 +36,15 @@ class InputTable:
 def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     """Make a table of all numeric inputs of the model, including constant ones.
 
-    The rows are the communication points, at which inputs are set. Held and piecewise constant signals step
+    The rows are the communication points, at which inputs are set; of a solver here, which evaluates them at
+    any time, also the times at which their pieces begin. Held and piecewise constant signals step
     there: one row with the value before and one with the value after. Redundant rows are omitted.
     """
     experiment = problem.experiment
     steps = round(experiment.stop_time / experiment.step)
     times = np.arange(steps + 1, dtype=np.float64) * np.float64(experiment.stop_time / steps)
+    if getattr(problem.model, "interface", "") == "model-exchange":
+        times = np.union1d(times, _beginnings(problem, candidate))
     columns = {}
     for variable in problem.info.inputs:
         after = _values(problem, candidate, variable, times)
@@ -65,11 +73,32 @@ def start_values(problem: Problem, candidate: Candidate) -> dict[str, float | st
     return {name: value for name, value in settings.items() if name not in inputs}
 
 
+def is_curve(signal: Signal) -> bool:
+    """Whether a signal has other values between its control points, or between two samples."""
+    return signal.hold is None and signal.interpolation != "constant" and len(signal.times) > 1
+
+
+def _beginnings(problem: Problem, candidate: Candidate) -> NDArray[np.float64]:
+    """Return the times in s at which pieces of continuous inputs begin between the communication points."""
+    experiment, info = problem.experiment, problem.info
+    signals = [s for name, s in candidate.signals.items() if info[name].is_continuous]
+    found = [s.pieces(experiment.stop_time)[:, 0] for s in signals]
+    if any(s.interpolation == "pchip" and is_curve(s) for s in signals):
+        found.append(np.linspace(0.0, experiment.stop_time, _CURVE_ROWS + 1))
+    begins = np.concatenate([*found, experiment.times[:1]])
+    apart = np.abs(begins / experiment.step - np.rint(begins / experiment.step)) * experiment.step
+    return begins[(apart > _TIME_ROUNDING) & (begins < experiment.stop_time)]
+
+
 def _values(
     problem: Problem, candidate: Candidate, variable: Variable, times: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     if variable.name in candidate.signals:
-        values = candidate.signals[variable.name].sample(times)
+        signal = candidate.signals[variable.name]
+        if getattr(problem.model, "interface", "") == "model-exchange" and not variable.is_continuous:
+            grid = problem.experiment.times  # on which a solver changes it
+            times = grid[np.searchsorted(grid, times + _TIME_ROUNDING, side="right") - 1]
+        values = signal.sample(times)
         return values if variable.kind == "real" else np.rint(values)
     value = problem.parameters.get(variable.name, variable.start_number)
     return None if value is None else np.full(times.shape, float(value))

@@ -13,16 +13,17 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
+from falsifier.core.signals import Interpolation, Signal
 from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script, unplayable
 from falsifier.counterexamples.store import FILE_NAME
-from falsifier.evaluation.evaluate import evaluate
+from falsifier.evaluation.evaluate import evaluate, evaluate_any
 from falsifier.fmu import FmuModel
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
 from tests.counterexamples.export.support import AT_INPUTS, exported
-from tests.fmu.fixtures import altered, path as fmu_path
+from tests.fmu.fixtures import ME, altered, path as fmu_path
 
 
 def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: Path) -> None:
@@ -81,7 +82,7 @@ def replayed(
     problem: Problem, candidate: Candidate, directory: Path, *, rtol: float = 1e-9, atol: float = 1e-9
 ) -> dict[str, list[float]]:
     """Export a candidate, run replay.py, and return the columns of its table, which are as simulated here."""
-    evaluation = evaluate(problem, candidate)
+    evaluation = evaluate_any(problem, candidate)
     problem.model.close()
     assert evaluation.trajectory is not None, evaluation.reason
     exported(problem, evaluation, directory)
@@ -133,6 +134,20 @@ def test_a_model_exchange_solver_of_another_tool_gets_the_same_within_its_tolera
     problem = load_problem(f"{spec}:CC1", interface="model-exchange", stop_time=100.0)
     middle = problem.space.decode(problem.space.bounds.mean(axis=1))
     replayed(problem, middle, tmp_path, rtol=1e-3, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("interpolation", "hold"), [("constant", None), ("pchip", 0.35), ("linear", None), ("pchip", None)]
+)
+def test_a_solver_of_another_tool_gets_changes_between_two_samples_when_they_were(
+    interpolation: Interpolation, hold: float | None, tmp_path: Path
+) -> None:
+    lag, only = fmu_path("Lag_2"), {"u": (-10.0, 10.0)}
+    problem = Problem.from_fmu(
+        lag, "G (y <= 9)", inputs=only, stop_time=5.0, output_interval=0.5, interface=ME
+    )
+    u = Signal.evenly((10.0, -10.0, 10.0, 5.0), stop_time=5.0, interpolation=interpolation, hold=hold)
+    replayed(problem, Candidate({"u": u}), tmp_path, rtol=1e-3, atol=0.03)
 
 
 def test_arrays_reproduce_in_fmpy(tmp_path: Path) -> None:
