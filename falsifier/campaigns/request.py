@@ -173,9 +173,14 @@ def method_of_run(described: Manifest) -> Method:
 
 
 def run_name(request: RunRequest) -> str:
-    """Name of a run's directory: readable, and unique by a hash of the request."""
+    """Name of a run's directory: readable, and unique by a hash of the request.
+
+    The next version must find a campaign's runs by it, so it does not follow how methods are named elsewhere.
+    """
     digest = sha256(request.model_dump_json().encode()).hexdigest()[:_HASH_DIGITS]
-    readable = f"{request.problems[0].name}-{method_of(request).label}-{request.seed}"
+    method = method_of(request)
+    label = replace(method, llm=method.llm.rpartition("/")[2]).label
+    readable = f"{request.problems[0].name}-{label}-{request.seed}"
     return f"{readable_part(readable)}-{digest}"
 
 

@@ -88,8 +88,9 @@ def resume_campaign(
     with campaign_lock(directory):
         record = read_campaign(directory)
         manifest.check_in_sight(directory, (run.problems[0] for run in record.request.runs))
-        manifest.check_files(directory, record.hashes)
-        problems = _load(record.request.runs)
+        with manifest.loading(directory, record.hashes):
+            problems = _load(record.request.runs)
+        manifest.check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
             record = record.model_copy(
                 update={"request": record.request.model_copy(update={"limits": limits})}

@@ -18,7 +18,7 @@ _FEWEST_RUNS = 5
 # What of a request is no setting of the search, or is told apart otherwise.
 _NO_SETTINGS: Any = {
     **dict.fromkeys(("engine", "seed", "budget", "jobs", "keep", "start_from"), True),
-    "problems": {"__all__": {"target", "record"}},
+    "problems": {"__all__": {"target", "record", "parameterization"}},
     "llm": {"cache", "timeout", "price"},
 }
 Interval = tuple[float, float]

@@ -140,8 +140,9 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
     manifest.check_in_sight(place, [source])
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
-    manifest.check_files(place, described.hashes, remedy)
-    problem = load_source(source)
+    with manifest.loading(place, described.hashes, remedy):
+        problem = load_source(source)
+    manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
     records = read_journal(place)
     evaluations = recorded_evaluations(place, records, problem.name, with_trajectories=False)
     doubtful = doubtful_confirmations(problem, records, evaluations)

@@ -3,6 +3,7 @@
 import platform
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from hashlib import sha256
 from importlib.metadata import version
@@ -16,7 +17,7 @@ from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import Range, ValueKind
-from falsifier.errors import JournalError, did_you_mean, setting
+from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Held, Problem
@@ -235,11 +236,19 @@ def check_unchanged(
             raise JournalError(f"{directory}: {name} has changed since the start; {remedy}")
 
 
-def check_files(directory: Path, recorded: dict[str, str], remedy: str = _START_ANEW) -> None:
-    """Check that files are as they were when their hashes were recorded, before they are loaded."""
-    files = (Path(name) for name in recorded)
-    found = {str(f): sha256(f.read_bytes()).hexdigest() for f in files if f.is_file()}
-    check_unchanged(directory, recorded, found, remedy)
+@contextmanager
+def loading(directory: Path, recorded: dict[str, str], remedy: str = _START_ANEW) -> Iterator[None]:
+    """Blame what cannot be loaded on a file that has changed since its hash was recorded, if there is one.
+
+    Only then: of a project that was copied, the hashes are of files that are no longer used.
+    """
+    try:
+        yield
+    except FalsifierError:
+        files = (Path(name) for name in recorded)
+        found = {str(f): sha256(f.read_bytes()).hexdigest() for f in files if f.is_file()}
+        check_unchanged(directory, recorded, found, remedy)
+        raise
 
 
 def _modes(problem: Problem) -> Iterator[ModeRecord]:

@@ -208,8 +208,8 @@ def resume(
             )
         if not problems:
             manifest.check_in_sight(place, request.problems)
-            manifest.check_files(place, described.hashes)
-            loaded = [load_source(source) for source in request.problems]
+            with manifest.loading(place, described.hashes):
+                loaded = [load_source(source) for source in request.problems]
         elif by_name.keys() >= set(described.names):
             loaded = [p for group in alike(by_name[name] for name in described.names) for p in group]
         else:

@@ -67,8 +67,9 @@ def test_free_parameterizations_and_other_profiles_stand_apart_and_without_publi
 
 
 def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
-    known = runs[1].request.model_copy(update={"start_from": ({},)})
-    own = asked_for("my.toml:HARD", 60)  # an own requirement may have the name of a published one
+    known = runs[1].request.model_copy(update={"start_from": ({},), "seed": 7})
+    # An own requirement may have the name of a published one. What is searched as fixed is in the method.
+    own = asked_for("my.toml:HARD", 60, parameterization="fixed")
     changed = asked_for("HARD", 20, changes={"stop_time": 5.0})
     for request in (own, changed, known):
         assert "rank" not in main_table([replace(runs[0], request=request), runs[1]], PUBLISHED).header
@@ -78,7 +79,7 @@ def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
     assert cells(table.rows, table.header, "budget") == ["20, 60"]
     assert "Runs that began with known inputs: HARD uniform 1 of 3." in table.notes
     assert "Runs with the seed of another one, so intervals are too narrow: HARD uniform 1." in table.notes
-    assert not any("counted together" in note for note in table.notes), "the place of a spec is no setting"
+    assert not any("counted together" in note for note in table.notes), "neither a place nor a seed is a setting"
     table = main_table([replace(runs[0], request=changed), *runs[1:2]], PUBLISHED)
     assert "Different ranges, options or context files, counted together: HARD uniform 2." in table.notes
     assert not any("seed" in n for n in main_table([asked(runs[0], "MP1")] * 2, PUBLISHED).notes), (

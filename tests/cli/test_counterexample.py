@@ -219,8 +219,21 @@ def test_what_is_of_another_model_is_said_and_does_not_stand_for_the_run(changea
     (folder / "w.toml").write_text(SPEC)
     shutil.copy(bundled("fmus") / "CC.fmu", folder / "AT.fmu")
     told = run(folder, "explain", "rw").err, run(folder, "resume", "rw", "--budget", "9").err
-    assert "w.toml is as it was then, so its FMU has changed: " in told[0]
+    assert "w.toml is as it was then, but its FMU has changed: " in told[0]
     assert "AT.fmu has changed since the start; start a new run instead" in told[1]
+    (folder / "AT.fmu").unlink()
+    gone = run(folder, "explain", "rw", code=2).err
+    assert "AT.fmu: no such file; give" in gone and "has changed" not in gone
+
+
+def test_a_copy_of_a_project_does_not_depend_on_what_it_was_copied_from(
+    changeable: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    copy = tmp_path_factory.mktemp("copy") / "project"
+    shutil.copytree(changeable, copy)
+    shutil.copy(bundled("fmus") / "CC.fmu", changeable / "AT.fmu")
+    assert run(copy, "resume", "rw", "--quiet").code == 1
+    assert run(copy, "assess", "rw", "--budget", "3", "--quiet").code == 1
 
 
 def test_outputs_replace_nothing_but_earlier_outputs(folder: Path) -> None:
