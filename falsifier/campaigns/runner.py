@@ -87,8 +87,8 @@ def resume_campaign(
     jobs, directory = whole("jobs", jobs, least=1), path_of("directory", directory)
     with campaign_lock(directory):
         record = read_campaign(directory)
-        manifest.check_in_sight(directory, (run.problems[0] for run in record.request.runs))
-        with manifest.loading(directory, record.hashes):
+        sources = (run.problems[0] for run in record.request.runs)
+        with manifest.loading(directory, sources, record.hashes):
             problems = _load(record.request.runs)
         manifest.check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:

@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from falsifier.analyses.assess import assess as assess_problem
+from falsifier.analyses.margin import margin as find_margin, stated_at
 from falsifier.cli import options
 from falsifier.cli.command import command, refuse
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
@@ -84,8 +85,6 @@ def margin(
     Exit codes: 0 not falsified at any threshold, 1 falsified at a threshold, 2 wrong usage or spec, 3 the
     simulations failed, 130 interrupted, after which the searches so far count.
     """
-    from falsifier.analyses.margin import margin as find_margin, stated_at
-
     low, high = _between(between)
     # So that the signals of the formula are recorded; problems made in Python take no formula.
     made_here = Target.parse(given["target"]).kind != "python"
@@ -138,9 +137,8 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
     source = described.request.source
     if source is None:
         raise SpecError(f"{place}: the problem of this run was made in Python; call assess() in Python")
-    manifest.check_in_sight(place, [source])
     remedy = f"what was found says nothing about it: assess {source.target}, or start a new run"
-    with manifest.loading(place, described.hashes, remedy):
+    with manifest.loading(place, [source], described.hashes, remedy):
         problem = load_source(source)
     manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
     records = read_journal(place)

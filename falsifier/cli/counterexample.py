@@ -17,6 +17,9 @@ from falsifier.core.literals import one_line
 from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.explain import explain as explain_case
+from falsifier.counterexamples.export import export_counterexample
+from falsifier.counterexamples.export.scripts import unplayable
+from falsifier.counterexamples.export.tables import input_table, write_csv
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET, robustness_map
 from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET, shrink
@@ -147,9 +150,6 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
 
     RUN is a run directory or a counterexample file.
     """
-    from falsifier.counterexamples.export import export_counterexample
-    from falsifier.counterexamples.export.scripts import unplayable
-
     if store is not None:
         refuse("--store writes nothing else; export to it in another command", out=out)
     case = counterexample_case(run)
@@ -180,8 +180,6 @@ def _shrink(
     quiet: bool,
 ) -> Told:
     """Write the simplest one that still violates, or of a nearest miss that comes about as near."""
-    from falsifier.counterexamples.export.tables import input_table, write_csv
-
     ending = ".csv" if case.is_miss else ".json"
     file = out or beside(case.file, f"shrunk{ending}")
     files.check_ending(file, (ending,))

@@ -13,6 +13,7 @@ from falsifier.cli.command import command, refuse
 from falsifier.cli.files import in_existing_folder
 from falsifier.cli.options import PATH, changes_in, json_option, out_option, policy_options
 from falsifier.cli.output import as_shown, say
+from falsifier.context.simulink import read_diagram
 from falsifier.context.values import SIMULINK
 from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
@@ -53,18 +54,13 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     FILE is an FMU, the name of a bundled FMU (AT) or of a bundled requirement (AT1), or a spec file; for the
     last two, their FMU or system is shown. A Simulink file (.slx, .mdl) is shown as blocks, lines and charts.
     """
-    from falsifier.context.simulink import read_diagram
-
     if fmu.suffix.lower() in SIMULINK:
         refuse("applies to FMUs only", all=everything, check=checked)
         diagram = read_diagram(fmu)
         say(as_shown(simulink_text(diagram), as_json and asdict(diagram), as_json=as_json))
         return
-    refuse(
-        "the comparison is printed as text only; drop one of them",
-        check=checked and as_json,
-        json=checked and as_json,
-    )
+    if checked and as_json:
+        refuse("the comparison is printed as text only; drop one of them", check=True, json=True)
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     spec = _spec_of(fmu)

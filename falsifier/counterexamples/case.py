@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
 
 from falsifier.core.arguments import utf_8
@@ -22,7 +21,6 @@ from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.shorthand import given_rights
 from falsifier.problem.source import ProblemSource
-from falsifier.problem.spec import read_spec
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations, simulated
 from falsifier.record.manifest import Manifest, Origin
@@ -80,13 +78,7 @@ class Case:
             )
         remedy = "put it there, or correct problem.target in this file and delete its last key, sum"
         manifest.check_in_sight(self.place, [self.source], remedy)
-        try:
-            problem = load_source(self.source)
-        except SpecError as error:
-            if (spec := self._spec_of_another_fmu()) is None:
-                raise
-            message = f"{self.place}: {spec.name} is as it was then, but its FMU has changed: {error}"
-            raise SpecError(message) from None
+        problem = load_source(self.source)
         model = problem.model
         if not isinstance(model, FmuModel | System):
             return problem, ()
@@ -96,26 +88,6 @@ class Case:
         allowed = tuple(dict.fromkeys((*kept, *given["allow"])))
         denied = tuple(dict.fromkeys((*model.deny, *self.deny, *given["deny"])))
         return replace(problem, model=replace(model, allow=allowed, deny=denied)), withheld
-
-    def _spec_of_another_fmu(self) -> Path | None:
-        """Return the spec if it is as it was then but an FMU that it names is not; otherwise None."""
-        if self.source is None or self.source.parts.kind != "spec":
-            return None
-        spec = Path(self.source.parts.file)
-        try:
-            stated = read_spec(spec)
-            named = [stated.model.fmu, *(part.fmu for part in stated.components.values())]
-            found = {
-                str(name): sha256((spec.parent / name).read_bytes()).hexdigest() for name in named if name
-            }
-            found[str(spec)] = sha256(spec.read_bytes()).hexdigest()
-        except (SpecError, OSError):  # which is then what is to be said
-            return None
-        now = Origin.of("", found)
-        is_spec_alone = (
-            now.spec_sha256 == self.origin.spec_sha256 and now.fmu_sha256 != self.origin.fmu_sha256
-        )
-        return spec if is_spec_alone else None
 
     def changes(self, problem: Problem) -> list[str]:
         """Say what of the problem has changed since this was recorded."""

@@ -237,11 +237,14 @@ def check_unchanged(
 
 
 @contextmanager
-def loading(directory: Path, recorded: dict[str, str], remedy: str = _START_ANEW) -> Iterator[None]:
-    """Blame what cannot be loaded on a file that has changed since its hash was recorded, if there is one.
+def loading(
+    directory: Path, sources: Iterable[ProblemSource], recorded: dict[str, str], remedy: str = _START_ANEW
+) -> Iterator[None]:
+    """Check that the files exist, and blame what cannot be loaded on one that has changed, if there is one.
 
-    Only then: of a project that was copied, the hashes are of files that are no longer used.
+    Only then: of a project that was copied, the recorded hashes are of files that are no longer used.
     """
+    check_in_sight(directory, sources)
     try:
         yield
     except FalsifierError:

@@ -207,8 +207,7 @@ def resume(
                 f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
             )
         if not problems:
-            manifest.check_in_sight(place, request.problems)
-            with manifest.loading(place, described.hashes):
+            with manifest.loading(place, request.problems, described.hashes):
                 loaded = [load_source(source) for source in request.problems]
         elif by_name.keys() >= set(described.names):
             loaded = [p for group in alike(by_name[name] for name in described.names) for p in group]

@@ -144,11 +144,6 @@ class Diagnosis:
     vacuities: tuple[VacuousImplication, ...] = ()
 
     @property
-    def vacuous(self) -> bool:
-        """Whether an implication held only because its condition was never true."""
-        return any(v.only for v in self.vacuities)
-
-    @property
     def text(self) -> str:
         """The path in words, followed by the vacuous implications."""
         *above, predicate = (step.text for step in self.path if step.text)

@@ -4,13 +4,11 @@ The tables are plain text: a table library needs minutes for the 100,000 variabl
 """
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from falsifier.context.simulink import Diagram, structure_text
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import aligned, counted, readable
-
-if TYPE_CHECKING:
-    from falsifier.context.simulink import Diagram
 
 # Maximum rows of a table: models may have thousands of parameters or states.
 _SHOWN_VARIABLES = 60
@@ -80,10 +78,8 @@ def _number(value: float | str | None) -> str:
     return "" if value is None else readable(value) if isinstance(value, int | float) else value
 
 
-def simulink_text(diagram: "Diagram") -> str:
+def simulink_text(diagram: Diagram) -> str:
     """Return how much a diagram contains, and its structure."""
-    from falsifier.context.simulink import structure_text
-
     systems = [system for _, system in diagram.root.walk()]
     size = (
         f"{counted(sum(len(system.blocks) for system in systems), 'block')} in "

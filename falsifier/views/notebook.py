@@ -8,6 +8,7 @@ consists of plain tables and PNG images, so that code hosts display it too::
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from falsifier.core.candidate import Candidate
@@ -23,6 +24,7 @@ from falsifier.stl import Verdict, in_words
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import el, join, picture, table
 from falsifier.views.model_text import info_text
+from falsifier.views.plotting import plot_evaluation, plot_trajectory, png
 from falsifier.views.text import Fact, broken_facts, margin_facts, result_facts, seconds_text
 
 # Images are stored in the notebook file; at this resolution about 20 kB each.
@@ -45,13 +47,7 @@ def register() -> None:
         formatter.for_type_by_name(shown.__module__, shown.__name__, html)
     pictures = shell.display_formatter.formatters["image/png"]
     if "matplotlib.figure.Figure" not in pictures:  # neither pyplot nor %matplotlib draws them
-        pictures.for_type_by_name("matplotlib.figure", "Figure", _figure_png)
-
-
-def _figure_png(figure: Any) -> bytes:
-    from falsifier.views.plotting import png
-
-    return png(figure, dpi=_DPI)
+        pictures.for_type_by_name("matplotlib.figure", "Figure", partial(png, dpi=_DPI))
 
 
 def problem_html(problem: Problem) -> str:
@@ -86,8 +82,6 @@ def evaluation_html(evaluation: Evaluation) -> str:
 
 def trajectory_html(trajectory: Trajectory) -> str:
     """Range of each signal, and a figure of the first few."""
-    from falsifier.views.plotting import plot_trajectory, png
-
     header = ("signal", "unit", "first", "smallest", "largest", "last")
     rows = [
         (name, trajectory.units.get(name, ""), *(readable(v, 5) for v in (c[0], c.min(), c.max(), c[-1])))
@@ -104,8 +98,6 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 def result_html(result: Result) -> str:
     """How the run ended, as on a terminal, with a figure of the counterexample or of the best evaluation."""
-    from falsifier.views.plotting import plot_evaluation, png
-
     found, spent, shown = result.counterexample, result.spent, result.shown
     title = f"{result.problem.name}: {result.status} after {spent.simulations_text}"
     parts = [el("b", title), table((), [*result_facts(result), ("time", seconds_text(spent))])]

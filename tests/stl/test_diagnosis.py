@@ -32,7 +32,7 @@ def test_the_path_of_a_nested_formula_in_words() -> None:
     assert [step.time for step in found.path] == pytest.approx([0.0, 12.3, 17.0])
     assert [step.window for step in found.path] == [(0.0, 15.0), pytest.approx((12.3, 20.3)), None]
     assert found.robustness == pytest.approx(-0.9)
-    assert not found.vacuous
+    assert found.vacuities == ()
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,6 @@ def test_a_condition_that_was_never_true_is_reported_as_vacuous() -> None:
     x, y = [1.0, 2.5, 2.0, 0.0], [5.0, 5.0, 5.0, 5.0]
     found = diagnose("G[0,3] (x >= 3 -> y <= 4)", x=x, y=y)
     assert found.robustness == 0.5
-    assert found.vacuous
     (finding,) = found.vacuities
     assert (finding.window, finding.nearest, finding.margin, finding.only) == ((0.0, 3.0), 1.0, -0.5, True)
     assert found.text.endswith(
@@ -79,7 +78,7 @@ def test_a_condition_that_was_never_true_is_reported_as_vacuous() -> None:
 
 def test_a_condition_that_was_never_true_is_not_the_only_reason_where_the_consequence_held() -> None:
     found = diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[1.0, 2.0], y=[3.0, 4.0])
-    assert not found.vacuous
+    assert not found.vacuities[0].only
     assert "The condition of x >= 3 -> y <= 4 was never true over [0, 1] s" in found.text
     once = diagnose("G[0,1] (x >= 3 -> y <= 4)", x=[3.0, 2.0], y=[3.0, 9.0])
     assert once.vacuities == (), "it was true once"
@@ -87,12 +86,12 @@ def test_a_condition_that_was_never_true_is_not_the_only_reason_where_the_conseq
 
 def test_a_condition_exactly_on_its_limit_is_true_if_its_comparison_says_so() -> None:
     found = diagnose("G[0,1] (x > 0 -> y <= 4)", x=[0.0, 0.0], y=[9.0, 9.0])
-    assert found.vacuous and found.text.endswith("it came closest at 0 s, exactly on its limit.")
+    assert found.vacuities[0].only and found.text.endswith("it came closest at 0 s, exactly on its limit.")
     assert diagnose("G[0,1] (x >= 0 -> y <= 4)", x=[0.0, 0.0], y=[9.0, 9.0]).robustness < 0
 
 
 def test_only_the_times_at_which_an_implication_is_asked_count() -> None:
-    assert diagnose("G[1,2] (x >= 3 -> y <= 4)", x=[9.0, 1.0, 1.0, 9.0], y=[9.0] * 4).vacuous
+    assert diagnose("G[1,2] (x >= 3 -> y <= 4)", x=[9.0, 1.0, 1.0, 9.0], y=[9.0] * 4).vacuities[0].only
     single = diagnose("(G[0,1] (x <= 3)) -> y <= 4", x=[1.0, 4.0], y=[9.0, 9.0])
     assert single.vacuities[0].text == (
         "Vacuous: G[0,1] (x <= 3) -> y <= 4 held at 0 s only because its condition was not true; "
