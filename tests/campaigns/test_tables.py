@@ -79,7 +79,9 @@ def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
     assert cells(table.rows, table.header, "budget") == ["20, 60"]
     assert "Runs that began with known inputs: HARD uniform 1 of 3." in table.notes
     assert "Runs with the seed of another one, so intervals are too narrow: HARD uniform 1." in table.notes
-    assert not any("counted together" in note for note in table.notes), "neither a place nor a seed is a setting"
+    assert not any("counted together" in note for note in table.notes), (
+        "neither a place nor a seed is a setting"
+    )
     table = main_table([replace(runs[0], request=changed), *runs[1:2]], PUBLISHED)
     assert "Different ranges, options or context files, counted together: HARD uniform 2." in table.notes
     assert not any("seed" in n for n in main_table([asked(runs[0], "MP1")] * 2, PUBLISHED).notes), (
