@@ -13,7 +13,7 @@ from falsifier.engines import make_engine
 from falsifier.engines.briefing import Briefing
 from falsifier.engines.hybrid import Hybrid, Turns, helps
 from falsifier.engines.llm import LLMEngine
-from falsifier.engines.protocol import Engine
+from falsifier.engines.protocol import Engine, FollowsRun
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.scripted import ScriptedChat
@@ -113,6 +113,8 @@ def test_the_model_opens_and_both_hear_everything() -> None:
     assert asked[1].rationale.startswith("surrogate: ")
     assert len(script.heard) == 5
     assert len(engine.surrogate.history.samples) == 5
+    assert isinstance(engine, FollowsRun), "what its run tells it is for the model"
+    assert (engine.begin, engine.doubt) == (script.begin, script.doubt)
 
 
 def test_a_later_answer_is_ranked_before_one_is_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
