@@ -31,7 +31,7 @@ _MOST_LINES = 4
 # Maximum number of names beside an axis; of more, only numbers are shown. And of characters of such a name.
 _MOST_TICKS, _LONGEST_TICK = 12, 24
 # Width in inches of a character of a label, more or less.
-_CHARACTER = 0.07
+CHARACTER = 0.07
 
 
 def caption(text: str) -> str:
@@ -61,7 +61,7 @@ def fit_labels(ax: "Axes") -> None:
     """Put labels longer than their axis on several small lines; of a very long one, both ends are kept."""
     box, dpi = ax.get_window_extent(), figure_of(ax).dpi
     for label, length in ((ax.xaxis.label, box.width / dpi), (ax.yaxis.label, box.height / dpi)):
-        text, width = label.get_text().replace(r"\$", "$"), max(8, int(length / _CHARACTER))
+        text, width = label.get_text().replace(r"\$", "$"), max(8, int(length / CHARACTER))
         if len(text) > width:
             half = (_MOST_LINES - 1) * width // 2
             kept = text if len(text) <= 2 * half else f"{text[:half]} ... {text[-half:]}"

@@ -16,6 +16,7 @@ from falsifier.search.result import Result
 from falsifier.stl.margins import is_on_limit, signed
 from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.axes import (
+    CHARACTER,
     Colour,
     caption,
     figure_of,
@@ -44,8 +45,8 @@ _CORNERS = [
 # Maximum number of bounds in a panel whose predicates are written beside them.
 _LABELLED = 3
 # Share of a panel's height above which a predicate is written below its line, and below which the predicates
-# of two lines are written together; width of a character in inches.
-_TOP, _TOGETHER, _CHARACTER = 0.85, 0.12, 0.07
+# of two lines are written together.
+_TOP, _TOGETHER = 0.85, 0.12
 # Shorter intervals, as a share of the simulated time, are drawn as a line: a single sample has no width.
 _SHORT = 0.003
 
@@ -271,8 +272,8 @@ def _name_bounds(ax: "Axes", panel: Panel) -> None:
             named.setdefault(next(near, (x, y)), {})[bound.predicate] = end
     for (x, y), ends in named.items():
         side, offset = ("top", -3) if y > low + _TOP * (high - low) else ("bottom", 2)
-        text = shortened(", ".join(ends), int(inches / _CHARACTER))
-        is_late = len(text) * _CHARACTER > (last - x) / (last - first) * inches
+        text = shortened(", ".join(ends), int(inches / CHARACTER))
+        is_late = len(text) * CHARACTER > (last - x) / (last - first) * inches
         at, where, align = ((max(ends.values()), y), -3, "right") if is_late else ((x, y), 3, "left")
         look: dict[str, Any] = {"va": side, "ha": align, "color": Colour.LIMIT, "fontsize": 8}
         look["path_effects"] = [withStroke(linewidth=2, foreground="white", alpha=0.7)]
