@@ -15,7 +15,7 @@ from falsifier.engines import DEFAULT_ENGINE, ENGINES
 from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS
 from falsifier.llm.prompts.view import Part
-from falsifier.problem.sections import ModelChanges, ModelSection
+from falsifier.problem.sections import ModelChanges
 from falsifier.problem.spec import Spec
 
 _MARK = re.compile(r"^<!-- (keys|engines|variants)(?: (\w+))? -->$", re.MULTILINE)
@@ -67,17 +67,18 @@ def _keys(section: str) -> str:
     if is_template:  # these are the same for all
         properties = {k: v for k, v in properties.items() if k not in ("template", "description")}
         properties["during"] = properties.pop("during")  # after its own arguments
+    if section == "ModelSection":  # its own keys first: what is simulated, then how
+        properties = dict(sorted(properties.items(), key=lambda item: item[0] in ModelChanges.model_fields))
     required = sections[section].get("required", ())
     rows = [
-        (f"`{key}`", _type(said), "yes" if key in required else "", _meaning(key, said))
+        (f"`{key}`", _type(said), "yes" if key in required else "", _meaning(said))
         for key, said in properties.items()
     ]
     return _table(("key", "value", "required", "meaning"), rows)
 
 
-def _meaning(key: str, said: Mapping[str, Any]) -> str:
-    inherited = ModelSection.model_fields.get(key)
-    meaning = said.get("description") or (inherited and inherited.description) or ""
+def _meaning(said: Mapping[str, Any]) -> str:
+    meaning = str(said.get("description", ""))
     default = said.get("default")
     if default in (None, "", [], {}, False) or "default" in meaning.lower():
         return meaning

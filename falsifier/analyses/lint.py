@@ -19,7 +19,7 @@ from falsifier.problem.source import ProblemSource, source_of
 from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.vacuity import hidden_margin
 from falsifier.stl import Formula
-from falsifier.stl.formula import Always, And, Bare, Eventually, Or, Until, Window
+from falsifier.stl.formula import And, Bare, Or, Temporal, Until, Window
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import Interval, decided
 
@@ -141,7 +141,7 @@ def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
 def _windows(problem: Problem) -> Iterator[LintFinding]:
     still = {*_constants(problem), *(p.name for p in problem.space.parameters)} - problem.info.starts
     for part in dict.fromkeys(problem.requirement.formula.walk()):
-        if not isinstance(part, Always | Eventually | Until):
+        if not isinstance(part, Temporal):
             continue
         if part.window == Window(0.0, 0.0) and not isinstance(part, Until):
             text, advice = "the window contains only the present", f"leave it out: {part.children[0]}"
@@ -160,7 +160,7 @@ def _implied_side(name: str, part: And | Or) -> Iterator[LintFinding]:
             continue
         spare, kept = (other, one) if isinstance(part, And) else (one, other)
         because = "implies it" if isinstance(part, And) else "it implies"
-        is_window = type(spare) is type(kept) and isinstance(spare, Always | Eventually | Until)
+        is_window = type(spare) is type(kept) and isinstance(spare, Temporal)
         yield LintFinding(
             name,
             "window" if is_window and spare.children == kept.children else "implied",

@@ -64,7 +64,8 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     spec = _spec_of(fmu)
-    rights = rights_of(spec, [changes])
+    stated = read_spec(spec).model if spec else ModelSection()
+    rights = rights_of(spec, [stated, changes])
     try:
         note = rights_text(*rights)
     except (MachineError, ModelError) as error:  # the description can be shown all the same
@@ -72,7 +73,7 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
     found = replace(found, notes=(*found.notes, note))
     say(as_shown(info_text(found, everything=everything), as_json and model_json(found), as_json=as_json))
     if checked:
-        _print_convergence(source, found, read_spec(spec).model if spec else ModelSection(), *rights)
+        _print_convergence(source, found, stated, *rights)
 
 
 @command()

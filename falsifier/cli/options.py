@@ -113,15 +113,12 @@ def policy_options(command: Function) -> Function:
     )
 
 
-_EXPERIMENT = ("stop_time", "output_interval", "time_limit", "interface")
-_CHANGES = ("values", "ranges", *_EXPERIMENT, "omit", "allow", "deny")
-
-
 def changes_in(options: dict[str, Any]) -> "ModelChanges":
     """Take out of a command's keyword arguments what changes a problem, as far as the command has it."""
-    from falsifier.problem.shorthand import changes_from_options
+    from falsifier.problem.shorthand import KEYS_WITH_OPTION, changes_from_options
 
-    return changes_from_options(**{name: options.pop(name) for name in _CHANGES if name in options})
+    names = ("values", "ranges", *KEYS_WITH_OPTION)
+    return changes_from_options(**{name: options.pop(name) for name in names if name in options})
 
 
 def interface_option(text: str) -> Decorator:

@@ -48,8 +48,6 @@ _ENVIRONMENT = {
 _WARNINGS = (".*`?ReadOnly`? qualifier", "Pydantic serializer warnings")
 _CLASSES = re.compile(r"(?:(?:litellm\.)?\w+(?:Error|Exception|Timeout)(?:: ?| - |$))+")
 _TRACE = "Traceback (most recent call last)"
-# Providers that pass options on to servers of all kinds.
-_ROUTERS = frozenset({"openrouter", "huggingface"})
 # Parameters that litellm drops for LLMs that do not accept them.
 _DROPPABLE = frozenset(
     {"temperature", "top_p", "seed", "max_tokens", "reasoning_effort", "stop", "presence_penalty",
@@ -150,21 +148,16 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
     """
     if "timeout" in options:
         raise ChatSetupError("timeout: state it beside the options, which also limits slow replies")
-    provider = provider_of(llm)
-    is_own = (
-        stated_address(llm, api_base) is not None
-        or known(llm).local
-        or not known(llm).keys
-        or provider in _ROUTERS
-    )
-    if not options or is_own:
+    provider = known(llm)
+    is_own = stated_address(llm, api_base) is not None or provider.local or not provider.keys
+    if not options or is_own or provider.routes:
         return
     taken = _options_of(llm)
     for name in options:
         if name not in taken:
             given = written(f"--llm-option {name}", name)
             raise ChatSetupError(
-                f"{given}: {provider} has no such option; {did_you_mean(name, taken)}. What litellm "
+                f"{given}: {provider_of(llm)} has no such option; {did_you_mean(name, taken)}. What litellm "
                 "does not know can be sent in Python: connect(NAME, options={'extra_body': {...}})"
             )
 

@@ -28,6 +28,10 @@ class Provider:
     names_effort: bool = False  # whether litellm passes an effort only if the parameter is named
     marks: bool = False  # whether it keeps only what is marked of a prompt
     limits: bool = False  # whether schemas may state numbers of items and ranges of numbers
+    routes: bool = False  # whether it passes options on to servers of all kinds
+    # Whether gpt-oss, constrained to a grammar, returns empty or garbled replies (ollama#11691, ollama#12470,
+    # lmstudio-bug-tracker#1555).
+    garbles_gpt_oss: bool = False
 
 
 # Ollama silently cuts off the beginning of a prompt that exceeds its context. Its default context is shorter
@@ -38,6 +42,7 @@ _OLLAMA = Provider(
     start="ollama serve",
     defaults=MappingProxyType({"num_ctx": 32_768}),
     limits=True,
+    garbles_gpt_oss=True,
 )
 
 PROVIDERS: Mapping[str, Provider] = MappingProxyType(
@@ -46,11 +51,11 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
         "azure": Provider(("AZURE_API_KEY",), openai_client=True),
         "anthropic": Provider(("ANTHROPIC_API_KEY",), marks=True),
         "gemini": Provider(("GEMINI_API_KEY", "GOOGLE_API_KEY")),
-        "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), names_effort=True),
+        "huggingface": Provider(("HF_TOKEN", "HUGGINGFACE_API_KEY"), names_effort=True, routes=True),
         "mistral": Provider(("MISTRAL_API_KEY",)),
         "groq": Provider(("GROQ_API_KEY",)),
         "deepseek": Provider(("DEEPSEEK_API_KEY",)),
-        "openrouter": Provider(("OPENROUTER_API_KEY",)),
+        "openrouter": Provider(("OPENROUTER_API_KEY",), routes=True),
         "together_ai": Provider(("TOGETHERAI_API_KEY", "TOGETHER_API_KEY")),
         "xai": Provider(("XAI_API_KEY",)),
         "ollama": _OLLAMA,
@@ -62,6 +67,7 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
             openai_client=True,
             names_effort=True,
             limits=True,
+            garbles_gpt_oss=True,
         ),
         "hosted_vllm": Provider(own=True, start="vllm serve MODEL", limits=True),
         "custom_openai": Provider(("CUSTOM_OPENAI_API_KEY",), own=True, openai_client=True),
@@ -233,12 +239,7 @@ def _address_variables(llm: str) -> tuple[str, ...]:
 
 
 def first_mode(llm: str) -> Mode:
-    """First way of asking this LLM for JSON.
-
-    Constrained to a grammar by Ollama or LM Studio, gpt-oss returns empty or garbled replies
-    (ollama#11691, ollama#12470, lmstudio-bug-tracker#1555).
-    """
-    grammar_is_broken = provider_of(llm) in ("ollama", "ollama_chat", "lm_studio") and "gpt-oss" in llm
-    if grammar_is_broken:
+    """First way of asking this LLM for JSON."""
+    if known(llm).garbles_gpt_oss and "gpt-oss" in llm:
         return "prompt"
     return "bounded_schema" if known(llm).limits else "json_schema"

@@ -18,7 +18,7 @@ from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freed
 from falsifier.problem.models import default_interface, make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
-from falsifier.problem.sections import InputSection, ModelChanges, ModelSection, ParameterSection
+from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, Simulation
 from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
@@ -70,7 +70,7 @@ def join(
             raise SpecError(f"no profile {profile!r}; {near}; without a profile: free or fixed")
         overriding, changes = spec.changes(requirement, profile), changes or ModelChanges()
         stating |= overriding
-        allowing: dict[str, ModelSection | ModelChanges] = {"model": spec.model, **overriding}
+        allowing: dict[str, Simulation] = {"model": spec.model, **overriding}
         for place, each in allowing.items():
             with in_section(key=place):
                 Rights.of(resolved(each.allow, path.parent), each.deny)

@@ -8,8 +8,8 @@ from falsifier import fmu
 from falsifier.core.files import absent
 from falsifier.core.model import Interface, Model, ModelInfo
 from falsifier.errors import SpecError, in_section
-from falsifier.problem.sections import ModelChanges, ModelSection
-from falsifier.problem.spec import Spec, read_spec
+from falsifier.problem.sections import ModelChanges, Simulation
+from falsifier.problem.spec import Spec
 
 
 def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
@@ -22,9 +22,10 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
         SpecError: naming the file, the key and the remedy.
         ModelError: if an FMU cannot be read.
     """
-    logging = next((each.logging for each in layers[::-1] if each.logging is not None), spec.model.logging)
-    interface = next((each.interface for each in layers[::-1] if each.interface), spec.model.interface)
-    allow, deny = rights_of(path, layers, spec.model)
+    sections = [*reversed(layers), spec.model]
+    logging = next((each.logging for each in sections if each.logging is not None), False)
+    interface = next((each.interface for each in sections if each.interface), None)
+    allow, deny = rights_of(path, sections[::-1])
     if spec.is_system:
         if interface == "model-exchange":
             raise SpecError(
@@ -39,21 +40,14 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
     )
 
 
-def rights_of(
-    path: Path | None, layers: Sequence[ModelChanges], section: ModelSection | None = None
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what the FMUs may do and may not do, as a spec and what overrides it say together.
+def rights_of(path: Path | None, sections: Sequence[Simulation]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what the FMUs may do and may not do, as these sections say together.
 
-    The layers add to the section ``model`` of the spec, which is read from its file if it is not given.
-
-    Raises:
-        SpecError: naming what is unknown.
+    ``path`` is that of the spec file, if there is one. SpecError naming what is unknown.
     """
-    if section is None:
-        section = read_spec(path).model if path is not None else ModelSection()
-    words = (*section.allow, *(word for layer in layers for word in layer.allow))
+    words = [word for section in sections for word in section.allow]
     allow = fmu.resolved(words, path.parent if path is not None else Path())
-    deny = (*section.deny, *(word for layer in layers for word in layer.deny))
+    deny = tuple(word for section in sections for word in section.deny)
     with in_section(*((str(path), "model") if path is not None else ())):
         fmu.Rights.of(allow, deny)
     return allow, deny

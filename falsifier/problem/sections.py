@@ -82,7 +82,8 @@ class Strict(BaseModel):
         """Say which keys there are, and what a missing one means; ``wrong_key`` states the key beside it."""
         if not isinstance(section, Mapping):
             return section
-        fields = {field.alias or name: field for name, field in cls.model_fields.items()}
+        own_first = sorted(cls.model_fields.items(), key=lambda named: named[0] not in cls.__annotations__)
+        fields = {field.alias or name: field for name, field in own_first}
         for key in section:
             if key not in fields:
                 raise _wrong(str(key), f"unknown key; {did_you_mean(str(key), (*fields, *cls.other_keys))}")
@@ -165,13 +166,9 @@ _BARE = BeforeValidator(lambda found: {"value": found} if isinstance(found, int 
 Parameters = dict[str, Annotated[ParameterSection, _BARE]]
 
 
-class ModelSection(Strict):
-    """What is simulated and how."""
+class Simulation(Strict):
+    """How a model is simulated: keys of [model], which requirements and profiles may override."""
 
-    fmu: str | None = Field(
-        None,
-        description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
-    )
     interface: Interface | None = Field(None, description="Required if the FMU offers both.")
     stop_time: Seconds | None = Field(None, description="End of each simulation in s.")
     output_interval: Seconds | None = Field(None, description="Step of the monitored time grid in s.")
@@ -181,15 +178,24 @@ class ModelSection(Strict):
         None,
         description="Maximum wall-clock time of one simulation in s; default: 60 per tenth of its stop time.",
     )
-    logging: Truth = Field(default=False, description="Ask the FMU for its messages in every simulation.")
-    record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
+    logging: Truth | None = Field(None, description="Ask the FMU for its messages in every simulation.")
     omit: tuple[str, ...] = Field((), description="Outputs not to record, such as one that becomes NaN.")
-    allow: tuple[str, ...] = Field(
+    allow: tuple[Recordable, ...] = Field(
         (),
         description="What the FMU may do beyond changing its own folders: write:PATH, read:PATH (a file or "
         "folder that may hold keys), programs (execute programs).",
     )
     deny: tuple[str, ...] = Field((), description="What it may not do: network (open connections).")
+
+
+class ModelSection(Simulation):
+    """What is simulated and how."""
+
+    fmu: str | None = Field(
+        None,
+        description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
+    )
+    record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
 class ComponentSection(Strict):
@@ -264,19 +270,9 @@ _BARE_SOURCE = BeforeValidator(lambda found: {"from": found} if isinstance(found
 Connections = dict[str, Annotated[ConnectionSection, _BARE_SOURCE]]
 
 
-class ModelChanges(Strict):
+class ModelChanges(Simulation):
     """What a requirement or a profile may override."""
 
-    interface: Interface | None = None
-    stop_time: Seconds | None = None
-    output_interval: Seconds | None = None
-    step_size: Seconds | None = None
-    tolerance: Seconds | None = None
-    time_limit: Seconds | None = None
-    logging: Truth | None = None
-    omit: tuple[str, ...] = ()
-    allow: tuple[Recordable, ...] = ()
-    deny: tuple[str, ...] = ()
     inputs: Inputs = Field(default_factory=dict)
     parameters: Parameters = Field(default_factory=dict)
 

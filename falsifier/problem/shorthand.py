@@ -17,6 +17,9 @@ from falsifier.problem.sections import InputSection, ModelChanges, ParameterSect
 from falsifier.problem.spec import AnyRequirement, parse_spec
 from falsifier.stl.lexer import RESERVED
 
+# Keys that the option of the same name states; --set and --search state inputs and parameters.
+KEYS_WITH_OPTION = ("interface", "stop_time", "output_interval", "time_limit", "omit", "allow", "deny")
+
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # A template and its first argument; no formula begins like this.
 _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
@@ -133,12 +136,22 @@ def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
     [('--search', 'u=0:1:3'), ('--stop-time', '5.0')]
     """
     options = [_option(name, section) for name, section in changes.variables]
-    for field in ("interface", "stop_time", "output_interval", "time_limit"):
-        if (value := getattr(changes, field)) is not None:
-            options.append((f"--{field.replace('_', '-')}", str(value)))
-    options += [("--omit", name) for name in changes.omit]
-    options += [("--allow", word) for word in changes.allow]
-    return options + [("--deny", word) for word in changes.deny]
+    for key in KEYS_WITH_OPTION:
+        stated = getattr(changes, key)
+        values = stated if isinstance(stated, tuple) else () if stated is None else (stated,)
+        options += [(f"--{key.replace('_', '-')}", str(value)) for value in values]
+    return options
+
+
+def without_option(changes: ModelChanges) -> list[str]:
+    """Return the keys of these changes, stated in Python, that ``options_from`` cannot say."""
+    others = ModelChanges.model_fields.keys() - {*KEYS_WITH_OPTION, "logging", "inputs", "parameters"}
+    keys = sorted(key for key in others if getattr(changes, key) is not None)
+    for name, section in changes.inputs.items():
+        is_whole = section.range is not None and section.control_points is not None
+        said = ("range", "value", *(("control_points", "interpolation") if is_whole else ()))
+        keys += [f"inputs.{name}.{key}" for key in section.model_dump(exclude_none=True) if key not in said]
+    return keys
 
 
 def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from operator import mul, truediv
 
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
-from falsifier.stl.formula import And, Formula, Iff, Implies, Not, Or, Predicate, Until
+from falsifier.stl.formula import And, Formula, Iff, Implies, Next, Not, Or, Predicate, Temporal, Until
 from falsifier.stl.margins import on_limit
 
 
@@ -74,7 +74,9 @@ def margins(formula: Formula, ranges: Mapping[str, Interval]) -> Interval:
         case Iff():
             left, right = parts
             return _smallest([_largest([-left, right]), _largest([-right, left])])
-    return parts[0]
+    if isinstance(formula, Next | Temporal):
+        return parts[0]
+    raise TypeError(f"not a formula: {formula!r}")
 
 
 def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[Formula, bool]]:

@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 from importlib import import_module
 from pathlib import Path
@@ -7,7 +8,7 @@ import pytest
 
 from falsifier.cli import _carried_out
 from falsifier.core.files import bundled
-from tests.command import Done, falsifier
+from tests.command import ROOT, Done, falsifier
 from tests.pictures import CRITICAL, OUTPUT, colours
 
 
@@ -96,10 +97,9 @@ def test_what_was_computed_is_shown_if_it_cannot_be_written(
 
 def test_export_writes_the_files_of_every_tool(folder: Path) -> None:
     done = run(folder, "export", "run", "--out", "exported", code=0)
-    assert {Path(line).name for line in done.out.splitlines()} == {
-        *("counterexample.json", "input.csv", "start_values.json", "start_values.ssv"),
-        *("inputs.mat", "replay.py", "replay.mos", "AT.fmu"),
-    }
+    page = (ROOT / "docs" / "counterexamples.md").read_text(encoding="utf-8").replace("MODEL.fmu", "AT.fmu")
+    listed = re.findall(r"`([\w.]+\.\w+)`", page.partition("**Export** writes")[2].partition("\n\nThe")[0])
+    assert {Path(line).name for line in done.out.splitlines()} == set(listed)
     assert all((folder / line).is_file() for line in done.out.splitlines())
     assert run(folder, "replay", "exported").code == 1
 

@@ -31,9 +31,7 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
     ("options", "message"),
     [
         (["--seed", "-1"], "--seed -1: expected a whole number from 0 on"),
-        (["--jobs", "0"], "--jobs 0: expected a whole number from 1 on"),
         (["--budget", "many"], "--budget 'many': expected a whole number from 1 to 10000000"),
-        (["--seconds", "many"], "--seconds many: expected a positive number"),
         (["--max-cost", "1"], "--max-cost: applies to language models only; add --llm NAME"),
         (["--max-tokens", "10", "--max-cost", "1"], "--max-tokens, --max-cost: applies to language models"),
         (["--anonymous"], "--anonymous: applies to language models only"),

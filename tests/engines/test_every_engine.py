@@ -48,8 +48,12 @@ class TestContract(EngineContract):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_engine_loads_and_bears_its_name(name: str) -> None:
-    assert make_engine(name, lag_problem(), seed=0).name == name
+def test_every_engine_is_registered_by_its_name_and_as_free_if_it_chooses_control_points(name: str) -> None:
+    problem = lag_problem(free=FREE)
+    engine = make(name, problem)
+    chosen = {c.signals["u"].times for c in drive(engine, partial(evaluate, problem), rounds=10)}
+    own = {problem.space.fixed_times(problem.space.inputs[0])}
+    assert (engine.name, ENGINES[name].is_free) == (name, chosen != own)
 
 
 def test_an_absent_package_is_an_error_with_the_command_that_brings_it(

@@ -46,12 +46,12 @@ def test_the_validator_accepts_every_kind_of_variable(build: Build, model: str, 
 def test_hashes_are_listed() -> None:
     lines = (ROOT / "fmus" / "SHA256SUMS").read_text().splitlines()
     expected = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}" for path in FMUS]
-    assert lines == expected
+    assert lines == expected, "make fmus writes them"
 
 
 def test_every_fmu_of_the_table_is_there() -> None:
     table = tomllib.loads((ROOT / "modelica" / "export" / "systems.toml").read_text())
-    assert sorted(entry["file"] for entry in table.values()) == [path.name for path in FMUS]
+    assert sorted(entry["file"] for entry in table.values()) == [path.name for path in FMUS], "state each"
 
 
 def test_parameters_are_fixed_tunable_or_constant(build: Build) -> None:

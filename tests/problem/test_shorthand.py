@@ -1,11 +1,14 @@
+from itertools import chain
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 
+from falsifier.cli.options import problem_source, requirement_options
 from falsifier.errors import SpecError
 from falsifier.problem.sections import InputSection
-from falsifier.problem.shorthand import changes_from, changes_from_options, options_from
+from falsifier.problem.shorthand import changes_from, changes_from_options, options_from, without_option
 
 
 @pytest.mark.parametrize(
@@ -39,14 +42,10 @@ def test_options_that_cannot_be_read_are_named(option: str, message: str) -> Non
 )
 def test_changes_can_be_said_as_options_again(options: dict[str, Any]) -> None:
     changes = changes_from_options(**options)
-    said: dict[str, Any] = {}
-    for name, value in options_from(changes):
-        key = {"--search": "ranges", "--set": "values"}.get(name, name.removeprefix("--").replace("-", "_"))
-        if key in ("ranges", "values", "allow", "deny"):
-            said.setdefault(key, []).append(value)
-        else:
-            said[key] = value if key == "interface" else float(value)
-    assert changes_from_options(**said) == changes
+    command = click.command()(requirement_options(lambda **_: None))
+    given = command.make_context("x", ["AT1", *chain.from_iterable(options_from(changes))]).params
+    assert problem_source(given).changes == changes
+    assert given == {}, "options that are declared, and not taken: add them to KEYS_WITH_OPTION"
 
 
 def test_values_of_python_mean_the_same_as_options() -> None:
@@ -59,7 +58,9 @@ def test_values_of_python_mean_the_same_as_options() -> None:
 
 def test_a_section_says_all_that_a_spec_can() -> None:
     section = InputSection(control_points=3, hold=0.05)
-    assert changes_from(inputs={"u": section}, parameters={}).inputs["u"] == section
+    changes = changes_from(inputs={"u": section}, parameters={})
+    assert changes.inputs["u"] == section
+    assert without_option(changes) == ["inputs.u.control_points", "inputs.u.hold"]
 
 
 @pytest.mark.parametrize("value", [(1,), (0, 1, 2, "linear", 4)])

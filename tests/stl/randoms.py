@@ -1,6 +1,8 @@
 """Random formulas and trajectories with many ties: small whole numbers, short windows, few samples."""
 
 import random
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,13 @@ from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negativ
 
 STEP = 0.5
 SIGNALS = ("x", "y", "der(b)")
+# All classes of formulas with operands, so that an operator that is added is tested with the others.
+OPERATORS: list[Any] = [
+    kind
+    for name, kind in vars(stl).items()
+    if isinstance(kind, type) and issubclass(kind, stl.Formula) and name[0] != "_"
+    if kind is not stl.Formula and not issubclass(kind, stl.Predicate | stl.Constant)
+]
 
 
 def random_expression(rng: random.Random, depth: int) -> Expression:
@@ -35,28 +44,19 @@ def random_formula(rng: random.Random, depth: int, *, windows: bool = True) -> s
     if depth == 0 or rng.random() < 0.15:
         operator: stl.Comparison = rng.choice(("<", "<=", ">", ">=", "==", "!="))
         return stl.Predicate(operator, random_expression(rng, 2), random_expression(rng, 1))
-    choice = rng.choice(["not", "and", "or", "->", "<->", "G", "F", "U", "X"])
+    kind = rng.choice(OPERATORS)
+    *operands, last = (f.name for f in fields(kind))
+    has_window = last == "window"
     window = random_window(rng) if windows and rng.random() < 0.8 else None
 
     def below() -> stl.Formula:
         part = random_formula(rng, depth - 1, windows=windows)
-        while choice in "GFU" and window is None and part.horizon(STEP) > 0:
+        while has_window and window is None and part.horizon(STEP) > 0:
             part = random_formula(rng, depth - 1, windows=windows)
         return part
 
-    match choice:
-        case "not":
-            return stl.Not(below())
-        case "X":
-            return stl.Next(below())
-        case "G":
-            return stl.Always(below(), window)
-        case "F":
-            return stl.Eventually(below(), window)
-        case "U":
-            return stl.Until(below(), below(), window)
-    joined = {"and": stl.And, "or": stl.Or, "->": stl.Implies, "<->": stl.Iff}[choice]
-    return joined(below(), below())
+    found: stl.Formula = kind(*(below() for _ in operands), window if has_window else below())
+    return found
 
 
 def random_window(rng: random.Random) -> stl.Window:

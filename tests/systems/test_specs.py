@@ -4,6 +4,7 @@ import pytest
 
 from falsifier.campaigns.analysis import read_published
 from falsifier.problem.loading import load_problem, load_problems
+from tests.systems.driving import ROOT
 
 # Requirements and coordinates of the default parameterization, then of instance 2 if any; one more for AFC27.
 SYSTEMS = {
@@ -29,11 +30,14 @@ COUPLED = {
     "SharedFeeder": ("SharedFeeder", 14, None),
     "CCcars": ("CCcars1 CCcars2 CCcars3 CCcars4 CCcars5 CCcarsx", 20, None),
 }
+BUNDLED = sorted(path.stem for path in (ROOT / "specs").glob("*.toml") if path.stem != "published")
 PUBLISHED = ("AT", "CC", "NN", "F16", "SC")
 
 
-@pytest.mark.parametrize("system", [*SYSTEMS, *COUPLED])
-def test_spec_loads(system: str) -> None:
+@pytest.mark.parametrize("system", BUNDLED)
+def test_spec_loads_and_is_in_the_list(system: str) -> None:
+    assert f"\n| {system} | " in (ROOT / "docs" / "fmus.md").read_text(encoding="utf-8")
+    assert system in SYSTEMS | COUPLED, "state its requirements and coordinates above"
     names, coordinates, coordinates_of_instance_2 = (SYSTEMS | COUPLED)[system]
     problems = load_problems(system)
     assert [p.name for p in problems] == names.split()

@@ -140,7 +140,7 @@ def needs_several(formula: stl.Formula, *, negated: bool = False) -> bool:
 def inner_windows(formula: stl.Formula, *, nested: bool = False) -> list[float]:
     """Return the lengths in s of the windows below another temporal operator."""
     lengths = []
-    if isinstance(formula, (stl.Always, stl.Eventually, stl.Until)):
+    if isinstance(formula, stl.Temporal):
         if nested and formula.window is not None:
             lengths.append(formula.window.end - formula.window.start)
         nested = True

@@ -17,7 +17,7 @@ from falsifier.core.words import with_unit
 from falsifier.stl import Formula
 from falsifier.stl.breach import compared_sides
 from falsifier.stl.expression import Expression, unit_of
-from falsifier.stl.formula import Always, Eventually, Predicate, Until
+from falsifier.stl.formula import Predicate, Temporal, Until
 from falsifier.stl.monitor import Verdict
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ def judged_windows(
     if isinstance(formula, Predicate):
         yield formula, (start, end)
         return
-    if isinstance(formula, Always | Eventually | Until):
+    if isinstance(formula, Temporal):
         window = formula.window
         begin, finish = (window.start, window.end) if window else (0.0, np.inf)
         if isinstance(formula, Until):  # its left operand counts from its own time on

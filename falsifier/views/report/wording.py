@@ -15,7 +15,7 @@ from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
-from falsifier.problem.shorthand import options_from
+from falsifier.problem.shorthand import options_from, without_option
 from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.search.request import LLMSettings, RunRequest
@@ -197,6 +197,8 @@ def run_command(request: RunRequest, *, shared: bool = False) -> str:
         return "(no command: it began with known inputs, which the manifest lists)"
     if shared and problem.stl is not None:
         return "(no command: these requirements were searched together in Python)"
+    if unsaid := without_option(problem.changes):
+        return f"(no command: no option states {listed(unsaid)}, which the manifest has)"
     target = (problem.parts.file or problem.target.partition(":")[0]) if shared else problem.target
     stated = [(name, value) for name, value in _options(request) if value is not None]
     words = chain.from_iterable([name] if value is True else [name, str(value)] for name, value in stated)

@@ -9,7 +9,7 @@ from falsifier.counterexamples.store import load_counterexample, save, to_store
 from falsifier.engines import make_engine
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.problem.shorthand import changes_from_options
+from falsifier.problem.shorthand import changes_from, changes_from_options
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
@@ -75,6 +75,8 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         "falsifier run ./-my.toml:R --stl 'x <= 1' --search u=0:1:3 --stop-time 5.0 --context a.c --engine "
         "uniform --budget 7 --max-cost 0.5 --seed 3 --jobs 2"
     )
+    source = ProblemSource(target="AT1", changes=changes_from(step_size=0.1))
+    assert "no option states step_size" in run_command(request.model_copy(update={"problems": (source,)}))
     assert "my own" in run_command(request.model_copy(update={"engine": "my own"}))
     assert "known inputs" in run_command(request.model_copy(update={"start_from": ({},)}))
     model = LLMSettings(
