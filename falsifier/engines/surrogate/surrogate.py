@@ -269,13 +269,14 @@ class Surrogate:
         if len(self.history.samples) < 2:
             return "random"
         has_inputs, differs = bool(self.problem.space.inputs), not self._levels.is_plateau
-        lead = has_inputs and self._levels.is_staircase
+        lead, is_fine = has_inputs and self._levels.is_staircase, any(self.layout.is_fine)
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
-            # Where levels lead, they do what a change would; of parameters, no time decides.
-            "changes": differs and has_inputs and not lead,
-            "region": differs,
+            # Of few control points, a model needs fewer simulations than changes do; of many cells, more.
+            # Where levels lead, they do what a change would.
+            "changes": differs and is_fine and not lead,
+            "region": differs and not is_fine,
             "cma": differs,
             "corners": not self._corners.is_done,
             "switching": bool(self._windows) and self._switched < _MOST_SWITCHING,
