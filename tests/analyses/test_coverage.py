@@ -67,6 +67,13 @@ def test_combinations_are_of_values_at_the_same_time() -> None:
     assert np.argwhere(pairs["u", "v"]).tolist() == [[0, 0], [9, 9]]
     assert np.argwhere(pairs["u", "p"]).tolist() == [[0, 5], [9, 5]]
     assert found.pairs[0].count == 2
+    # Also of values that are held between two samples only.
+    pulse = Signal((0.0, 4.012, 4.022), (0.5, 9.5, 0.5), "constant")
+    late = Signal((0.0, 4.018, 4.026), (0.5, 9.5, 0.5), "constant")
+    for hold, others in ((None, [[0, 9], [9, 0], [9, 9]]), (0.01, [[9, 9]])):
+        candidate = Candidate({"u": pulse.held(hold), "v": late.held(hold)})
+        (pair,) = coverage_of(described(*ranges), [(candidate, None)]).pairs
+        assert np.argwhere(pair.tried).tolist() == [[0, 0], *others]
 
 
 def test_many_simulations_of_many_inputs_take_little_memory() -> None:
