@@ -61,6 +61,12 @@ def test_of_a_signal_the_stretches_that_count_are_named() -> None:
     signal = Signal((0.0, 2.0, 5.0, 9.5), (-1.0, 0.5, 1.0, 0.5), "constant", hold=3.0)
     explanation = explain(problem, evaluate(problem, Candidate({"u": signal})))
     assert [e.span for e in explanation.effects[1:]] == [(0.0, 3.0), (3.0, 6.0), (6.0, 10.0)]
+    # A curve has the value that it is reset to at its control points only.
+    curve = Signal((0.0, 2.0, 5.0, 7.0, 10.0), (-1.0, 1.0, 1.0, 0.5, 1.0), "pchip")
+    problem = lag_problem("G[9,10] (x <= 0.8)", free=FREE)
+    explanation = explain(problem, evaluate(problem, Candidate({"u": curve})))
+    assert [e.span for e in explanation.effects[1:]] == [(0.0, 0.0), (2.0, 5.0), (7.0, 7.0), (10.0, 10.0)]
+    assert "With u at rest (0 V) at 10 s alone: +0.4821" in explanation.text
 
 
 def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
