@@ -159,3 +159,5 @@ def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
         built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
     )
     assert [e.name for e in read_ssd(str(file), validate=True).system.elements] == ["plant", "pi"]
+    with zipfile.ZipFile(file) as package:  # without a unit, which it would define, it is that of the FMU
+        assert b" unit=" not in package.read("SystemStructure.ssd")
