@@ -31,8 +31,7 @@ Progress = Callable[[int], None]
 class Draws(Uniform):
     """The engine ``uniform``, but with each allowed number of an integer or enumeration equally likely.
 
-    The numbers are others than those that engines draw with this seed: a search that found nothing would
-    choose which draws are looked at.
+    No engine draws these numbers with the same seed: a search that found nothing would have chosen them.
     """
 
     def _propose(self, rng: np.random.Generator) -> Proposal:

@@ -212,8 +212,8 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
             seen.reach(trajectory)
     stop_time = described.stop_time
     times = np.linspace(0.0, stop_time, _SAMPLES)
-    # Also when any input takes a new value, which it may hold for less than there is between two of these.
-    begun = [np.concatenate([[0.0], *map(_beginnings, c.signals.values())]) for c in candidates]
+    # Also when any input has a new value, if sampled and held, from the next sampling on: it may be brief.
+    begun = [[t + 0.999999 * (s.hold or 0) for s in c.signals.values() for t in s.times] for c in candidates]
     most = max(map(len, begun), default=0)
     moments = [np.minimum(np.append(times, np.resize(b, most)), stop_time) for b in begun]
     ranges = []
@@ -255,12 +255,6 @@ def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) ->
         even = cells[:, :_SAMPLES]
         times = np.stack([_had(even[:, of_slice == k], count) for k in range(SLICES)])
     return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells
-
-
-def _beginnings(signal: Signal) -> Array:
-    """Return the times in s of the control points; of what is sampled and held, when it is sampled next."""
-    at = np.asarray(signal.times)
-    return at if signal.hold is None else np.ceil(at / signal.hold - 1e-9) * signal.hold
 
 
 def _had(cells: Cells, count: int) -> Counts:

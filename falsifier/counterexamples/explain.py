@@ -37,8 +37,8 @@ class Effect:
 
     Attributes:
         name: name of the input or parameter.
-        span: from when to when in s the reset part has its value, which are equal for one point of a curve;
-            None for a parameter or a whole signal.
+        span: start and end in s of that value, equal for a point of a curve; None for all of a signal, or a
+            parameter.
         instead: the value it was reset to.
         is_rest: whether that is the rest value; otherwise it is the middle of the range.
         robustness: robustness after the reset; None if the simulation failed.
