@@ -105,15 +105,12 @@ def test_what_was_drawn_when_the_user_stopped_counts() -> None:
         assess(lag_problem(response=interrupting), budget=50)
 
 
-def test_a_search_that_found_nothing_is_stated_beside_the_bound() -> None:
+def test_what_a_search_found_is_stated_beside_the_bound_and_no_violation_is_of_probability_zero() -> None:
     searched = falsify(system(5.0), "corners", budget=4).evaluations
     found = assess(system(5.0), budget=10, searched=searched)
     assert found.searched is not None
     assert (found.searched.violation, found.searched.smallest) == (None, 4.0)
     assert "A search of 4 simulations came nearer: its smallest robustness was +4" in found.text
-
-
-def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero() -> None:
     searched = falsify(system(0.9999), "corners", budget=10).evaluations
     found = assess(system(0.9999), budget=100, searched=searched)
     assert found.violations == 0

@@ -89,16 +89,13 @@ def test_what_resetting_would_not_change_is_left_out() -> None:
     assert "x0" not in explanation.text
 
 
-def test_a_part_without_which_the_simulation_fails_is_said() -> None:
+def test_a_part_without_which_the_simulation_fails_is_said_and_a_failed_one_not_explained() -> None:
     def fails_at_rest(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
         return broken(times, {"u": 1 - inputs["u"]}, parameters)
 
     problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
     assert "With u at rest (0 V) alone, the simulation fails." in explanation.text
-
-
-def test_a_failed_simulation_cannot_be_explained() -> None:
     problem = lag_problem(response=broken)
     with pytest.raises(SpecError, match="no trajectory to explain"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))

@@ -20,10 +20,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
-from tests.fmu.small_systems import LOOP, component, run, solved, system as built
+from tests.fmu.small_systems import LINEAR, LOOP, component, run, solved, system as built
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
-LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 
 FOLLOWED = {"plant.u": Connection("pi.y", extrapolation="linear"), "pi.measured": "plant.y"}
 
