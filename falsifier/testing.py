@@ -12,6 +12,7 @@ A test module for your own engine::
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,11 +158,7 @@ class EngineContract:
         """``ask(n)`` returns n candidates, even if nothing has been told since the last call."""
         problem = lag_problem(free=FREE, parameters=[START])
         engine = self.make(problem, seed=5)
-        judge = partial(evaluate, problem)
-        for _ in range(3):
-            batch = engine.ask(4)
-            assert len(batch) == 4
-            engine.tell([judge(c) for c in batch])
+        assert len(drive(engine, partial(evaluate, problem), rounds=3, n=4)) == 3 * 4
         assert len(engine.ask(3)) == 3
         assert len(engine.ask(2)) == 2
 
@@ -182,15 +179,9 @@ class EngineContract:
     def test_survives_failures(self) -> None:
         """The engine continues after evaluations without verdict or trajectory."""
         problem = lag_problem(parameters=[START])
-        judge = partial(evaluate, problem)
-        count = 0
-
-        def half_failing(candidate: Candidate) -> Evaluation:
-            nonlocal count
-            count += 1
-            return judge(candidate) if count % 2 else Evaluation(candidate, "failed", reason="diverged")
-
-        for failing in (half_failing, lambda c: Evaluation(c, "timeout", reason="too slow")):
+        diverging = partial(Evaluation, status="failed", reason="diverged")
+        judges = cycle((partial(evaluate, problem), diverging))
+        for failing in (lambda c: next(judges)(c), partial(Evaluation, status="timeout", reason="too slow")):
             assert len(drive(self.make(problem, seed=7), failing, rounds=self.rounds)) == self.rounds
 
     def test_survives_a_plateau(self) -> None:

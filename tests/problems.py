@@ -53,6 +53,11 @@ def straight(times: Array, inputs: dict[str, Array], parameters: dict[str, float
     return {"x": np.full(times.shape, parameters["bias"])}
 
 
+def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give 0, whatever the input is."""
+    return {"x": np.zeros_like(times)}
+
+
 def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Fail always."""
     raise RuntimeError("out of order")

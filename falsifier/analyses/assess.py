@@ -16,7 +16,6 @@ from falsifier.core.arguments import finite, whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.core.words import counted, readable
 from falsifier.engines.box import Proposal
-from falsifier.engines.layout import fixed_layout
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation
@@ -30,10 +29,13 @@ Progress = Callable[[int], None]
 
 
 class Draws(Uniform):
-    """The engine ``uniform``, but with each allowed number of an integer or enumeration equally likely."""
+    """The engine ``uniform``, but with each allowed number of an integer or enumeration equally likely.
+
+    No engine draws these numbers with the same seed: a search that found nothing would have chosen them.
+    """
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
-        point = super()._propose(rng).point
+        point = super()._propose(rng.spawn(1)[0]).point
         for r, group in zip(self.box.space.ranges, self.box.groups, strict=True):
             if r.kind != "real" and r.low < r.high:
                 drawn = np.array([r.numbers[int(share * len(r.numbers))] for share in point[group]])
@@ -250,7 +252,8 @@ def _told(
     found = [k for k, e in enumerate(evaluations) if e.violated and e.candidate not in doubted]
     if not found:
         return Searched(len(evaluations), smallest, unconfirmed=len(doubted))
-    drawable = fixed_layout(space).represents(evaluations[found[0]].candidate)
+    signals = ((r, evaluations[found[0]].candidate.signals[r.name]) for r in space.inputs)
+    drawable = all(space.is_fixed(r, signal) or not signal.switches for r, signal in signals)
     return Searched(len(evaluations), smallest, found[0] + 1, drawable, len(doubted))
 
 

@@ -212,14 +212,15 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
             seen.reach(trajectory)
     stop_time = described.stop_time
     times = np.linspace(0.0, stop_time, _SAMPLES)
+    # Also when any input has a new value, if sampled and held, from the next sampling on: it may be brief.
+    begun = [[t + 0.999999 * (s.hold or 0) for s in c.signals.values() for t in s.times] for c in candidates]
+    most = max(map(len, begun), default=0)
+    moments = [np.minimum(np.append(times, np.resize(b, most)), stop_time) for b in begun]
     ranges = []
     for r in described.inputs:
         signals = [c.signals[r.name].stepped(stop_time) for c in candidates]
         paces = Counter(pace_of(signal, r, stop_time) for signal in signals)
-        # Also what is held only between two of these times; if sampled and held, from the next sampling on.
-        most = max((len(s.times) for s in signals), default=0)
-        moments = [np.append(times, np.resize(s.times, most) + 0.999999 * (s.hold or 0)) for s in signals]
-        values = [s.sample(np.minimum(at, stop_time)) for s, at in zip(signals, moments, strict=True)]
+        values = [signal.sample(at) for signal, at in zip(signals, moments, strict=True)]
         ranges.append(_of_range(r, values, {p: paces[p] for p in PACES}))
     for p in described.parameters:
         ranges.append(_of_range(p, [[c.parameters[p.name]] for c in candidates], {}))
@@ -243,7 +244,7 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
 def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) -> tuple[RangeCoverage, Cells]:
     """Return what was tried of an input or parameter, and the part of each value, shape (simulations, n).
 
-    n is _SAMPLES for an input, which may have more values, and 1 for a parameter, which has no paces.
+    n is 1 for a parameter, which has no paces; an input has _SAMPLES even values, and more after them.
     """
     values = np.array(tried, np.float64) if tried else np.empty((0, _SAMPLES if paces else 1))
     cells, count = cells_of(r, values), len(edges_of(r))
@@ -253,7 +254,7 @@ def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) ->
         of_slice = np.arange(_SAMPLES) * SLICES // _SAMPLES
         even = cells[:, :_SAMPLES]
         times = np.stack([_had(even[:, of_slice == k], count) for k in range(SLICES)])
-    return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells[:, :_SAMPLES].copy()
+    return RangeCoverage(r, low, high, _had(cells, count), times, paces), cells
 
 
 def _had(cells: Cells, count: int) -> Counts:

@@ -37,7 +37,8 @@ class Effect:
 
     Attributes:
         name: name of the input or parameter.
-        span: start and end in s of the reset part; None for a parameter or a whole signal.
+        span: start and end in s of that value, equal for a point of a curve; None for all of a signal, or a
+            parameter.
         instead: the value it was reset to.
         is_rest: whether that is the rest value; otherwise it is the middle of the range.
         robustness: robustness after the reset; None if the simulation failed.
@@ -114,7 +115,8 @@ class Explanation:
         return sorted(spans, key=lambda e: -(e.robustness or 0.0))[:1] if rising else []
 
     def _told(self, effect: Effect) -> str:
-        during = "" if effect.span is None else f" from {' to '.join(readable(t, 4) for t in effect.span)} s"
+        ends = dict.fromkeys(readable(t, 4) for t in effect.span or ())
+        during = f" {'from' if len(ends) > 1 else 'at'} {' to '.join(ends)} s" if ends else ""
         what = f"With {effect.name} {self._instead(effect)}{during} alone"
         if effect.robustness is None:
             return f"{what}, the simulation fails."
@@ -195,6 +197,7 @@ def _longest(signal: Signal, stop_time: float) -> list[tuple[int, int]]:
 
 
 def _span(signal: Signal, first: int, end: int, stop_time: float) -> tuple[float, float]:
-    """Interval in s that control points influence: between the unchanged neighbours, or to the next step."""
-    finish = min(signal.moments[end], stop_time) if end < len(signal.times) else stop_time
-    return signal.moments[first if signal.interpolation == "constant" else max(first - 1, 0)], finish
+    """Interval in s in which equal control points are the value: up to the last one, or to the next step."""
+    times = (*signal.moments, stop_time)
+    last = end - (signal.interpolation != "constant" and end < len(signal.times))
+    return times[first], min(times[last], stop_time)

@@ -114,10 +114,10 @@ class RobustnessMap:
         changes = counted(len(self.robustness), "random change")
         if self.original < 0:
             (size, share), *larger = self.persistence
-            shares = f"{_rounded(share)} % of changes up to {_percent(size)} of the range still violate"
+            shares = f"{_rounded(share)} % of those up to {_percent(size)} of the range still violate"
             shares += "".join(f", {_rounded(share)} % up to {_percent(size)}" for size, share in larger)
             names = listed(list(dict.fromkeys(c.name for c in self.coordinates)))
-            return f"{shares} ({changes} of {names} at once). {self._followed}"
+            return f"of {changes} of {names} at once, {shares}. {self._followed}"
         tried = f"{changes} of up to {_percent(self.persistence[-1][0])} of the range"
         violating = int((self.robustness < 0).sum())
         found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"

@@ -23,16 +23,19 @@ def system(limit: float):  # type: ignore[no-untyped-def]
     return lag_problem(f"G[0,10] (x <= {limit})", inputs=0, parameters=[BIAS], response=straight)
 
 
-def test_violations_are_those_of_the_uniform_engine_with_exact_bounds() -> None:
+def test_violations_are_those_of_draws_that_no_search_with_this_seed_made_with_exact_bounds() -> None:
     found = assess(system(0.8), budget=60, seed=3)
-    same = falsify(system(5.0), "uniform", budget=60, seed=3).evaluations
-    expected = sum(e.candidate.parameters["bias"] > 0.8 for e in same)
+    drawn = [candidate.parameters["bias"] for candidate in Draws(system(0.8), seed=3).ask(60)]
+    for engine in ("uniform", "corners"):
+        searched = falsify(system(5.0), engine, budget=60, seed=3).evaluations
+        assert not {e.candidate.parameters["bias"] for e in searched} & set(drawn), engine
+    expected = sum(bias > 0.8 for bias in drawn)
     assert (found.drawn, found.violations) == (60, expected) and expected > 0
     assert found.bound == upper_bound(expected, 60, 0.95)
     assert found.interval == (lower_bound(expected, 60, 0.975), upper_bound(expected, 60, 0.975))
     always = replace(found, bound=0.99441, interval=(0.99959, 1.0)).text
     assert "is at most 0.995." in always and "between 0.999 and 1." in always, "rounded, and still bounds"
-    assert found.smallest.robustness == pytest.approx(0.8 - max(e.candidate.parameters["bias"] for e in same))
+    assert found.smallest.robustness == pytest.approx(0.8 - max(drawn))
 
 
 def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
@@ -54,8 +57,6 @@ def test_a_condition_that_never_held_makes_the_bound_say_little() -> None:
         "G[0,10] (x >= 5 -> x <= 0)", inputs=0, parameters=[BIAS], response=straight, name="VACUOUS"
     )
     found = assess(problem, budget=30, seed=1)
-    run = falsify(problem, "uniform", budget=30, seed=1)
-    assert found.findings == run.findings
     assert [finding.kind for finding in found.findings] == ["condition"]
     for part in (
         "the probability of a violation is at most 0.095",
@@ -104,15 +105,12 @@ def test_what_was_drawn_when_the_user_stopped_counts() -> None:
         assess(lag_problem(response=interrupting), budget=50)
 
 
-def test_a_search_that_found_nothing_is_stated_beside_the_bound() -> None:
+def test_what_a_search_found_is_stated_beside_the_bound_and_no_violation_is_of_probability_zero() -> None:
     searched = falsify(system(5.0), "corners", budget=4).evaluations
     found = assess(system(5.0), budget=10, searched=searched)
     assert found.searched is not None
     assert (found.searched.violation, found.searched.smallest) == (None, 4.0)
     assert "A search of 4 simulations came nearer: its smallest robustness was +4" in found.text
-
-
-def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero() -> None:
     searched = falsify(system(0.9999), "corners", budget=10).evaluations
     found = assess(system(0.9999), budget=100, searched=searched)
     assert found.violations == 0
@@ -125,11 +123,13 @@ def test_a_violation_that_a_search_found_and_no_draw_is_not_of_probability_zero(
 
 def test_a_violation_with_signals_that_are_not_drawn_says_nothing_of_the_draws() -> None:
     problem = lag_problem(free=FREE)
-    edge = Candidate({"u": Signal((0.0, 0.1), (0.9, 1.0))})
-    assert evaluate(problem, edge).violated
-    found = assess(problem, budget=5, searched=[evaluate(problem, edge)])
-    assert found.searched is not None and not found.searched.drawable
-    assert "control points that are not drawn" in found.text and "not zero" not in found.text
+    edge = evaluate(problem, Candidate({"u": Signal((0.0, 0.1), (0.9, 1.0))}))
+    full = evaluate(problem, Candidate({"u": Signal((0.0,), (1.0,), "constant")}))
+    assert edge.violated and full.violated
+    found = assess(problem, budget=5, searched=[edge])
+    assert "control points that are not drawn here: the bound says nothing about it." in found.text
+    # However a constant input is written, it is one of those that are drawn.
+    assert assess(problem, budget=5, searched=[full]).searched == Searched(1, full.robustness, 1)
 
 
 def test_what_a_probability_is_of_is_said() -> None:

@@ -30,14 +30,11 @@ def tried(*signals: Signal, trajectory: Trajectory | None = None) -> Coverage:
     return coverage_of(described(u), [(Candidate({"u": s}), trajectory) for s in signals])
 
 
-def test_parts_of_a_range_that_no_value_was_in_are_gaps() -> None:
+def test_parts_of_a_range_that_no_value_was_in_are_gaps_and_at_first_all_of_them() -> None:
     (u,) = tried(Signal((0.0,), (5.0,)), Signal((0.0, 10.0), (20.0, 49.0), "linear")).ranges
     assert (u.low, u.high) == (5.0, 49.0)
     assert u.parts.tolist() == [1, 0, 1, 1, 1, 0, 0, 0, 0, 0]
     assert u.gaps == ((10.0, 20.0), (50.0, 100.0))
-
-
-def test_before_the_first_simulation_nothing_was_tried() -> None:
     p = Range(name="p", low=0.0, high=1.0)
     found = coverage_of(described(Range(name="u", low=0.0, high=1.0), parameters=(p,)), [])
     assert [(r.low, r.tried, r.gaps) for r in found.ranges] == [(None, 0, ((0.0, 1.0),))] * 2
@@ -67,6 +64,13 @@ def test_combinations_are_of_values_at_the_same_time() -> None:
     assert np.argwhere(pairs["u", "v"]).tolist() == [[0, 0], [9, 9]]
     assert np.argwhere(pairs["u", "p"]).tolist() == [[0, 5], [9, 5]]
     assert found.pairs[0].count == 2
+    # Also of values that are held between two samples only.
+    pulse = Signal((0.0, 4.012, 4.022), (0.5, 9.5, 0.5), "constant")
+    late = Signal((0.0, 4.018, 4.026), (0.5, 9.5, 0.5), "constant")
+    for hold, others in ((None, [[0, 9], [9, 0], [9, 9]]), (0.01, [[9, 9]])):
+        candidate = Candidate({"u": pulse.held(hold), "v": late.held(hold)})
+        (pair,) = coverage_of(described(*ranges), [(candidate, None)]).pairs
+        assert np.argwhere(pair.tried).tolist() == [[0, 0], *others]
 
 
 def test_many_simulations_of_many_inputs_take_little_memory() -> None:
@@ -105,7 +109,7 @@ def test_outputs_and_modes_are_read_from_trajectories() -> None:
     assert (gear.seen, gear.never, gear.changes) == (("N", "D"), ("R",), (("N", "D"),))
 
 
-def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> None:
+def test_a_run_is_read_from_its_directory_alone_and_what_is_no_path_refused(tmp_path: Path) -> None:
     result = falsify(lag_problem("G[0,10] (x <= 2)", inputs=2), "uniform", budget=6, directory=tmp_path)
     found = coverage(tmp_path)
     values = [v for e in result.evaluations for v in e.candidate.signals["u"].values]
@@ -113,9 +117,6 @@ def test_a_run_is_read_from_its_directory_without_its_model(tmp_path: Path) -> N
     assert found.ranges[0].low == pytest.approx(min(values))
     assert found.ranges[0].high == pytest.approx(max(values))
     assert [o.name for o in found.outputs] == ["x"]
-
-
-def test_what_is_no_path_is_refused() -> None:
     with pytest.raises(SpecError, match="coverage: expected a run directory, got None"):
         coverage(None)  # type: ignore[arg-type]
 

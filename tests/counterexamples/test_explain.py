@@ -61,6 +61,12 @@ def test_of_a_signal_the_stretches_that_count_are_named() -> None:
     signal = Signal((0.0, 2.0, 5.0, 9.5), (-1.0, 0.5, 1.0, 0.5), "constant", hold=3.0)
     explanation = explain(problem, evaluate(problem, Candidate({"u": signal})))
     assert [e.span for e in explanation.effects[1:]] == [(0.0, 3.0), (3.0, 6.0), (6.0, 10.0)]
+    # A curve has the value that it is reset to at its control points only.
+    curve = Signal((0.0, 2.0, 5.0, 7.0, 10.0), (-1.0, 1.0, 1.0, 0.5, 1.0), "pchip")
+    problem = lag_problem("G[9,10] (x <= 0.8)", free=FREE)
+    explanation = explain(problem, evaluate(problem, Candidate({"u": curve})))
+    assert [e.span for e in explanation.effects[1:]] == [(0.0, 0.0), (2.0, 5.0), (7.0, 7.0), (10.0, 10.0)]
+    assert "With u at rest (0 V) at 10 s alone: +0.4821" in explanation.text
 
 
 def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
@@ -83,16 +89,13 @@ def test_what_resetting_would_not_change_is_left_out() -> None:
     assert "x0" not in explanation.text
 
 
-def test_a_part_without_which_the_simulation_fails_is_said() -> None:
+def test_a_part_without_which_the_simulation_fails_is_said_and_a_failed_one_not_explained() -> None:
     def fails_at_rest(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
         return broken(times, {"u": 1 - inputs["u"]}, parameters)
 
     problem = lag_problem("G[0,10] (x >= 0.5)", response=fails_at_rest)
     explanation = explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
     assert "With u at rest (0 V) alone, the simulation fails." in explanation.text
-
-
-def test_a_failed_simulation_cannot_be_explained() -> None:
     problem = lag_problem(response=broken)
     with pytest.raises(SpecError, match="no trajectory to explain"):
         explain(problem, evaluate(problem, problem.space.decode([1.0] * 4)))

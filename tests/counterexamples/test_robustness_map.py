@@ -38,13 +38,13 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     np.testing.assert_array_equal(found.robustness < 0, found.values[:, 0] + 1e-9 > 0.5)
     assert found.sizes.max() <= 0.1 + 1e-12
     assert found.surface.shape == (11, 11)
-    assert "100 % of changes up to 1.25 % of the range still violate, " in found.text
+    assert "of u and x0 at once, 100 % of those up to 1.25 % of the range still violate, " in found.text
     # At 10 s u has full effect, x0 almost none.
     u, x0 = found.influences
     assert u < -0.99 and abs(x0) < 0.3
     assert f"the robustness follows u [V] ({u:+.2f}) and x0 ({x0:+.2f}) most (rank correlation)" in found.text
     many = replace(found, robustness=np.r_[np.nan, -np.ones(999)], sizes=np.full(1000, 0.1)).text
-    assert "99 % of changes up to 10 %" in many and "1 simulation failed and counted as no violation." in many
+    assert "99 % of those up to 10 %" in many and "1 simulation failed and counted as no violation." in many
 
 
 def test_a_margin_of_nothing_is_shown_as_everywhere_else() -> None:

@@ -19,7 +19,7 @@ from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse
 from falsifier.testing import FREE, START, Array, EngineContract, Response, drive, lag, lag_problem
 from tests.engines.support import HASTY
-from tests.problems import Columns
+from tests.problems import Columns, still
 
 NAMES = [name for name in ENGINES if name != "hybrid"]
 FORMULAS = (
@@ -105,10 +105,6 @@ def test_signals_that_are_not_searched_are_no_obstacle(name: str, formula: str) 
             assert evaluation.verdict is not None, evaluation.reason
 
 
-def constant(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    return {"x": np.zeros_like(times)}
-
-
 def at_the_ends(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
     return {"x": 1.7e308 * np.sign(lag(times, inputs, parameters)["x"])}
 
@@ -127,7 +123,7 @@ def often_failing(times: Array, inputs: Columns, parameters: dict[str, float]) -
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("response", [constant, at_the_ends, with_spikes, often_failing])
+@pytest.mark.parametrize("response", [still, at_the_ends, with_spikes, often_failing])
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("formula", ["G[0,10] (x <= 3)", "G[0,10] (x <= 3) or F[0,10] (x >= 9)"])
 def test_no_number_ends_a_search_or_warns(formula: str, name: str, response: Response) -> None:

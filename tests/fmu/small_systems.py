@@ -13,6 +13,7 @@ from tests.fmu import fixtures
 from tests.fmu.fixtures import path
 
 LOOP: dict[str, str | Connection] = {"plant.u": "pi.y", "pi.measured": "plant.y"}
+LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 STEP = 0.1
 
 

@@ -1,7 +1,5 @@
-from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from falsifier import Candidate, ParameterRange, Signal, evaluate
@@ -16,6 +14,7 @@ from falsifier.search.vacuity import Effects
 from falsifier.testing import Array, lag, lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
+from tests.problems import still
 from tests.searches import stop_after
 
 
@@ -70,12 +69,8 @@ def test_a_predicate_far_from_its_threshold_is_told() -> None:
     assert not findings(lag_problem("1 <= 20")), "no simulation could come nearer"
 
 
-def dead(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    return {"x": np.zeros_like(times)}
-
-
 def test_a_requirement_that_nothing_moves_is_told() -> None:
-    problem = lag_problem("G[0,10] (x <= 0.1)", response=dead)
+    problem = lag_problem("G[0,10] (x <= 0.1)", response=still)
     (found,) = findings(problem)
     assert found.kind == "constant"
     assert found.text.startswith(

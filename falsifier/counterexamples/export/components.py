@@ -231,8 +231,9 @@ def _connectors(element: Element, variables: Iterable[Variable]) -> None:
     ports = SubElement(element, f"{_SSD}Connectors")
     for variable in found:
         port = SubElement(ports, f"{_SSD}Connector", {"name": variable.name, "kind": variable.causality})
-        unit = {"unit": variable.unit} if variable.unit and variable.kind == "real" else {}
-        SubElement(port, f"{_SSC}{_TYPES[variable.kind]}", unit)
+        # A component's is that of the FMU, whose definition of the unit the package would have to repeat.
+        unit = {"unit": variable.unit} if variable.unit and element.tag == f"{_SSD}System" else {}
+        SubElement(port, f"{_SSC}{_TYPES[variable.kind]}", unit if variable.kind == "real" else {})
 
 
 def _bindings(element: Element, system: System, files: Iterable[str]) -> None:

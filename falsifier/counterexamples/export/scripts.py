@@ -117,6 +117,7 @@ def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> s
         model=modelica_path(name),
         stop_time=problem.experiment.stop_time,
         intervals=problem.experiment.samples - 1,
+        tolerance=f" tolerance={stated!r}," if (stated := problem.experiment.tolerance) else "",
         flags=modelica_string(shlex.join(flags)),  # omc starts the simulation with a shell
     )
 

@@ -20,10 +20,9 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
-from tests.fmu.small_systems import LOOP, component, run, solved, system as built
+from tests.fmu.small_systems import LINEAR, LOOP, component, run, solved, system as built
 
 DRIVE = Candidate({"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}, {"plant.T": 1.5, "pi.k": 1.0})
-LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 
 FOLLOWED = {"plant.u": Connection("pi.y", extrapolation="linear"), "pi.measured": "plant.y"}
 
@@ -159,3 +158,5 @@ def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
         built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
     )
     assert [e.name for e in read_ssd(str(file), validate=True).system.elements] == ["plant", "pi"]
+    with zipfile.ZipFile(file) as package:  # without a unit, which it would define, it is that of the FMU
+        assert b" unit=" not in package.read("SystemStructure.ssd")

@@ -16,14 +16,13 @@ from falsifier.core.signals import Signal
 from falsifier.fmu import Component, Connection, Coupling, Frame, System
 from falsifier.problem.loading import load_problem
 from tests.fmu.fixtures import path
-from tests.fmu.small_systems import LOOP, component, system
+from tests.fmu.small_systems import LINEAR, LOOP, component, system
 
 GOLDEN: dict[str, dict[str, list[float]]] = json.loads(Path(__file__).with_name("golden.json").read_text())
 Case = tuple[System, Experiment, Mapping[str, Signal], Mapping[str, float]]
 
 DRIVE = {"pi.r": Signal((0.0, 0.35), (0.5, 1.5), "constant")}
 GAINS = {"plant.T": 1.5, "pi.k": 0.5}
-LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 SCALED = {"plant.u": Connection("pi.y", factor=0.5, offset=0.25), "pi.measured": Connection("plant.y")}
 
 

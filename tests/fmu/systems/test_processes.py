@@ -10,13 +10,12 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Component, Connection, Coupling
 from tests.campaigns.test_kill import children
-from tests.fmu.small_systems import LOOP, component, pids, run, solved, system
+from tests.fmu.small_systems import LINEAR, LOOP, component, pids, run, solved, system
 from tests.fmu.support import CRASH, HANG
 from tests.patience import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are forked, and end with a parent")
 EACH = Coupling(isolation="each")
-LINEAR = {"plant.u": Connection("pi.y"), "pi.measured": Connection("plant.y", extrapolation="linear")}
 BAD = {**LOOP, "pi.r": "bad.y"}
 
 
