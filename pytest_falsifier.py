@@ -8,7 +8,7 @@ every start and the package takes time to import.
 import re
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,19 +37,23 @@ _WORDS = re.compile(r"^[\s\[]*[\"']?([\w-]+)", re.MULTILINE)
 _NEAR = 0.8
 
 
-class UntestedWarning(UserWarning):
-    """A requirement was not violated, but a part of it was not tested."""
+class RequirementWarning(UserWarning):
+    """Base of all warnings of this plugin."""
 
 
-class UnconfirmedWarning(UserWarning):
+class UntestedWarning(RequirementWarning):
+    """A requirement was not violated, but a part of it was not tested, or simulations failed."""
+
+
+class UnconfirmedWarning(RequirementWarning):
     """A requirement was violated, but no violation was confirmed."""
 
 
-class UncollectedWarning(UserWarning):
+class UncollectedWarning(RequirementWarning):
     """A TOML file may be meant as a spec and is not collected."""
 
 
-class UnusedCounterexampleWarning(UserWarning):
+class UnusedCounterexampleWarning(RequirementWarning):
     """A stored counterexample tests nothing any more."""
 
 
@@ -86,8 +90,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--falsifier-strict",
         action="store_true",
         default=None,
-        help="fail if a part of a requirement was not tested, such as a condition that never held, or if "
-        "a violation was found and not confirmed",
+        help="fail if a part of a requirement was not tested, such as a condition that never held, if "
+        "simulations failed, or if a violation was found and not confirmed",
     )
     for name in _OPTIONS:
         kind: Any = "bool" if name == "strict" else None
@@ -135,7 +139,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
                     f"{_short(file_path)} is not collected: {why}. If it is a spec, correct it; if not, "
                     f"--ignore={_short(file_path)} leaves it out"
                 )
-                _warn(UncollectedWarning, file_path, text)
+                _warn_of_collection(parent.session, UncollectedWarning, file_path, text)
             return None
     return SpecFile.from_parent(parent, path=file_path)
 
@@ -194,7 +198,7 @@ def pytest_collection_finish(session: pytest.Session) -> None:
                 f"{_short(path)} is not replayed, because {_short(spec)} {said}. If it was renamed or moved, "
                 f"move the file to {_short(now)}; otherwise delete it"
             )
-            _warn(UnusedCounterexampleWarning, path, text)
+            _warn_of_collection(session, UnusedCounterexampleWarning, path, text)
 
 
 def _is_of_a_test(file: Path) -> bool:
@@ -209,7 +213,22 @@ def _is_of_a_test(file: Path) -> bool:
     return source is None or source.stl is not None
 
 
-def _warn(kind: type[Warning], file: Path, text: str, line: int = 1) -> None:
+def _warn_of_collection(
+    session: pytest.Session, kind: type[RequirementWarning], file: Path, text: str
+) -> None:
+    """Warn while tests are collected; where warnings are errors, it is an error of the collection.
+
+    An exception would end pytest, with a traceback through it and without running any test.
+    """
+    try:
+        _warn(kind, file, text)
+    except kind as error:
+        report = pytest.CollectReport(str(_short(file)), "failed", str(error), [])
+        session.ihook.pytest_collectreport(report=report)
+
+
+def _warn(kind: type[RequirementWarning], file: Path, text: str, line: int = 1) -> None:
+    __tracebackhide__ = True
     from falsifier.core.literals import printable
 
     warnings.warn_explicit(printable(text), kind, filename=printable(str(file)), lineno=line)
@@ -250,7 +269,9 @@ class RequirementItem(pytest.Item):
         from falsifier.core.literals import printable
         from falsifier.errors import FalsifierError
 
-        expected = FalsifiedError | UntestedError | FalsifierError | OSError | MemoryError
+        expected = (
+            FalsifiedError | UntestedError | RequirementWarning | FalsifierError | OSError | MemoryError
+        )
         if isinstance(excinfo.value, expected):
             return printable(str(excinfo.value)) or "not enough memory"
         return super().repr_failure(excinfo, style)
@@ -334,7 +355,9 @@ def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: 
                     f"{_short(file)} tests nothing. {replayed.text}. Undo what has changed, or delete "
                     "the file; a search may find another one"
                 )
-                _warn(UnusedCounterexampleWarning, file, text)
+                # Where warnings are errors, a violation is the more important one.
+                with suppress(UnusedCounterexampleWarning) if checked.counterexample else nullcontext():
+                    _warn(UnusedCounterexampleWarning, file, text)
         if checked.counterexample is not None:
             raise FalsifiedError(_message(item, checked, database))
     finally:
@@ -344,14 +367,15 @@ def _check(item: pytest.Item, problem: "Problem | str | PathLike[str]", stated: 
 
 
 def _tell_doubts(item: pytest.Item, checked: "Checked", *, strict: bool) -> None:
-    """Warn of parts of the requirement that were not tested and of unconfirmed violations, or fail."""
+    """Warn of what was not tested, also because simulations failed, and not confirmed, or fail."""
     __tracebackhide__ = True
     name, result = checked.problem.name, checked.result
     untested = [f.text for f in result.findings if f.untested] if result else []
+    untested += [failure.text for failure in result.failures] if result else []
     again = ((file, r) for file, r in checked.replayed.items() if r.status == "fragile")
     unconfirmed = [f"{_short(file)}: {replayed.text}" for file, replayed in again]
     unconfirmed += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)] if result else []
-    told: list[tuple[type[Warning], str, list[str]]] = [
+    told: list[tuple[type[RequirementWarning], str, list[str]]] = [
         (UnconfirmedWarning, f"{name} was violated, but no violation is confirmed", unconfirmed),
         (UntestedWarning, f"{name} is not violated, but not all of it was tested", untested),
     ]
@@ -443,7 +467,12 @@ def _command(item: pytest.Item, file: Path, database: "Database") -> str:
     # A file that was moved here loads what it was found for.
     if stored.problem is not None and database.place(stored.requirement, stored.problem) == file.parent:
         return f"falsifier replay {shell_word(_short(file))}"
-    return f"pytest {'--falsifier ' if isinstance(item, RequirementItem) else ''}'{item.nodeid}'"
+    options = ["--falsifier"] if isinstance(item, RequirementItem) else []
+    if folder := item.config.getoption("falsifier_database"):
+        options += ["--falsifier-database", shell_word(folder)]
+    # As seen from here, and not from pytest's root.
+    name = "::".join((str(_short(item.path)), *item.nodeid.split("::")[1:]))
+    return " ".join(["pytest", *options, shell_word(name)])
 
 
 def _short(path: Path) -> Path:

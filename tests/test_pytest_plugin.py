@@ -18,6 +18,7 @@ from falsifier.testing import lag_problem
 from pytest_falsifier import UnconfirmedWarning, UntestedError, UntestedWarning, _tell_doubts
 from tests.command import ROOT, Done, forked
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.problems import broken
 from tests.stepped import euler_problem
 
 SPEC = """
@@ -84,15 +85,6 @@ def test_each_requirement_is_a_test_and_a_counterexample_is_shown_stored_and_rep
     assert run_pytest(repository, "--falsifier", "specs", "-m", "not falsifier", "--co").code == 5
 
 
-def test_a_broken_spec_is_an_error_that_names_the_key(repository: Path) -> None:
-    broken = repository / "broken.toml"
-    broken.write_text(SPEC.replace("control_points = 2", "control_pionts = 2"))
-    done = run_pytest(repository, "--falsifier", "broken.toml")
-    assert done.code == 2
-    assert "inputs.throttle.control_pionts: unknown key; did you mean 'control_points'" in done.out
-    assert "Traceback" not in done.out
-
-
 def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_alone(
     repository: Path, tmp_path: Path
 ) -> None:
@@ -100,6 +92,7 @@ def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_a
     files = {
         "system.toml": f'[components.car]\nfmu = "AT.fmu"\n{system}',
         "conflict.toml": f"{SPEC}<<<<<<< HEAD\n",
+        "pionts.toml": SPEC.replace("control_points = 2", "control_pionts = 2"),
         "modle.toml": SPEC.replace("[model]", "[modle]"),
         "requirement.toml": SPEC.replace("[requirements.", "[requirement."),
         "broken.toml": "[model\nfmu=",
@@ -110,10 +103,11 @@ def test_what_is_meant_as_a_spec_is_collected_or_told_and_other_files_are_left_a
     for name, text in files.items():
         (tmp_path / name).write_text(text)
     done = run_pytest(tmp_path, "--falsifier", "--co", "--continue-on-collection-errors")
-    assert done.code == 1 and "3 errors" in done.out, done.out
+    assert done.code == 1 and "4 errors" in done.out and "Traceback" not in done.out, done.out
     for part in (
         "<SpecFile system.toml>",
         "conflict.toml: not valid TOML: Invalid statement",
+        "inputs.throttle.control_pionts: unknown key; did you mean 'control_points'",
         "modle.toml: modle: unknown key; did you mean 'model'",
         "requirement.toml: requirement: unknown key; did you mean 'requirements'",
         "broken.toml is not collected: it cannot be read as TOML (Expected ']'",
@@ -131,8 +125,11 @@ def test_the_fixture_and_the_marker_in_ordinary_tests(repository: Path) -> None:
     done = run_pytest(repository, "tests")
     assert "1 failed, 9 passed" in done.out, done.out
     assert "LAG is violated by a counterexample found by a search" in done.out
-    assert "replay with    pytest 'tests/test_lag.py::test_violated'" in done.out
+    assert "replay with    pytest tests/test_lag.py::test_violated" in done.out
     assert "pytest_falsifier.py" not in done.out
+    elsewhere = ("--falsifier-database", "my own", "-k", "test_violated")
+    again = run_pytest(repository / "specs", f"{repository}/tests", *elsewhere)
+    assert f"pytest --falsifier-database 'my own' {repository}/tests/test_lag.py::test_violated" in again.out
 
 
 def test_importing_the_plugin_loads_nothing_else() -> None:
@@ -175,12 +172,15 @@ def test_specs_of_one_name_have_their_own_counterexamples_and_what_is_unused_is_
         f"car.toml/fast/{stored[1].name} is not replayed, because b/car.toml does not exist.",
     ):
         assert part in done.out
+    errors = ("-W", "error::pytest_falsifier.RequirementWarning", "--continue-on-collection-errors")
+    done = run_pytest(tmp_path, *options, *errors, "a")
+    assert "1 passed" in done.out and done.out.count("ERROR collecting counterexamples/") == 2, done.out
 
     stored[0].parent.rename(stored[0].parent.with_name("slow"))
     spec.write_text(spec.read_text().replace("500", "120"))
     done = run_pytest(tmp_path, *options, "a")
     assert "a/car.toml has no" not in done.out and "violated by a stored counterexample" in done.out, done.out
-    assert "replay with    pytest --falsifier 'a/car.toml::slow'" in done.out
+    assert "replay with    pytest --falsifier a/car.toml::slow" in done.out
     spec.write_text(spec.read_text().replace("[inputs.throttle]", "[inputs.throttle]\nrange = [0, 50]"))
     done = run_pytest(tmp_path, *options, "a")
     assert f"slow/{stored[0].name} tests nothing. slow: the counterexample does not fit" in done.out, done.out
@@ -197,22 +197,22 @@ def test_a_counterexample_that_cannot_be_stored_or_drawn_is_shown(repository: Pa
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"),
+    ("option", "said"),
     [
-        ("budget", "abc", "a whole number from 1 to 10000000, got 'abc'"),
-        ("budget", "99999999999", "a whole number from 1 to 10000000, got '99999999999'"),
-        ("seed", "-1", "a whole number from 0 to .*, got '-1'"),
-        ("strict", "x", "x"),
-        ("engine", "surogate", "unknown engine 'surogate'; did you mean 'surrogate'"),
-        ("engine", "hybrid", "hybrid asks a language model, and tests ask none"),
+        ("-ofalsifier_budget=abc", "budget: expected a whole number from 1 to 10000000, got 'abc'"),
+        ("-ofalsifier_budget=99999999999", "budget: .* from 1 to 10000000, got '99999999999'"),
+        ("-ofalsifier_seed=-1", "seed: expected a whole number from 0 to .*, got '-1'"),
+        ("-ofalsifier_strict=x", "strict: .*x"),
+        ("-ofalsifier_engine=surogate", "engine: unknown engine 'surogate'; did you mean 'surrogate'"),
+        ("-ofalsifier_engine=hybrid", "engine: hybrid asks a language model, and tests ask none"),
+        ("--falsifier-budget=0", "budget: .*from 1 to 10000000, got 0"),
+        ("--falsifier-budget=-5", "budget: .*from 1 to 10000000, got -5"),
     ],
 )
-def test_a_wrong_ini_value_is_a_usage_error_that_names_the_key(
-    repository: Path, key: str, value: str, said: str
-) -> None:
-    done = run_pytest(repository, "--falsifier", "specs", "-o", f"falsifier_{key}={value}")
+def test_a_wrong_setting_is_a_usage_error_that_names_it(repository: Path, option: str, said: str) -> None:
+    done = run_pytest(repository, "--falsifier", "specs", option)
     assert done.code == 4 and "Traceback" not in done.err
-    assert re.search(f"ERROR: falsifier_{key}: .*{said}", done.err), done.err
+    assert re.search(f"ERROR: falsifier_{said}", done.err), done.err
 
 
 HOSTILE = """
@@ -225,12 +225,6 @@ range = [1, 3]
 [requirements."../../[31mred::line"]
 formula = "y >= -1"
 """
-
-
-def test_a_budget_of_nothing_is_refused_like_any_other_wrong_one(repository: Path) -> None:
-    for budget in ("0", "-5"):
-        done = run_pytest(repository, "--falsifier", "specs", "--falsifier-budget", budget)
-        assert done.code == 4 and f"from 1 to 10000000, got {budget}" in done.err, done.err
 
 
 def test_lists_of_packages_and_files_that_are_not_asked_for_are_no_errors(repository: Path) -> None:
@@ -268,6 +262,9 @@ def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
         _tell_doubts(request.node, checked, strict=False)
     with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
         _tell_doubts(request.node, checked, strict=True)
+    half = check(lag_problem("G[0,10] (x <= 2)", response=broken), engine="sobol", budget=4)
+    with pytest.raises(UntestedError, match=r"not all of it was tested\n2 simulations failed: .*x' is nan"):
+        _tell_doubts(request.node, half, strict=True)
 
 
 def test_a_violation_that_is_not_confirmed_is_a_warning_and_with_strict_an_error(

@@ -23,7 +23,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record.run import falsify
 from falsifier.search import DEFAULT_SIMULATIONS
-from falsifier.search.budget import Budget
+from falsifier.search.budget import Budget, Spent
 from falsifier.search.result import Result
 
 
@@ -89,7 +89,8 @@ def check(
         database: where counterexamples are stored; None: nowhere.
 
     Raises:
-        SimulationError: if a stored counterexample cannot be simulated, or all of the search fail.
+        SimulationError: if a stored counterexample cannot be simulated, or most of the search fail.
+        KeyboardInterrupt: if the user stops the search, which then says nothing of the requirement.
     """
     replayed: dict[Path, Replayed] = {}
     for path, stored in database.fetch(problem) if database else ():
@@ -99,9 +100,9 @@ def check(
     result = falsify(problem, engine, budget=budget, seed=seed)
     if result.status == "failed":
         raise SimulationError(f"{problem.name}: {result.reason}")
-    found = result.counterexample and _smallest(
-        problem, result.counterexample, result.spent.simulations, budget
-    )
+    if result.status == "interrupted":
+        raise KeyboardInterrupt
+    found = result.counterexample and _smallest(result.counterexample, result.spent, budget)
     try:
         file = database.save(problem, store.to_store(found)) if database and found else None
     except OSError as error:  # what was found is worth more than its file
@@ -109,9 +110,9 @@ def check(
     return Checked(problem, found, file, replayed, result)
 
 
-def _smallest(problem: Problem, found: Confirmation, spent: int, budget: Budget | int) -> Confirmation:
+def _smallest(found: Confirmation, spent: Spent, budget: Budget | int) -> Confirmation:
     """The shrunk counterexample if it is confirmed, otherwise the original."""
     limit = budget.simulations if isinstance(budget, Budget) else budget
-    shrunk = shrink(problem, found.evaluation, budget=limit or 2 * spent)
-    again = confirm(problem, shrunk.evaluation)
+    shrunk = shrink(found.problem, found.evaluation, budget=limit or 2 * spent.simulations)
+    again = confirm(found.problem, shrunk.evaluation)
     return again if again.outcome == "confirmed" else found

@@ -40,6 +40,8 @@ _CURES = {
     r"Unescaped|hex value|Invalid value.*\\": "write backslashes, as of a path, in single quotes",
     r"Invalid value.*\): [^\W\d]": "write texts in quotes, true and false in small letters",
     r"=\s*[-+]?\d+,\d": "write decimals with a point",
+    r"Cannot (overwrite|declare)": "state every key and every table once",
+    r"Expected '(\]' at|=' .*\): [^:])": "quote names with more than ASCII letters, digits, _ and -",
 }
 _LONGEST_LINE = 80  # characters of it that are shown
 # Parts of pydantic's locations that are no keys.

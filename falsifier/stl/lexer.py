@@ -62,8 +62,14 @@ _INSTEAD = {
     "iff": "write <->", "xor": "write not (a <-> b)",
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
-_BOXES = {"[]": "[] is written G or always", "<>": "<> is written F or eventually"}
-JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /"
+# What to do where one or two symbols stand in place of a formula, a signal or a number.
+_MISPLACED = {
+    "[]": "[] is written G or always", "<>": "<> is written F or eventually",
+    **dict.fromkeys("[]", "write windows directly after G, F or U"),
+    ")": "there is nothing between the parentheses, or one parenthesis too many",
+    "*": "write powers as x^y", "|": "write absolute values as abs(x)",
+}  # fmt: skip
+JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units"
 # Maximum number of characters of a line that errors show.
 _SHOWN_LINE = 160
 
@@ -121,13 +127,8 @@ def hint_for(token: Token) -> str:
     """Return what to write instead of a name that was meant as an operator, perhaps with a window."""
     written = token.text.partition("[")[0].rstrip("_")  # as Breach writes alw_[0,20]
     word = written.lower()
-    if token.kind != "name":
-        return ""
-    return (
-        _INSTEAD.get(written)
-        or _INSTEAD.get(word)
-        or (f"write operators in lower case: {word}" if word in RESERVED else "")
-    )
+    lower = f"write operators in lower case: {word}" if word in RESERVED else ""
+    return "" if token.kind != "name" else _INSTEAD.get(written) or _INSTEAD.get(word) or lower
 
 
 def hint_at(tokens: Sequence[Token], index: int) -> str:
@@ -135,14 +136,9 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
     token, previous = tokens[index], tokens[index - 1] if index else None
     if token.text == "U":
         return f'it belongs between two formulas; write a signal of that name as "{token.written}"'
-    if (box := "".join(t.text for t in tokens[index : index + 2])) in _BOXES:
-        return _BOXES[box]
-    if token.text in ("[", "]"):
-        return "write windows directly after G, F or U"
-    if token.text == ")":
-        return "there is nothing between the parentheses, or one parenthesis too many"
-    if token.text == "*":
-        return "write powers as x^y"
+    pair = "".join(t.text for t in tokens[index : index + 2])
+    if found := _MISPLACED.get(pair) or _MISPLACED.get(token.written):
+        return found
     if token.kind == "symbol" and previous and previous.written in RESERVED:
         word = previous.written
         return f'{word} is a reserved word; write a signal of that name as "{word}"'

@@ -86,10 +86,9 @@ class _Parser:
         return token
 
     def _accept(self, symbol: str) -> bool:
-        if self._next.kind == "symbol" and self._next.text == symbol:
-            self.index += 1
-            return True
-        return False
+        is_next = self._next.kind == "symbol" and self._next.text == symbol
+        self.index += is_next
+        return is_next
 
     # -- the grammar -------------------------------------------------------------------------------------
 

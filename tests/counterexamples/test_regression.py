@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -32,9 +33,11 @@ def test_check_stores_a_shrunk_counterexample_and_replays_it_first(tmp_path: Pat
     assert third.result.spent.simulations == 5
 
 
-def test_a_check_that_cannot_simulate_is_an_error() -> None:
+def test_a_check_that_cannot_simulate_or_is_stopped_is_no_pass() -> None:
     with pytest.raises(SimulationError, match=r"all 10 simulations failed; .*RuntimeError: out of order"):
         check(lag_problem(response=never), engine="uniform")
+    with pytest.raises(KeyboardInterrupt):
+        check(lag_problem(response=Mock(side_effect=KeyboardInterrupt)), engine="uniform")
 
 
 def test_what_cannot_be_confirmed_when_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -37,11 +37,7 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
     ("old", "new", "message"),
     [
         ('"AT.fmu"', '"gone.fmu"', r"model\.fmu: .*gone\.fmu: no such file"),
-        (
-            '"AT.fmu"',
-            r'"..\fmus\new.fmu"',
-            r"model\.fmu: .*no such file; write backslashes of a path in sing",
-        ),
+        ('"AT.fmu"', r'"..\fmus\new.fmu"', r"model\.fmu: .* file; write backslashes of a path in sing"),
         ('"AT.fmu"', r'"C:\Users\a.fmu"', r"not valid TOML: .*; write backslashes, as of a path, in single"),
         ('"AT.fmu"', r'"C:\Docs\a.fmu"', r"not valid TOML: .*; write backslashes, as of a path, in single"),
         ("[inputs.throttle]", "[inputs.throtle]", r"inputs\.throtle: .*did you mean 'throttle'"),
@@ -53,7 +49,9 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         ('"AT.fmu"', "“AT.fmu”", r"not valid TOML: .*: fmu = “AT.fmu”; write straight quotes"),
         ('"AT.fmu"', "AT.fmu", r"not valid TOML: .*: fmu = AT.fmu; write texts in quotes"),
         ('"AT.fmu"', '"AT.fmu"\nstop_time = 5,5', r"not valid .*: stop_time = 5,5; write decimals with a p"),
-        ("[inputs", '["at line 9"]\n["at line 9"]  # it’s a = b\n[inputs', r"not valid .*\]  # it’s a = b$"),
+        ("[inputs.throttle]", "[inputs.u[1]]", r"not valid TOML: .*: \[inputs\.u\[1\]\]; quote names with"),
+        ("[inputs.throttle]", "[inputs]\nu v.range = [0, 1]", r"not valid TOML: .*; quote names with"),
+        ("[inputs", '["at line 9"]\n["at line 9"]  # it’s a = b\n[inputs', r".*\]  # it’s a = b; state"),
         ("finalDrive", "finalDrve", r"parameters\.finalDrve: .*did you mean 'finalDrive'"),
         ("[parameters]", "[parameters]\nspeed = 3", r"parameters\.speed: cannot be set: the model computes"),
         ("interface", "output_interval = 0.03\ninterface", r"model\.output_interval: .*integer multiple"),

@@ -191,6 +191,8 @@ MISTAKES = [
     ("abs(x, y) <= 3", 1, "one expression"),
     ("min(x) <= 3", 1, "two or more"),
     ("a and", 6, "missing"),
+    ("G (|x| <= 3)", 4, "abs(x)"),
+    ("G (x <= 3 mph)", 11, "without units"),
     ("()", 2, "nothing between"),
     ("[0,5] x", 1, "directly after G"),
     ("1e999 <= x", 1, "1e308"),
