@@ -102,7 +102,12 @@ def check(
         raise SimulationError(f"{problem.name}: {result.reason}")
     if result.status == "interrupted":
         raise KeyboardInterrupt
-    found = result.counterexample and _smallest(result.counterexample, result.spent, budget)
+    try:
+        found = result.counterexample and _smallest(result.counterexample, result.spent, budget)
+    except KeyboardInterrupt:  # what was found is kept as it is
+        if database and result.counterexample:
+            database.save(problem, store.to_store(result.counterexample))
+        raise
     try:
         file = database.save(problem, store.to_store(found)) if database and found else None
     except OSError as error:  # what was found is worth more than its file

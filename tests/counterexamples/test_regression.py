@@ -40,15 +40,20 @@ def test_a_check_that_cannot_simulate_or_is_stopped_is_no_pass() -> None:
         check(lag_problem(response=Mock(side_effect=KeyboardInterrupt)), engine="uniform")
 
 
-def test_what_cannot_be_confirmed_when_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_be_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     calls: list[Evaluation] = []
 
     def refute_the_shrunk(problem: Problem, evaluation: Evaluation) -> Confirmation:
         calls.append(evaluation)
         return replace(confirm(problem, evaluation), outcome="refuted")
 
-    monkeypatch.setattr("falsifier.counterexamples.regression.confirm", refute_the_shrunk)
-    checked = check(lag_problem("G[0,10] (x <= 0.5)"), engine="uniform", budget=100)
-    assert checked.counterexample is not None and checked.result is not None
+    problem, module = lag_problem("G[0,10] (x <= 0.5)"), "falsifier.counterexamples.regression"
+    monkeypatch.setattr(f"{module}.confirm", refute_the_shrunk)
+    checked = check(problem, engine="uniform", budget=100)
+    assert checked.result is not None
     assert checked.counterexample == checked.result.counterexample
-    assert len(calls) == 1
+    assert checked.counterexample and len(calls) == 1
+    monkeypatch.setattr(f"{module}.shrink", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        check(problem, engine="uniform", budget=100, database=Database(tmp_path))
+    assert Database(tmp_path).fetch(problem)
