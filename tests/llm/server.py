@@ -69,8 +69,9 @@ class Server:
                 if self.path.endswith("/api/show"):  # what Ollama knows of a model, asked in the background
                     self._not_found()
                     return
+                headers = {name.lower(): value for name, value in self.headers.items()}
                 with outer._lock:
-                    outer.received.append(Received(self.path, dict(self.headers), body))
+                    outer.received.append(Received(self.path, headers, body))
                     step = outer.script.pop(0) if outer.script else Step(status=410, message="script ended")
                 if step.silent:
                     outer._closing.wait(HANG)

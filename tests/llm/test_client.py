@@ -17,7 +17,7 @@ from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
-from tests.llm.server import Received, Server, Step, serving
+from tests.llm.server import Server, Step, serving
 
 SCHEMA = schema_of_object(rationale={"type": "string"})
 STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
@@ -129,10 +129,10 @@ def test_what_is_sent(wire: Wire) -> None:
     assert not set(wire.absent) & received.body.keys()
     assert "question" in str(received.body) and "standing" in str(received.body)
     if wire.header is not None:
-        assert lowered(received)[wire.header[0]] == wire.header[1]
+        assert received.headers[wire.header[0]] == wire.header[1]
     assert (reply.usage.prompt_tokens, reply.usage.completion_tokens) == (100, 20)
     # What every request has whose reply is limited and whose connection can be cut.
-    assert lowered(received)["accept-encoding"] == "identity"
+    assert received.headers["accept-encoding"] == "identity"
 
 
 def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
@@ -140,10 +140,6 @@ def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
     return LiteLLMChat(
         wire.model, effort="low", api_base=base, options=wire.options, mode=first_mode(wire.model)
     )
-
-
-def lowered(received: Received) -> dict[str, str]:
-    return {k.lower(): v for k, v in received.headers.items()}
 
 
 @pytest.mark.usefixtures("keys")

@@ -176,7 +176,7 @@ def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyP
     with serving(Step("an answer"), Step("an answer")) as server:
         assert connect(llm, api_base=server.url, attempts=1).complete(PLAIN).text == "an answer"
         connect("openai/x", api_base=server.url).complete(PLAIN)
-    assert [r.headers["Authorization"] for r in server.received] == [f"Bearer {NO_KEY}", "Bearer sk-openai"]
+    assert [r.headers["authorization"] for r in server.received] == [f"Bearer {NO_KEY}", "Bearer sk-openai"]
     assert [list(r.headers.values()).count("account") for r in server.received] == [0, 3]
 
 
