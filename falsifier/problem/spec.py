@@ -41,7 +41,8 @@ _CURES = {
     r"Invalid value.*\): [^\W\d]": "write texts in quotes, true and false in small letters",
     r"=\s*[-+]?\d+,\d": "write decimals with a point",
     r"Cannot (overwrite|declare)": "state every key and every table once",
-    r"Expected '(\]' at|=' .*\): [^:])": "quote names with more than ASCII letters, digits, _ and -",
+    r"Expected '(\]' at.*\): [^#\n].*\]|=' .*\): [^:\"'\n<>=!]+=[^=])": "quote names with more than ASCII"
+    " letters, digits, _ and -",
 }
 _LONGEST_LINE = 80  # characters of it that are shown
 # Parts of pydantic's locations that are no keys.
@@ -128,7 +129,7 @@ def read_spec(path: Path) -> Spec:
         try:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
-            said = str(error).replace("('", "[").replace("', '", ".").replace("')", "]")  # of nested keys
+            said = re.sub(r"',?\)", "]", str(error).replace("('", "[").replace("', '", "."))  # of keys
             at = re.search(r"\(at line (\d+), column (\d+)\)$", said)
             line = text.split("\n")[int(at[1]) - 1] if at else ""
             there = f"{said}: {line[int(at[2]) - 1 :]}\n{line}" if at else said

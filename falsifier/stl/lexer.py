@@ -36,7 +36,7 @@ _SPELLINGS = {
 }  # fmt: skip
 _HINTS = {
     "=": "equality is ==, less or equal is <=",
-    "%": "write the number without a percent sign",
+    "%": "write the number without a percent sign", "°": "write numbers without units; else quote the name",
     "'": "a single quote opens a Modelica name and needs a second one",
     '"': "a double quote opens a name and needs a second one",
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
@@ -140,8 +140,7 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
     if found := _MISPLACED.get(pair) or _MISPLACED.get(token.written):
         return found
     if token.kind == "symbol" and previous and previous.written in RESERVED:
-        word = previous.written
-        return f'{word} is a reserved word; write a signal of that name as "{word}"'
+        return f'{previous.written} is a reserved word; write a signal of that name as "{previous.written}"'
     return "something is missing before it"
 
 

@@ -193,6 +193,7 @@ MISTAKES = [
     ("a and", 6, "missing"),
     ("G (|x| <= 3)", 4, "abs(x)"),
     ("G (x <= 3 mph)", 11, "without units"),
+    ("x <= 20 °C", 9, "without units"),
     ("()", 2, "nothing between"),
     ("[0,5] x", 1, "directly after G"),
     ("1e999 <= x", 1, "1e308"),
