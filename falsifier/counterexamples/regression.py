@@ -102,17 +102,18 @@ def check(
         raise SimulationError(f"{problem.name}: {result.reason}")
     if result.status == "interrupted":
         raise KeyboardInterrupt
+    found, refused, stop = result.counterexample, "", None
     try:
-        found = result.counterexample and _smallest(result.counterexample, result.spent, budget)
-    except KeyboardInterrupt:  # what was found is kept as it is
-        if database and result.counterexample:
-            database.save(problem, store.to_store(result.counterexample))
-        raise
+        found = found and _smallest(found, result.spent, budget)
+    except KeyboardInterrupt as stopped:  # what was found is kept as it is
+        stop = stopped
     try:
         file = database.save(problem, store.to_store(found)) if database and found else None
     except OSError as error:  # what was found is worth more than its file
-        return Checked(problem, found, None, replayed, result, refusal(error))
-    return Checked(problem, found, file, replayed, result)
+        file, refused = None, refusal(error)
+    if stop:
+        raise stop
+    return Checked(problem, found, file, replayed, result, refused)
 
 
 def _smallest(found: Confirmation, spent: Spent, budget: Budget | int) -> Confirmation:
