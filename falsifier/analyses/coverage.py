@@ -213,9 +213,9 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
     stop_time = described.stop_time
     times = np.linspace(0.0, stop_time, _SAMPLES)
     # Also when any input has a new value, if sampled and held, from the next sampling on: it may be brief.
-    begun = [[t + 0.999999 * (s.hold or 0) for s in c.signals.values() for t in s.times] for c in candidates]
+    begun = [{t + 0.999999 * (s.hold or 0) for s in c.signals.values() for t in s.times} for c in candidates]
     most = max(map(len, begun), default=0)
-    moments = [np.minimum(np.append(times, np.resize(b, most)), stop_time) for b in begun]
+    moments = [np.minimum(np.append(times, np.resize(sorted(b), most)), stop_time) for b in begun]
     ranges = []
     for r in described.inputs:
         signals = [c.signals[r.name].stepped(stop_time) for c in candidates]
