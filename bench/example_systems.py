@@ -6,6 +6,7 @@ The figure after the @ is the number of runs with a violation. Committed table: 
 
 import argparse
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from statistics import mean, stdev
 
 import numpy as np
@@ -147,6 +148,7 @@ def compare(problems: Mapping[str, Callable[[], Problem]], description: str | No
     parser.add_argument("--requirements", nargs="+", default=list(problems))
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 9), metavar=("FIRST", "LAST"))
     parser.add_argument("--budget", type=int, default=300)
+    parser.add_argument("--free", type=int, metavar="PIECES", help="inputs may have so many control points")
     options = parser.parse_args()
     print(f"| requirement | {' | '.join(options.engines)} |\n|{'---|' * (len(options.engines) + 1)}")
     means: dict[str, list[float]] = {engine: [] for engine in options.engines}
@@ -154,6 +156,9 @@ def compare(problems: Mapping[str, Callable[[], Problem]], description: str | No
         cells = [name]
         for engine in options.engines:
             problem, counts, found = problems[name](), [], 0
+            if options.free and problem.space.inputs:
+                shortest = problem.space.stop_time / options.free
+                problem = replace(problem, space=problem.space.freed(shortest))
             for seed in range(options.seeds[0], options.seeds[1] + 1):
                 result = falsify(problem, engine, seed=seed, budget=options.budget)
                 counts.append(result.spent.simulations if result.falsified else options.budget)

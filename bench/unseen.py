@@ -3,10 +3,11 @@
 Searches for every requirement of the spec files in a folder with every engine. A cell is the mean number of
 simulations until a confirmed violation, a miss counted as the budget, with its standard error; how many runs
 found one; and the seconds of thinking per proposal. The last row is the mean over the requirements. The
-parameterization is fixed, because most engines search no other.
+parameterization is fixed, because most engines search no other; with ``--free``, it is free.
 
     python -m bench.unseen bench/development
     python -m bench.unseen bench/development --engines surrogate cma --systems Crane BottleLine --seeds 10-19
+    python -m bench.unseen bench/development --engines surrogate coverage --free
     python -m bench.unseen bench/held_out --peer PEER/bin/python       # with psy-taliro, see peers.py
     python -m bench.unseen bench/development --rates 20000             # how often do uniform samples violate?
 """
@@ -23,6 +24,7 @@ from bench.peers import PEERS, peer_search
 from bench.search import seeds_from
 from falsifier import ENGINES, Problem, evaluate, falsify, load_problem, make_engine
 from falsifier.evaluation.evaluate import judge
+from falsifier.problem.source import Parameterization
 
 COMPARED = ("surrogate", "uniform", "corners", "cma", "optuna", "coverage")
 
@@ -63,14 +65,15 @@ def cell(runs: Sequence[Run]) -> str:
     return f"{mean(counts):.1f}{error} @ {sum(r.found for r in runs)}, {mean(r.thinking for r in runs):.3f} s"
 
 
-def problems_of(folder: Path, systems: Sequence[str]) -> list[dict[str, Problem]]:
+def problems_of(folder: Path, systems: Sequence[str], *, free: bool) -> list[dict[str, Problem]]:
     """Return the problems of each spec file of a folder by name; of all files, or of the named systems."""
+    used: Parameterization = "free" if free else "fixed"
     specs = {spec.stem: spec for spec in sorted(folder.glob("*.toml"))}
     if unknown := sorted(set(systems) - specs.keys()):
         sys.exit(f"{folder} has no system {', '.join(unknown)}; it has {', '.join(specs) or 'none'}")
     return [
         {
-            f"{name} {requirement}": load_problem(f"{specs[name]}:{requirement}", parameterization="fixed")
+            f"{name} {requirement}": load_problem(f"{specs[name]}:{requirement}", parameterization=used)
             for requirement in tomllib.loads(specs[name].read_text("utf-8"))["requirements"]
         }
         for name in systems or specs
@@ -83,7 +86,7 @@ def compare(options: argparse.Namespace) -> None:
     columns += [f"psy-taliro, {name}" for name in PEERS if options.peer]
     print(f"| requirement | {' | '.join(columns)} |\n|{'---|' * (1 + len(columns))}")
     rows: list[list[list[Run]]] = []
-    for problems in problems_of(options.folder, options.systems):
+    for problems in problems_of(options.folder, options.systems, free=options.free):
         for name, problem in problems.items():
             row = [
                 [own(problem, engine, seed=seed, budget=options.budget) for seed in options.seeds]
@@ -107,7 +110,7 @@ def compare(options: argparse.Namespace) -> None:
 def rates(options: argparse.Namespace) -> None:
     """Print how many of the same uniform samples violate each requirement."""
     print("| requirement | violated | one of | levels |\n|---|---|---|---|")
-    for problems in problems_of(options.folder, options.systems):
+    for problems in problems_of(options.folder, options.systems, free=False):
         first, *_ = problems.values()
         values: dict[str, list[float]] = {name: [] for name in problems}
         for candidate in make_engine("uniform", first, seed=options.seeds[0]).ask(options.rates):
@@ -130,6 +133,7 @@ def main() -> None:
     parser.add_argument("--systems", nargs="+", default=(), metavar="NAME", help="default: all of the folder")
     parser.add_argument("--seeds", type=seeds_from, default=range(10), help="for example 0-9")
     parser.add_argument("--budget", type=int, default=300)
+    parser.add_argument("--free", action="store_true", help="engines may choose control points")
     parser.add_argument("--peer", type=Path, help="interpreter that can import staliro")
     parser.add_argument("--rates", type=int, metavar="N", help="instead: judge N uniform samples")
     options = parser.parse_args()
