@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import example, given, strategies as st
 
-from falsifier.core.space import Freedom, ParameterRange
+from bench.example_systems import function_problem
+from falsifier.core.model import Kind
+from falsifier.core.space import Freedom, InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.coverage import CoverageEngine
 from falsifier.engines.coverage.explorer import describe
@@ -13,7 +15,7 @@ from falsifier.engines.coverage.programs import Programs
 from falsifier.engines.layout import Layout, TimeGrid, planning_layout
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
-from falsifier.testing import FREE, START, drive, lag_problem
+from falsifier.testing import FREE, START, drive, lag, lag_problem
 from tests.engines.coverage.support import lock_problem, safe_problem
 
 # Of uniform inputs one in 3600 opens the lock: a tenth of that is what the engine may use at most.
@@ -94,6 +96,13 @@ def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
     assert {m.what[0] for m in found(0.85) - found(0.5)} == {"up", "near"}
     assert not {m.source for m in found(0.5)} & {"u"}
     assert any(m.what[0] == "changes" for m in found(0.95)), "the predicate became false"
+
+
+def test_of_thousands_of_signals_those_of_the_formula_and_some_others_are_looked_at() -> None:
+    kinds: dict[str, Kind] = {f"y{i}": "real" for i in range(2000)} | {"x": "real"}
+    u = InputRange("u", 0.0, 1.0)
+    marker = Marker(function_problem(lag, "G[0,10] (x <= 0.9)", (u,), (), kinds, 10.0, 0.1))
+    assert list(marker.kinds) == [*(f"y{i}" for i in range(200)), "x"]
 
 
 @given(
