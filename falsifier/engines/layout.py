@@ -19,6 +19,8 @@ _LARGEST = 1e25
 # Cells over the formula's horizon on which free inputs are held and outputs predicted: enough for pieces of
 # 1 % of the horizon, few enough for a roll-out in milliseconds.
 CELLS = 100
+# Maximum number of held cells of an input that are few.
+_FEW_CELLS = 10
 # Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
 _MAX_HORIZONS = 20
 
@@ -58,9 +60,7 @@ class Coding:
 
     times: tuple[float, ...]  # control-point times in s
     interpolation: Interpolation  # interpolation between them
-    # Whether it consists of many held cells, most of them equal to their neighbours, or of a few control
-    # points that vary independently.
-    fine: bool
+    free: bool  # whether it consists of held cells, or of the spec's control points
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,12 @@ class Layout:
 
     @cached_property
     def is_fine(self) -> tuple[bool, ...]:
-        """Whether each group consists of many held cells."""
-        return (*(c.fine for c in self.codings), *(False for _ in self.space.parameters))
+        """Whether each group consists of many held cells, most of them equal to their neighbours.
+
+        A few vary independently, as the spec's control points do.
+        """
+        fine = (c.free and len(c.times) > _FEW_CELLS for c in self.codings)
+        return (*fine, *(False for _ in self.space.parameters))
 
     @cached_property
     def starts(self) -> NDArray[np.float64]:
@@ -137,7 +141,7 @@ class Layout:
         for r, coding, group in zip(self.space.inputs, self.codings, self.groups, strict=False):
             values = r.low + (r.high - r.low) * point[group]
             keep = np.ones(len(values), dtype=bool)
-            if coding.fine:
+            if coding.free:
                 keep[1:] = values[1:] != values[:-1]
             times = np.asarray(coding.times)[keep]
             signals[r.name] = Signal(
@@ -161,7 +165,7 @@ class Layout:
         parts = []
         for r, coding in zip(self.space.inputs, self.codings, strict=True):
             at = np.asarray(coding.times)
-            if coding.fine:
+            if coding.free:
                 # A cell is represented by its middle.
                 at = at + 0.5 * (at[1] - at[0] if len(at) > 1 else 0.0)
             signal = candidate.signals[r.name]
@@ -191,12 +195,12 @@ def planning_layout(space: SearchSpace, grid: TimeGrid) -> Layout:
 
 
 def _fixed(space: SearchSpace, r: InputRange) -> Coding:
-    return Coding(space.fixed_times(r), r.interpolation, fine=False)
+    return Coding(space.fixed_times(r), r.interpolation, free=False)
 
 
 def _held(horizon: float, count: int, free: Freedom) -> Coding:
     count = max(1, min(count, free.max_control_points, int(horizon / free.min_interval + 1e-6)))
-    return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", fine=True)
+    return Coding(even_times(count, stop_time=horizon, interpolation="constant"), "constant", free=True)
 
 
 def _read(coding: Coding, values: Array, at: Array) -> Array:

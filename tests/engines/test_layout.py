@@ -27,6 +27,9 @@ def test_layouts_keep_to_the_allowed_parameterization() -> None:
             assert layout.point(candidate) == pytest.approx(point, abs=1e-9)
     assert len(planning_layout(free.space, grid).codings[0].times) == 100
     assert len(planning_layout(fixed.space, grid).codings[0].times) == 4
+    for pieces in (10, 11):  # in few cells, a search is one of control points
+        layout = planning_layout(free.space.freed(10.0 / pieces), grid)
+        assert layout.is_fine == (pieces > 10, pieces > 10, False)
 
 
 def test_points_are_settled_where_their_candidates_are() -> None:
@@ -58,7 +61,7 @@ def test_points_are_settled_where_their_candidates_are() -> None:
 def test_no_coordinate_has_an_effect_before_it_starts(interpolation: Interpolation, back: int) -> None:
     times = (0.0, 2.0, 4.0, 6.0, 8.0, 10.0)
     space = lag_problem(free=None, inputs=1, parameters=[START]).space
-    layout = Layout(space, (Coding(times, interpolation, fine=False),))
+    layout = Layout(space, (Coding(times, interpolation, free=False),))
     assert layout.starts.tolist() == [times[max(i - back, 0)] for i in range(6)] + [0.0]
     grid = TimeGrid(0.1, 100, 100)
     point = np.random.default_rng(0).random(7)
