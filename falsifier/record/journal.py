@@ -19,7 +19,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from shutil import copy2
 from time import monotonic
@@ -132,7 +132,7 @@ class Journal:
         if not self._is_recorded(_key(record)):
             self.write(record)
 
-    def _is_recorded(self, key: "_Key") -> bool:
+    def _is_recorded(self, key: tuple[str | int, ...]) -> bool:
         found = self._recorded[key] > 0
         self._recorded[key] -= found
         return found
@@ -276,40 +276,25 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
     }
 
 
-def recorded_evaluations(
-    directory: Path,
-    records: Sequence[Record],
-    requirement: str | None = None,
-    *,
-    with_trajectories: bool = True,
-) -> dict[int, Evaluation]:
-    """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
-
-    The verdicts are those on the requirement; None: of each evaluation, on the requirement whose engine
-    suggested the candidate.
-    """
-    candidates = recorded_candidates(records)
-    asked = [record for record in records if isinstance(record, AskedRecord)]
-    turn = {record.first + i: record.requirement for record in asked for i in range(len(record.candidates))}
-    evaluations = {}
-    for record in records:
-        if isinstance(record, EvaluatedRecord):
-            evaluations[record.index] = Evaluation(
-                candidates[record.index],
-                record.status,
-                record.verdicts.get(requirement or turn[record.index]),
-                record.reason,
-                files.recorded_trajectory(directory, record.trajectory) if with_trajectories else None,
-                record.seconds,
-                tuple(record.log),
-            )
-    return dict(sorted(evaluations.items()))
+def candidates_in(directory: Path) -> dict[int, Candidate]:
+    """Read a run's candidates by the index of their evaluation, of all its requirements only once."""
+    state = (directory / JOURNAL).stat()
+    return _candidates_in(directory, (state.st_size, state.st_mtime_ns))
 
 
-_Key = tuple[str | int, ...]
+@lru_cache(maxsize=1)
+def _candidates_in(directory: Path, state: tuple[int, int]) -> dict[int, Candidate]:
+    return recorded_candidates(JournalReader(directory).new())
 
 
-def _key(record: Record) -> _Key:
+def recorded_evaluations(records: Sequence[Record], requirement: str) -> dict[int, Evaluation]:
+    """Recorded evaluations that were judged on a requirement, by their index, in its order."""
+    candidates, ended = recorded_candidates(records), (r for r in records if isinstance(r, EvaluatedRecord))
+    judged = (r for r in ended if requirement in r.verdicts)  # not after it was falsified
+    return {r.index: r.evaluation(candidates[r.index], requirement) for r in judged}
+
+
+def _key(record: Record) -> tuple[str | int, ...]:
     """What a record is about: a resumed run does not write a record about the same again."""
     match record:
         case AskedRecord():

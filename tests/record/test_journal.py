@@ -7,7 +7,7 @@ import pytest
 
 from falsifier.errors import JournalError
 from falsifier.record import journal
-from falsifier.record.files import set_aside
+from falsifier.record.files import recorded_trajectory, set_aside
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
 from falsifier.views.report.page import html_report
@@ -72,8 +72,7 @@ def test_a_trajectory_that_is_damaged_is_told_once(
     else:
         first.write_bytes(first.read_bytes()[:-1] + b"?")
     for _ in range(2):
-        found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
-    assert found[0].trajectory is None
+        assert recorded_trajectory(tmp_path, f"trajectories/{first.name}") is None
     assert caplog.text.count(f"{first.name} is damaged") == 1
     assert "not shown: its file is damaged or missing" in html_report(tmp_path)
 
@@ -99,5 +98,5 @@ def test_trajectories_that_a_better_one_has_replaced_are_not_told_as_damaged(
     for path in kept[:-1]:
         path.unlink()
     (tmp_path / "trajectories" / "mine.npz").touch()
-    found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
-    assert found[0].trajectory is None and "is damaged" not in caplog.text
+    assert recorded_trajectory(tmp_path, f"trajectories/{kept[0].name}") is None
+    assert "is damaged" not in caplog.text
