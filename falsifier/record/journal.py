@@ -52,8 +52,9 @@ STOP = "stop"
 _SYNC_PERIOD = 1.0
 # These are forced to disk at once: replies of a language model cost money, the others are results.
 _AT_ONCE = (ExchangeRecord, ConfirmedRecord, EndedRecord)
-# With Keep "history" the first so many trajectories are kept, then each that improves on the best.
-_KEPT_TRAJECTORIES = 200
+# With Keep "history" the first so many trajectories are kept, and those of simulations that took longer than
+# so many s, until all take so many bytes; and each that improves on the best.
+_KEPT_TRAJECTORIES, _SLOW, _KEPT_BYTES = 200, 1.0, 1_000_000_000
 
 
 class Journal:
@@ -70,6 +71,7 @@ class Journal:
         self._file.truncate(self._reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
+        self._kept_bytes = sum(p.stat().st_size for p in (directory / files.TRAJECTORIES).glob("*.npz"))
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
@@ -142,9 +144,11 @@ class Journal:
         if self._is_recorded(("evaluated", event.index)):
             return
         evaluation, file = event.evaluation, None
-        every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
+        is_kept = event.index < _KEPT_TRAJECTORIES or evaluation.seconds > _SLOW
+        every = self._keep == "history" and is_kept and self._kept_bytes < _KEPT_BYTES
         if evaluation.trajectory is not None and (event.improved or every):
             file = files.save_trajectory(self.directory, event.index, evaluation.trajectory)
+            self._kept_bytes += (self.directory / file).stat().st_size
         self.write(
             EvaluatedRecord(
                 index=event.index,

@@ -10,6 +10,7 @@ from falsifier.record import journal
 from falsifier.record.files import recorded_trajectory, set_aside
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
+from falsifier.search.result import Result
 from falsifier.views.report.page import html_report
 from tests.hostile.test_damage import Standing
 from tests.problems import impossible
@@ -100,3 +101,17 @@ def test_trajectories_that_a_better_one_has_replaced_are_not_told_as_damaged(
     (tmp_path / "trajectories" / "mine.npz").touch()
     assert recorded_trajectory(tmp_path, f"trajectories/{kept[0].name}") is None
     assert "is damaged" not in caplog.text
+
+
+@pytest.mark.parametrize(("slow", "most", "kept"), [(0.0, 10**9, 20), (60.0, 10**9, 2), (0.0, 1, 0)])
+def test_trajectories_that_took_long_are_kept_as_long_as_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, slow: float, most: int, kept: int
+) -> None:
+    monkeypatch.setattr(journal, "_KEPT_TRAJECTORIES", 2)
+    monkeypatch.setattr(journal, "_SLOW", slow)
+    monkeypatch.setattr(journal, "_KEPT_BYTES", most)
+    result = falsify(impossible(), "uniform", budget=20, directory=tmp_path)
+    assert isinstance(result, Result)
+    found = {int(path.name.partition("-")[0]) for path in (tmp_path / "trajectories").iterdir()}
+    values = [e.robustness or 0.0 for e in result.evaluations]
+    assert found == {i for i in range(20) if i < kept or values[i] < min(values[:i], default=9.0)}
