@@ -31,7 +31,7 @@ from falsifier.problem.loading import find_spec, load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.problem.spec import read_spec
-from falsifier.record.journal import read_journal, recorded_candidates
+from falsifier.record.journal import candidates_in
 
 Matrix = NDArray[np.float64]
 
@@ -218,7 +218,7 @@ def _exported(run: Run) -> dict[str, object]:
         "stop time": f"{run.manifest.stop_time:.10g}",
     }
     if run.counterexample is not None:
-        candidate = recorded_candidates(read_journal(run.directory))[run.counterexample]
+        candidate = candidates_in(run.directory)[run.counterexample]
         signals = {r.name: candidate.signals[r.name] for r in run.manifest.inputs}
         lines = (" ".join(f"{v:.12g}" for v in line) for line in _sampled(signals, run.manifest.stop_time))
         row["input"] = f"[{'; '.join(lines)}]"

@@ -88,9 +88,7 @@ class Run(RunProgress):
         Raises:
             JournalError: if the record is damaged.
         """
-        records = read_journal(self.directory)
-        name = self.manifest.requirement.name
-        found = recorded_evaluations(self.directory, records, name, with_trajectories=False)
+        found = recorded_evaluations(read_journal(self.directory), self.manifest.requirement.name)
         return evaluation_columns([found[i] for i in range(len(self.robustness))])
 
     def frame(self) -> "pandas.DataFrame":

@@ -142,7 +142,7 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
         problem = load_source(source)
     manifest.check_unchanged(place, described.hashes, manifest.file_hashes(problem), remedy)
     records = read_journal(place)
-    evaluations = recorded_evaluations(place, records, problem.name, with_trajectories=False)
+    evaluations = recorded_evaluations(records, problem.name)
     doubtful = doubtful_confirmations(problem, records, evaluations)
     return problem, {"searched": list(evaluations.values()), "doubtful": doubtful}
 

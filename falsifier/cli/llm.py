@@ -1,6 +1,7 @@
 """``falsifier llm``: what a language model is sent, and whether it replies."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,8 +60,10 @@ def prompt(
     With --at, print a question that a run sent.
     """
     from falsifier.engines.briefing import preview
+    from falsifier.record.files import recorded_trajectory
     from falsifier.record.journal import read_journal, recorded_evaluations
     from falsifier.record.questions import doubtful_confirmations
+    from falsifier.record.records import EvaluatedRecord
 
     if at is not None:
         refuse("--at prints what a run sent: falsifier llm prompt RUN --at N", after=directory)
@@ -72,7 +75,10 @@ def prompt(
     if directory:
         simulations = _told_by(directory, problem).request.budget.simulations
         records = read_journal(directory)
-        evaluations = recorded_evaluations(directory, records)
+        evaluations = recorded_evaluations(records, problem.name)
+        for record in (r for r in records if isinstance(r, EvaluatedRecord) and r.index in evaluations):
+            trajectory = recorded_trajectory(directory, record.trajectory)
+            evaluations[record.index] = replace(evaluations[record.index], trajectory=trajectory)
     messages = preview(
         problem,
         variant=variant,

@@ -253,6 +253,5 @@ def recorded_inputs(place: Path, requirement: str) -> Candidate:
 
 def _judged(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:
     """Return the robustness and the candidate of each recorded simulation with a verdict, in order."""
-    records = read_journal(directory)
-    evaluations = recorded_evaluations(directory, records, requirement, with_trajectories=False).values()
-    return [(e.robustness, e.candidate) for e in evaluations if e.robustness is not None]
+    evaluations = recorded_evaluations(read_journal(directory), requirement)
+    return [(e.robustness, e.candidate) for e in evaluations.values() if e.robustness is not None]

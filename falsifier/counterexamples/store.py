@@ -251,8 +251,7 @@ def keep_recorded(directory: Path, *, begun_here: bool = False) -> None:
         alone = described.of(record.requirement)
         if not begun_here:
             manifest.check_in_sight(directory, alone.request.problems)
-        evaluations = recorded_evaluations(directory, records, record.requirement, with_trajectories=False)
-        evaluation = evaluations.get(record.index)
+        evaluation = recorded_evaluations(records, record.requirement).get(record.index)
         if evaluation is None or not evaluation.violated:
             raise JournalError(
                 f"{directory / JOURNAL}: line {record.line} confirms a counterexample of "

@@ -106,9 +106,7 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         content = path.read_bytes()
     except OSError as error:
         # Where only the best one is kept, it is the only file, and later than those that it has replaced.
-        left = [
-            _index(other) for other in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, other.name)
-        ]
+        left = [_index(p) for p in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, p.name)]
         if not (isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path)):
             _tell_lost(path, error.strerror or "it cannot be read")
         return None

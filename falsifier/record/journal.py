@@ -19,7 +19,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from shutil import copy2
 from time import monotonic
@@ -52,8 +52,9 @@ STOP = "stop"
 _SYNC_PERIOD = 1.0
 # These are forced to disk at once: replies of a language model cost money, the others are results.
 _AT_ONCE = (ExchangeRecord, ConfirmedRecord, EndedRecord)
-# With Keep "history" the first so many trajectories are kept, then each that improves on the best.
-_KEPT_TRAJECTORIES = 200
+# With Keep "history" the first so many trajectories are kept, and those of simulations that took longer than
+# so many s, until all take so many bytes; and each that improves on the best.
+_KEPT_TRAJECTORIES, _SLOW, _KEPT_BYTES = 200, 1.0, 1_000_000_000
 
 
 class Journal:
@@ -70,6 +71,7 @@ class Journal:
         self._file.truncate(self._reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
+        self._kept_bytes = sum(p.stat().st_size for p in (directory / files.TRAJECTORIES).glob("*.npz"))
         self._synced = monotonic()
 
     def __call__(self, event: Event) -> None:
@@ -132,7 +134,7 @@ class Journal:
         if not self._is_recorded(_key(record)):
             self.write(record)
 
-    def _is_recorded(self, key: "_Key") -> bool:
+    def _is_recorded(self, key: tuple[str | int, ...]) -> bool:
         found = self._recorded[key] > 0
         self._recorded[key] -= found
         return found
@@ -142,9 +144,11 @@ class Journal:
         if self._is_recorded(("evaluated", event.index)):
             return
         evaluation, file = event.evaluation, None
-        every = self._keep == "history" and event.index < _KEPT_TRAJECTORIES
+        is_kept = event.index < _KEPT_TRAJECTORIES or evaluation.seconds > _SLOW
+        every = self._keep == "history" and is_kept and self._kept_bytes < _KEPT_BYTES
         if evaluation.trajectory is not None and (event.improved or every):
             file = files.save_trajectory(self.directory, event.index, evaluation.trajectory)
+            self._kept_bytes += (self.directory / file).stat().st_size
         self.write(
             EvaluatedRecord(
                 index=event.index,
@@ -276,40 +280,25 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
     }
 
 
-def recorded_evaluations(
-    directory: Path,
-    records: Sequence[Record],
-    requirement: str | None = None,
-    *,
-    with_trajectories: bool = True,
-) -> dict[int, Evaluation]:
-    """Recorded evaluations by their index, in its order, each with its trajectory if that was kept.
-
-    The verdicts are those on the requirement; None: of each evaluation, on the requirement whose engine
-    suggested the candidate.
-    """
-    candidates = recorded_candidates(records)
-    asked = [record for record in records if isinstance(record, AskedRecord)]
-    turn = {record.first + i: record.requirement for record in asked for i in range(len(record.candidates))}
-    evaluations = {}
-    for record in records:
-        if isinstance(record, EvaluatedRecord):
-            evaluations[record.index] = Evaluation(
-                candidates[record.index],
-                record.status,
-                record.verdicts.get(requirement or turn[record.index]),
-                record.reason,
-                files.recorded_trajectory(directory, record.trajectory) if with_trajectories else None,
-                record.seconds,
-                tuple(record.log),
-            )
-    return dict(sorted(evaluations.items()))
+def candidates_in(directory: Path) -> dict[int, Candidate]:
+    """Read a run's candidates by the index of their evaluation, of all its requirements only once."""
+    state = (directory / JOURNAL).stat()
+    return _candidates_in(directory, (state.st_size, state.st_mtime_ns))
 
 
-_Key = tuple[str | int, ...]
+@lru_cache(maxsize=1)
+def _candidates_in(directory: Path, state: tuple[int, int]) -> dict[int, Candidate]:
+    return recorded_candidates(JournalReader(directory).new())
 
 
-def _key(record: Record) -> _Key:
+def recorded_evaluations(records: Sequence[Record], requirement: str) -> dict[int, Evaluation]:
+    """Recorded evaluations that were judged on a requirement, by their index, in its order."""
+    candidates, ended = recorded_candidates(records), (r for r in records if isinstance(r, EvaluatedRecord))
+    judged = (r for r in ended if requirement in r.verdicts)  # not after it was falsified
+    return {r.index: r.evaluation(candidates[r.index], requirement) for r in judged}
+
+
+def _key(record: Record) -> tuple[str | int, ...]:
     """What a record is about: a resumed run does not write a record about the same again."""
     match record:
         case AskedRecord():

@@ -59,10 +59,8 @@ def _results(records: Iterable[Record], requirement: str) -> dict[int, str]:
     for record in records:
         if isinstance(record, EvaluatedRecord):
             verdict = record.verdicts.get(requirement)
-            text = (
-                f"robustness {signed(verdict.robustness)}" if verdict else f"{record.status}: {record.reason}"
-            )
-            found[record.index] = text
+            judged = f"robustness {signed(verdict.robustness)}" if verdict else ""
+            found[record.index] = judged or f"{record.status}: {record.reason}"
         elif isinstance(record, ConfirmedRecord) and record.requirement == requirement:
             reason = "" if record.outcome == "confirmed" else f" ({record.reason})"
             found[record.index] += f", {record.outcome}{reason}"

@@ -4,6 +4,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.files import seal
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
@@ -53,6 +54,11 @@ class EvaluatedRecord(_Record):
     log: list[str] = []
     trajectory: str | None = Field(None, description="File, relative to the run directory.")
     elapsed: float = _ELAPSED
+
+    def evaluation(self, candidate: Candidate, requirement: str) -> Evaluation:
+        """Return what was recorded, without the trajectory, given the candidate and who judges."""
+        verdict, log = self.verdicts.get(requirement), tuple(self.log)
+        return Evaluation(candidate, self.status, verdict, self.reason, seconds=self.seconds, log=log)
 
 
 class ExchangeRecord(_Record):

@@ -17,11 +17,12 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.conversation import MAX_REASKS
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
-from falsifier.record.journal import recorded_evaluations
+from falsifier.record.files import recorded_trajectory
 from falsifier.record.records import (
     AskedRecord,
     ConfirmedRecord,
     EndedRecord,
+    EvaluatedRecord,
     ExchangeRecord,
     Record,
     elapsed_at,
@@ -35,9 +36,9 @@ class ReplayedSteps(Steps):
     """The steps that a journal contains, then live ones."""
 
     asked: dict[int, AskedRecord]  # what engines suggested, by the index of the first candidate's evaluation
-    evaluations: dict[int, Evaluation]  # recorded evaluations by index
-    # Recorded confirmations by evaluation index and requirement.
-    confirmed: dict[tuple[int, str], ConfirmedRecord]
+    directory: Path  # the run directory
+    evaluated: dict[int, EvaluatedRecord]  # recorded evaluations by index
+    confirmed: dict[tuple[int, str], ConfirmedRecord]  # by evaluation index and requirement
     _next: int = 0
 
     def ask(self, problem: Problem, engine: Engine, wanted: int) -> tuple[list[Candidate], int, float]:
@@ -62,13 +63,16 @@ class ReplayedSteps(Steps):
 
     def _start(self, problem: Problem, index: int, candidate: Candidate) -> Callable[[], Evaluation]:
         """Start what is left of an evaluation: all of it, its trajectory, or nothing."""
-        recorded = self.evaluations.get(index)
-        if recorded is None:
-            return super().start(problem, [candidate])[0]
-        if recorded.verdict is None or recorded.trajectory is not None:
-            return lambda: recorded
+        record, start = self.evaluated.get(index), super().start
+        if record is None:
+            return start(problem, [candidate])[0]
+        recorded = record.evaluation(candidate, problem.name)
+        # Read only now: those of all evaluations together would fill the memory.
+        trajectory = recorded_trajectory(self.directory, record.trajectory)
+        if recorded.verdict is None or trajectory is not None:
+            return lambda: replace(recorded, trajectory=trajectory)
         # The trajectory was not kept, but engines need it.
-        simulate = super().start(problem, [recorded.candidate])[0]
+        simulate = start(problem, [candidate])[0]
         return lambda: replace(recorded, trajectory=simulate().trajectory)
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
@@ -84,14 +88,15 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     if not records:
         return live
     exchanges, unrepeated = _played_back(records)
-    evaluations = recorded_evaluations(directory, records)
+    evaluated = {r.index: r for r in records if isinstance(r, EvaluatedRecord)}
     return ReplayedSteps(
         executor=live.executor,
-        replayed=len(evaluations),
+        replayed=len(evaluated),
         seconds=max(map(elapsed_at, records)),
         unrepeated=unrepeated,
         asked={r.first: r for r in records if isinstance(r, AskedRecord)},
-        evaluations=evaluations,
+        directory=directory,
+        evaluated=evaluated,
         confirmed={(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
         exchanges=iter(exchanges),
     )

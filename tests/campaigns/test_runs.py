@@ -14,7 +14,7 @@ def test_a_run_is_loaded_as_it_was(campaign: Path) -> None:
     assert len(runs) == 8
     for run in runs:
         records = read_journal(run.directory)
-        evaluations = list(recorded_evaluations(run.directory, records).values())
+        evaluations = list(recorded_evaluations(records, run.requirement).values())
         assert run.robustness.tolist() == [e.robustness for e in evaluations]
         assert run.simulations == len(evaluations)
         assert run.falsified == (run.counterexample is not None) == (run.requirement == "HARD")

@@ -7,9 +7,10 @@ import pytest
 
 from falsifier.errors import JournalError
 from falsifier.record import journal
-from falsifier.record.files import set_aside
+from falsifier.record.files import recorded_trajectory, set_aside
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
+from falsifier.search.result import Result
 from falsifier.views.report.page import html_report
 from tests.hostile.test_damage import Standing
 from tests.problems import impossible
@@ -72,8 +73,7 @@ def test_a_trajectory_that_is_damaged_is_told_once(
     else:
         first.write_bytes(first.read_bytes()[:-1] + b"?")
     for _ in range(2):
-        found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
-    assert found[0].trajectory is None
+        assert recorded_trajectory(tmp_path, f"trajectories/{first.name}") is None
     assert caplog.text.count(f"{first.name} is damaged") == 1
     assert "not shown: its file is damaged or missing" in html_report(tmp_path)
 
@@ -99,5 +99,19 @@ def test_trajectories_that_a_better_one_has_replaced_are_not_told_as_damaged(
     for path in kept[:-1]:
         path.unlink()
     (tmp_path / "trajectories" / "mine.npz").touch()
-    found = journal.recorded_evaluations(tmp_path, journal.read_journal(tmp_path))
-    assert found[0].trajectory is None and "is damaged" not in caplog.text
+    assert recorded_trajectory(tmp_path, f"trajectories/{kept[0].name}") is None
+    assert "is damaged" not in caplog.text
+
+
+@pytest.mark.parametrize(("slow", "most", "kept"), [(0.0, 10**9, 20), (60.0, 10**9, 2), (0.0, 1, 0)])
+def test_trajectories_that_took_long_are_kept_as_long_as_there_is_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, slow: float, most: int, kept: int
+) -> None:
+    monkeypatch.setattr(journal, "_KEPT_TRAJECTORIES", 2)
+    monkeypatch.setattr(journal, "_SLOW", slow)
+    monkeypatch.setattr(journal, "_KEPT_BYTES", most)
+    result = falsify(impossible(), "uniform", budget=20, directory=tmp_path)
+    assert isinstance(result, Result)
+    found = {int(path.name.partition("-")[0]) for path in (tmp_path / "trajectories").iterdir()}
+    values = [e.robustness or 0.0 for e in result.evaluations]
+    assert found == {i for i in range(20) if i < kept or values[i] < min(values[:i], default=9.0)}

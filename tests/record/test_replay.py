@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 from threading import Barrier
+from unittest.mock import Mock
 
 import pytest
 
@@ -14,6 +15,7 @@ from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem
+from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import read_journal
 from falsifier.record.records import EvaluatedRecord
 from falsifier.record.run import falsify, resume
@@ -121,3 +123,15 @@ def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
     assert keys(resumed) == keys(whole)
     evaluated = [event.evaluation for event in events if isinstance(event, Evaluated)]
     assert len(evaluated) == 6 and all(each.trajectory is not None for each in evaluated)
+
+
+def test_kept_trajectories_are_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, counts = run(PROBLEM, tmp_path, budget=5), list[int]()
+    reader = Mock(side_effect=recorded_trajectory)
+    monkeypatch.setattr("falsifier.record.replay.recorded_trajectory", reader)
+    (resumed,) = resume(
+        tmp_path,
+        problems=[PROBLEM],
+        listeners=[lambda e: counts.append(reader.call_count) if isinstance(e, Evaluated) else None],
+    )
+    assert keys(resumed) == keys(whole) and counts == [1, 2, 3, 4, 5], "not all before the first is used"

@@ -1,13 +1,14 @@
 """Several requirements falsified in one search are a run for each of them."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from falsifier.campaigns.analysis import Run, load, load_run, main_table, read_published
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import evaluate
-from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
+from falsifier.record.journal import holds_run, read_journal, recorded_candidates, recorded_evaluations
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
@@ -65,12 +66,10 @@ def test_every_requirement_has_its_own_numbers(results: dict[str, Result], runs:
 
 
 def test_what_was_recorded_is_what_each_would_have_judged(directory: Path, runs: dict[str, Run]) -> None:
-    recorded = recorded_evaluations(directory, read_journal(directory))
-    candidates = [e.candidate for e in recorded.values()]
     for problem in PROBLEMS:
-        robustness = runs[problem.name].robustness
-        judged = [evaluate(problem, candidate).robustness for candidate in candidates[: len(robustness)]]
-        assert robustness.tolist() == judged
+        recorded = recorded_evaluations(read_journal(directory), problem.name).values()
+        judged = [evaluate(problem, evaluation.candidate).robustness for evaluation in recorded]
+        assert runs[problem.name].robustness.tolist() == judged == [e.robustness for e in recorded]
 
 
 def test_one_must_be_named(directory: Path, runs: dict[str, Run]) -> None:
@@ -111,3 +110,13 @@ def test_a_folder_of_runs_is_all_of_them(tmp_path: Path, results: dict[str, Resu
     search(tmp_path / "first")
     search(tmp_path / "second")
     assert [run.requirement for run in load(tmp_path)] == [*results, *results]
+
+
+@pytest.mark.usefixtures("runs")
+def test_a_report_reads_the_candidates_of_a_shared_search_once(
+    directory: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader = Mock(side_effect=recorded_candidates)
+    monkeypatch.setattr("falsifier.record.journal.recorded_candidates", reader)
+    html_report(directory)
+    assert reader.call_count <= 1, "an earlier report may have read them"

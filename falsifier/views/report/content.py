@@ -15,7 +15,7 @@ from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
-from falsifier.record.journal import JOURNAL, read_journal, recorded_candidates
+from falsifier.record.journal import JOURNAL, candidates_in
 from falsifier.search.budget import Spent
 from falsifier.stl import Monitor, in_words, parse
 from falsifier.stl.monitor import Verdict
@@ -168,7 +168,7 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
 
 def _recorded(run: Run) -> Candidate:
     assert run.shown is not None
-    return recorded_candidates(read_journal(run.directory))[run.shown]
+    return candidates_in(run.directory)[run.shown]
 
 
 def shown_of(run: Run, candidate: Candidate) -> Shown:

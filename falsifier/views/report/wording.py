@@ -17,7 +17,7 @@ from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
 from falsifier.problem.shorthand import options_from, without_option
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import read_journal, recorded_candidates
+from falsifier.record.journal import candidates_in
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.views.analyses_text import tried_facts
 from falsifier.views.report.content import Section, Shown, Side, spent_on
@@ -123,7 +123,7 @@ def tried(section: Section) -> list[Fact]:
     if not section.shown or section.shown[0].run.simulations > _MOST_COUNTED:
         return []
     run = section.shown[0].run
-    candidates = recorded_candidates(read_journal(run.directory))
+    candidates = candidates_in(run.directory)
     judged = [int(index) for index in np.flatnonzero(~np.isnan(run.robustness))]
     return tried_facts(coverage_of(run.manifest, [(candidates[index], None) for index in judged]))
 

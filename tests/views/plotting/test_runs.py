@@ -15,7 +15,7 @@ def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path)
     found = next(run for run in load(campaign) if run.falsified)
     figure = plot_history(found)
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
-    recorded = list(recorded_evaluations(found.directory, read_journal(found.directory)).values())
+    recorded = list(recorded_evaluations(read_journal(found.directory), "HARD").values())
     assert ys(lines["robustness"]).tolist() == [e.robustness for e in recorded]
     best = ys(lines["smallest so far"])
     assert (np.diff(best) <= 0).all() and best[-1] == min(e.robustness or 0.0 for e in recorded)
