@@ -16,6 +16,7 @@ from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
+from falsifier.llm.messages import Strict
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.loading import load_source
