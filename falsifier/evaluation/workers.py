@@ -81,9 +81,10 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
 
 
 def _check_importable(model: Model) -> None:
+    script = Path(getattr(sys.modules["__main__"], "__file__", None) or "")  # <stdin> is no file
     reason = "it was written in a notebook or at a prompt"
     try:
-        if b"__main__" not in pickle.dumps(model) or hasattr(sys.modules["__main__"], "__file__"):
+        if b"__main__" not in pickle.dumps(model) or script.is_file():
             return
     except Exception as error:  # of many types
         reason = str(error)

@@ -153,10 +153,10 @@ def test_a_model_that_processes_cannot_import_is_refused(monkeypatch: pytest.Mon
         local_executor(2, replace(model, function=lambda *_: {})).__enter__()
     monkeypatch.setattr(model.function, "__module__", "__main__")
     monkeypatch.setattr(main, model.function.__name__, model.function, raising=False)
-    monkeypatch.setattr(main, "__file__", "mine.py", raising=False)
+    monkeypatch.setattr(main, "__file__", __file__, raising=False)
     with local_executor(2, model):  # of a script, which processes import
         pass
-    monkeypatch.delattr(main, "__file__")
+    monkeypatch.setattr(main, "__file__", "<stdin>")
     with pytest.raises(SpecError, match=rf"{told}\(it was written in a notebook or at a prompt\)"):
         local_executor(2, model).__enter__()
 
