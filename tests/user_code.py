@@ -16,6 +16,7 @@ from falsifier import (
     Freedom,
     InputRange,
     Problem,
+    ProblemSource,
     Requirement,
     Result,
     SearchSpace,
@@ -57,6 +58,7 @@ mixed: list[Result] = falsify([problem, "AT1"])
 another: list[Result] = falsify((problem, "AT1"))
 names = ["AT1", "AT2"]
 by_name: list[Result] = falsify(names)
+from_source: Result = falsify(ProblemSource(target="AT:AT1"))
 again: list[Result] = resume("runs/a")
 found: Confirmation | None = result.counterexample
 robustness: float | None = result.robustness

@@ -16,6 +16,7 @@ from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
+from falsifier.llm.messages import Strict
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.loading import load_source
@@ -23,7 +24,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget, budget_of, stated_price
 from falsifier.search.parameterization import engine_parameterization, parameterization_of
-from falsifier.search.request import LLMSettings, RunRequest, Strict
+from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
 
@@ -83,9 +84,7 @@ class CampaignRequest(Strict):
         """Runs by the name of their directory, in order; SpecError if the same run is requested twice."""
         runs = {run_name(request): request for request in self.runs}
         if len(runs) < len(self.runs):
-            raise SpecError(
-                "this campaign contains the same run twice: name each requirement and engine only once"
-            )
+            raise SpecError("the campaign has the same run twice: name each requirement and engine only once")
         return runs
 
 

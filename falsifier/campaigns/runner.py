@@ -15,7 +15,7 @@ from falsifier.campaigns.directory import (
 from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
-from falsifier.core.arguments import path_of, whole
+from falsifier.core.arguments import instance, list_of, path_of, whole
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError, written
 from falsifier.evaluation.workers import open_workers
@@ -60,12 +60,14 @@ def run_campaign(
         ModelError: if an FMU cannot be used.
     """
     jobs, directory = whole("jobs", jobs, least=1), path_of("directory", directory)
+    listeners = list_of("listeners", listeners, Callable, "functions")
+    instance("request", request, CampaignRequest, "CampaignRequest(runs=...)")
     problems = check_request(request)
     with campaign_lock(directory):
         check_new(directory)
         record = CampaignRecord(**manifest.environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
-        return _work(directory, record, problems, jobs, tuple(listeners))
+        return _work(directory, record, problems, jobs, listeners)
 
 
 def resume_campaign(
@@ -85,6 +87,8 @@ def resume_campaign(
         ModelError: see run_campaign.
     """
     jobs, directory = whole("jobs", jobs, least=1), path_of("directory", directory)
+    listeners = list_of("listeners", listeners, Callable, "functions")
+    instance("limits", limits, (Budget, type(None)), "a Budget")
     with campaign_lock(directory):
         record = read_campaign(directory)
         sources = (run.problems[0] for run in record.request.runs)
@@ -92,11 +96,10 @@ def resume_campaign(
             problems = _load(record.request.runs)
         manifest.check_unchanged(directory, record.hashes, _hashes(problems))
         if limits is not None:
-            record = record.model_copy(
-                update={"request": record.request.model_copy(update={"limits": limits})}
-            )
+            request = record.request.model_copy(update={"limits": limits})
+            record = record.model_copy(update={"request": request})
             _check_limits(record.request)
-        return _work(directory, record, problems, jobs, tuple(listeners))
+        return _work(directory, record, problems, jobs, listeners)
 
 
 def _work(

@@ -18,12 +18,13 @@ from falsifier.record.manifest import Manifest
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.request import RunRequest
 from falsifier.search.result import Columns, evaluation_columns, frame as as_frame
+from falsifier.stl.margins import signed
 
 if TYPE_CHECKING:
     import pandas
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class RunProgress(Summary):
     """Progress of one requirement in one run, which need not have started.
 
@@ -41,6 +42,16 @@ class RunProgress(Summary):
     seed: int
     request: RunRequest
 
+    def __repr__(self) -> str:
+        # All its simulations would fill pages of a terminal, for each run of a campaign.
+        return f"<{self}>"
+
+    def __str__(self) -> str:
+        best = "" if self.best_robustness is None else f", best robustness {signed(self.best_robustness)}"
+        after = f"{self.status} after {self.spent.simulations_text}{best}"
+        reason = f": {self.reason}" if self.status == "failed" else ""
+        return f"{self.requirement} {self.method.label} seed {self.seed}: {after}{reason}"
+
     @property
     def simulations(self) -> int:
         """Number of simulations."""
@@ -52,7 +63,7 @@ class RunProgress(Summary):
         return self.finished
 
 
-@dataclass(eq=False, kw_only=True)
+@dataclass(eq=False, kw_only=True, repr=False)
 class Run(RunProgress):
     """One requirement in one run, read from its directory: its numbers (see Summary) and what was requested.
 

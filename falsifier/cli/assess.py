@@ -130,9 +130,7 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
         and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT
     ]
     if changed:
-        raise click.UsageError(
-            f"{place}: the search space of a run cannot be changed; drop {', '.join(changed)}"
-        )
+        raise click.UsageError(f"{place}: a run's search space cannot be changed; drop {', '.join(changed)}")
     described = manifest.read(place).of(requirement)
     source = described.request.source
     if source is None:

@@ -34,7 +34,7 @@ from falsifier.search import DEFAULT_SIMULATIONS
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import LLM_ENGINES, price_of
 from falsifier.search.request import LLMSettings
-from falsifier.views.campaign_progress import campaign_display, overall_line, run_line
+from falsifier.views.campaign_progress import campaign_display, overall_line
 from falsifier.views.terminal import warn
 
 # Time in s between two updates of falsifier watch.
@@ -176,7 +176,7 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
         progress = follower.look()  # after the lock was released: by then everything has been written
         show(progress)
     for run in () if is_campaign(directory) else progress.runs:
-        say(run_line(replace(run, status="interrupted") if run.status == "running" else run))
+        say(str(replace(run, status="interrupted") if run.status == "running" else run))
     say(overall_line(progress, stopped=True))
     if progress.finished < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shell_word(directory)}")

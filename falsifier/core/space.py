@@ -210,7 +210,7 @@ class SearchSpace:
         return replace(self, inputs=tuple(replace(r, free=None) for r in self.inputs))
 
     def freed(self, shortest: float) -> "SearchSpace":
-        """Return the same space in which every input may have control points as little as this apart, in s.
+        """Return the same space in which control points of every input are at least this far apart, in s.
 
         Raises:
             SpecError: if this is not positive, or longer than the simulation.
@@ -220,8 +220,10 @@ class SearchSpace:
                 f"the shortest piece of an input must be positive and at most the stop time of "
                 f"{self.stop_time:.12g} s, got {shortest:.12g} s"
             )
-        free = Freedom(max(1, int(self.stop_time / shortest + 1e-9)), shortest)
-        return replace(self, inputs=tuple(replace(r, free=free) for r in self.inputs))
+        most = max(1, int(self.stop_time / shortest + 1e-9))
+        changes = ((r, min(r.control_points, most)) for r in self.inputs)
+        free = Freedom(most, shortest)
+        return replace(self, inputs=tuple(replace(r, control_points=n, free=free) for r, n in changes))
 
     @property
     def dimensions(self) -> tuple[Dimension, ...]:

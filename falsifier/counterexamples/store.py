@@ -29,6 +29,7 @@ from falsifier.errors import (
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import fmu_files, resolved, with_paths
+from falsifier.llm.messages import Strict
 from falsifier.problem.loading import reloadable, source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
@@ -36,7 +37,6 @@ from falsifier.record import manifest
 from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import Origin
 from falsifier.record.records import ConfirmedRecord
-from falsifier.search.request import Strict
 from falsifier.stl.margins import signed
 
 FILE_NAME = "counterexample.json"

@@ -2,11 +2,12 @@
 
 import logging
 import os
+import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import wait
@@ -17,7 +18,7 @@ from typing import Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
-from falsifier.errors import Reader, reader, speak_to
+from falsifier.errors import Reader, SpecError, reader, setting, speak_to
 from falsifier.evaluation.evaluate import Evaluation, evaluate_any
 from falsifier.fmu import stop_simulations
 from falsifier.problem.problem import Problem
@@ -68,12 +69,29 @@ def local_executor(jobs: int, model: Model) -> Iterator[Executor | None]:
     A model that simulates in processes of its own needs only threads, each with its own such process: other
     Python processes would take seconds to start. They are there for models in Python. Simulations that are
     still under way at the end are stopped.
+
+    Raises:
+        SpecError: if the model is in Python and other processes cannot import it.
     """
-    if jobs == 1:
-        yield None
-        return
-    with _threads(jobs) if getattr(model, "has_own_processes", False) else _processes(jobs) as executor:
+    has_own = getattr(model, "has_own_processes", False)
+    if jobs > 1 and not has_own:
+        _check_importable(model)
+    with nullcontext() if jobs == 1 else _threads(jobs) if has_own else _processes(jobs) as executor:
         yield executor
+
+
+def _check_importable(model: Model) -> None:
+    script = Path(getattr(sys.modules["__main__"], "__file__", None) or "")  # <stdin> is no file
+    reason = "it was written in a notebook or at a prompt"
+    try:
+        if b"__main__" not in pickle.dumps(model) or script.is_file():
+            return
+    except Exception as error:  # of many types
+        reason = str(error)
+    raise SpecError(
+        f"{setting('jobs')}: other processes cannot import the model {model.info.name!r} ({reason}): "
+        "define its function in a .py file and import it from there, or simulate one at a time"
+    )
 
 
 @contextmanager

@@ -24,11 +24,13 @@ UNREADABLE = "unreadable"
 LONGEST_REPLY = 1_000_000
 
 
-class _Value(BaseModel):
+class Strict(BaseModel):
+    """A value of a record that takes no other keys than its own."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
-class Message(_Value):
+class Message(Strict):
     """One message of a conversation."""
 
     role: Role
@@ -43,7 +45,7 @@ class Message(_Value):
         return {k: v for k, v in handler(self).items() if v or k != "stable"}
 
 
-class Usage(_Value):
+class Usage(Strict):
     """Tokens and cost of one request."""
 
     prompt_tokens: int = 0
@@ -80,7 +82,7 @@ class Usage(_Value):
         )
 
 
-class ChatRequest(_Value):
+class ChatRequest(Strict):
     """One request.
 
     Everything that influences the reply is either here or among the parameters of ``LiteLLMChat``: together
@@ -115,7 +117,7 @@ class ChatRequest(_Value):
         return None if self.deadline is None else max(0.0, self.deadline - monotonic())
 
 
-class ChatReply(_Value):
+class ChatReply(Strict):
     """One reply."""
 
     text: str
@@ -130,7 +132,7 @@ class ChatReply(_Value):
     source: Source = "llm"
 
 
-class Exchange(_Value):
+class Exchange(Strict):
     """One request, its reply, and the defect of a rejected reply."""
 
     llm: str

@@ -80,9 +80,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
             )
         )
     if Path(target).is_file():
-        raise SpecError(
-            f"{target}: expected a file that ends in .toml, .fmu, .ssp or .ssd, or a bundled name"
-        )
+        raise SpecError(f"{target}: expected a file ending in .toml, .fmu, .ssp or .ssd, or a bundled name")
     if Path(f"{name}.toml").is_file():
         meant = f"{name}.toml{target.removeprefix(name)}"
         raise SpecError(f"no spec file or bundled requirement {target!r}; did you mean {meant!r}?")

@@ -155,9 +155,7 @@ class ParameterSection(Strict):
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
         if (self.range is None) == (self.value is None):
-            raise ValueError(
-                "expected either range = [low, high] (searched) or value = number or text (fixed)"
-            )
+            raise ValueError("expected range = [low, high] (searched) or value = number or text (fixed)")
         return self
 
 

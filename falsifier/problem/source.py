@@ -77,7 +77,7 @@ class ProblemSource(BaseModel):
     shortest_piece: Number | None = None
     changes: ModelChanges = Field(default_factory=ModelChanges)
     # Left out where it is empty, so that runs keep their names.
-    record: tuple[str, ...] = Field((), exclude_if=lambda names: not names)
+    record: tuple[str, ...] = Field(default=(), exclude_if=lambda names: not names)
     context: tuple[Recordable, ...] = ()
 
     @field_serializer("changes")

@@ -178,9 +178,7 @@ def _check_model(spec: Spec) -> None:
     if spec.model.fmu is None and not spec.components:
         raise SpecError(sections.missing(sections.ModelSection.model_fields["fmu"]), key="model.fmu")
     if spec.components and spec.model.fmu is not None:
-        raise SpecError(
-            "a spec has either one FMU here or [components.NAME]; remove one of them", key="model.fmu"
-        )
+        raise SpecError("a spec has one FMU here or [components.NAME]; remove one of them", key="model.fmu")
     is_coupled = spec.coupling != sections.CouplingSection()
     if (spec.connections and not spec.components) or (is_coupled and not spec.is_system):
         key = "connections" if spec.connections else "coupling"

@@ -144,9 +144,7 @@ def _requirement(info: ModelInfo, stop_time: float) -> str:
     if not info.outputs:
         shown = ", ".join(name_text(v.name) for v in candidates[:_SHOWN_VARIABLES])
         more = ", ..." if len(candidates) > _SHOWN_VARIABLES else ""
-        lines.append(
-            _comment(f"The FMU declares no outputs. Requirements may name any variable: {shown}{more}")
-        )
+        lines.append(_comment(f"The FMU has no outputs. Requirements may name any variable: {shown}{more}"))
     # Nothing may be searched, or found to hold, before somebody has said what is required.
     formula = f"G[0,{stop_time:.10g}] ({name_text(candidates[0].name)} <= {PLACEHOLDER})"
     lines.append(

@@ -19,12 +19,13 @@ from falsifier.core.model import Variable
 from falsifier.core.space import Range, ValueKind
 from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
+from falsifier.llm.messages import Strict
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
 from falsifier.search.parameterization import engine_parameterization, parameterization_of, searched_space
-from falsifier.search.request import RunRequest, Strict
+from falsifier.search.request import RunRequest
 
 MANIFEST = "manifest.json"
 # What to do where a run's files, whose paths are relative, are not seen.

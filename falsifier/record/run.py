@@ -23,7 +23,7 @@ from falsifier.problem.loading import load_source, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.files import check_unused
+from falsifier.record.files import CAMPAIGN, check_unused
 from falsifier.record.journal import JOURNAL, STOP, check_new, holds_run, open_journal, simulated
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
@@ -121,10 +121,8 @@ def falsify(
     >>> falsify("AT1", budget=20).status  # doctest: +SKIP
     'falsified'
     """
-    several = not isinstance(problem, Falsifiable)
-    if several and not isinstance(problem, Iterable):
-        raise SpecError(f"expected a Problem, a target such as 'AT1' or a list, got {type(problem).__name__}")
-    problems = [_problem(each) for each in ([problem] if isinstance(problem, Falsifiable) else problem)]
+    listed = None if isinstance(problem, Falsifiable) or not isinstance(problem, Iterable) else [*problem]
+    problems = [_problem(each) for each in ([problem] if listed is None else listed)]
     if not problems:
         raise SpecError("problem: the list is empty; expected Problems, or targets such as 'AT1'")
     check_names(problems)
@@ -157,7 +155,7 @@ def falsify(
         found = carry_out(request, group, place, engine=made, chat=chat, listeners=listeners)
         results |= {result.problem.name: result for result in found}
     ordered = [results[each.name] for each in problems]
-    return ordered if several else ordered[0]
+    return ordered[0] if listed is None else ordered
 
 
 def resume(
@@ -203,9 +201,7 @@ def resume(
         if engine is not None and engine.name != described.engine:
             raise JournalError(f"{place}: this run has the engine {described.engine!r}, not {engine.name!r}")
         if not problems and not request.problems:
-            raise JournalError(
-                f"{place}: this run's problem was made in Python: call resume() with problems=[...]"
-            )
+            raise JournalError(f"{place}: its problem was made in Python: call resume() with problems=[...]")
         if not problems:
             with manifest.loading(place, request.problems, described.hashes):
                 loaded = [load_source(source) for source in request.problems]
@@ -223,6 +219,8 @@ def resume(
 
 def runs_in(directory: Path) -> list[Path]:
     """Return a run directory, or those in a folder; JournalError if they are not of one spec and its FMUs."""
+    if (directory / CAMPAIGN).exists():
+        raise JournalError(f"{directory} is a campaign: resume_campaign({str(directory)!r}) continues it")
     found = [directory] if holds_run(directory) else sorted(filter(holds_run, directory.glob("*")))
     known = [hashes for place in found if (hashes := manifest.read(place).hashes)]  # none if made in Python
     if any(hashes != known[0] for hashes in known):
@@ -316,11 +314,11 @@ def carry_out(
         )
 
 
-def _problem(given: Falsifiable) -> Problem:
+def _problem(given: object) -> Problem:
     if isinstance(given, Problem):
         return given
     if not isinstance(given, Falsifiable):
-        raise SpecError(f"expected a Problem or a target such as 'AT1', got {type(given).__name__}")
+        raise SpecError(f"expected a Problem, a target such as 'AT1' or a list, got {type(given).__name__}")
     return load_source(given if isinstance(given, ProblemSource) else ProblemSource(target=str(given)))
 
 

@@ -252,7 +252,5 @@ class _Compiler:
 def _constant(node: expression.Expression) -> float:
     value = float(node.evaluate({}))
     if not math.isfinite(value):
-        raise FormulaError(
-            f"the constant {node} has no finite value; write a number or correct the expression"
-        )
+        raise FormulaError(f"the constant {node} has no finite value; write a number or correct it")
     return value

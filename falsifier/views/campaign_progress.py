@@ -4,9 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
 
-from falsifier.campaigns import Progress, RunProgress
+from falsifier.campaigns import Progress
 from falsifier.core.words import counted
-from falsifier.stl.margins import signed
 from falsifier.views.terminal import error_console, line_writer, live_line, unbroken
 
 Show = Callable[[Progress], None]
@@ -47,21 +46,13 @@ class Scoreboard:
         for run in progress.runs:
             if run.name in ended and self._ended.get(run.name) != run.status:
                 self._ended[run.name] = run.status
-                self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run_line(run)}")
+                self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run}")
         line = overall_line(progress)
         if self._update is not None:
             self._update(line)
         elif monotonic() - self._written > _LINE_PERIOD and line != self._overall:
             self._written, self._overall = monotonic(), line
             self._write(line)
-
-
-def run_line(run: RunProgress) -> str:
-    """Describe an ended run in one line."""
-    best = "" if run.best_robustness is None else f", best robustness {signed(run.best_robustness)}"
-    count = run.spent.simulations_text
-    reason = f": {run.reason}" if run.status == "failed" else ""
-    return f"{run.requirement} {run.method.label} seed {run.seed}: {run.status} after {count}{best}{reason}"
 
 
 def overall_line(progress: Progress, *, stopped: bool = False) -> str:

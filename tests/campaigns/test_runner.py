@@ -13,7 +13,7 @@ from falsifier.counterexamples.store import load_counterexample, replay
 from falsifier.errors import JournalError, SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.record.records import Record, parse_line
-from falsifier.record.run import falsify
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from tests import problems
 from tests.campaigns.support import outcomes, request, work_in_threads
@@ -58,6 +58,8 @@ def test_a_directory_is_used_by_one_process_and_for_one_campaign(tmp_path: Path)
         run_campaign(request("easy"), tmp_path / "r")
     with campaign_lock(directory), pytest.raises(JournalError, match="another process is working on"):
         resume_campaign(directory)
+    with pytest.raises(JournalError, match=r"is a campaign: resume_campaign\('.*'\) continues it"):
+        resume(directory)
 
 
 def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> None:

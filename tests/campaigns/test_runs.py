@@ -21,6 +21,7 @@ def test_a_run_is_loaded_as_it_was(campaign: Path) -> None:
         assert run.verdict == evaluations[int(np.nanargmin(run.robustness))].verdict
     assert [run.seed for run in runs] == [0, 1] * 4
     assert load_run(runs[1].directory).seed == 1
+    assert repr(runs[0]).startswith("<HARD uniform seed 0: falsified after "), "one line, not all its values"
 
 
 def test_columns_are_tidy_and_a_frame_where_pandas_is(campaign: Path) -> None:

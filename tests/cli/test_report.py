@@ -65,7 +65,7 @@ def test_validate_ends_with_1_where_a_claim_does_not_hold(command: Any, tmp_path
     (tmp_path / "v.csv").write_bytes(b"\x9c\x00")
     unread = command("tools", "validate", "v.csv")
     assert "v.csv: cannot be read: expected a CSV file in UTF-8" in str(unread.exception)
-    assert "v.csv: expected a file that ends in .toml, .fmu" in str(command("simulate", "v.csv").exception)
+    assert "v.csv: expected a file ending in .toml, .fmu" in str(command("simulate", "v.csv").exception)
 
 
 def test_what_a_run_tried_is_printed_and_drawn(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
     command("run", "python:tests.problems:impossible", "--engine", "uniform", "--budget", "2", "--out", "b")
     result = command("resume", ".", code=0)
     assert "NEVER: not falsified after 2 simulations" in result.stdout
-    assert "a: this run's problem was made in Python: call resume() with problems=[...]" in result.stderr
+    assert "a: its problem was made in Python: call resume() with problems=[...]" in result.stderr
     assert isinstance(command("resume", "a").exception, JournalError)
     with pytest.raises(JournalError, match=r"choose another directory, .*resume\(\) with problems=\[...\]"):
         falsify(lag_problem(), budget=2, directory="a")

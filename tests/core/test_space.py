@@ -155,6 +155,9 @@ def test_other_parts_of_a_space_are_checked_when_they_are_made() -> None:
 def test_a_shortest_piece_frees_all_inputs_up_to_the_stop_time() -> None:
     space = SearchSpace((InputRange("u", 0.0, 1.0), InputRange("v", 0.0, 1.0)), (), 10.0)
     assert [r.free for r in space.freed(0.1).inputs] == [Freedom(100, 0.1)] * 2
+    dense = replace(space.inputs[0], control_points=7)
+    (coarse,) = SearchSpace((dense,), (), 10.0).freed(4.0).inputs
+    assert (coarse.control_points, coarse.free) == (2, Freedom(2, 4.0))
     for wrong in (0.0, -1.0, 11.0, math.nan):
         with pytest.raises(SpecError, match="shortest piece of an input must be positive"):
             space.freed(wrong)

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from falsifier.errors import SimulationError, setting
+from falsifier.core.model import FunctionModel
+from falsifier.errors import SimulationError, SpecError, setting
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.evaluation.workers import LastingExecutor, death, local_executor, open_workers, start
 from falsifier.testing import lag_problem
@@ -142,6 +143,22 @@ def test_only_what_ends_a_process_of_its_own_has_crashed(
     (script := tmp_path / "mine.py").write_text("falsify(problem, jobs=2)\n")
     monkeypatch.setattr(sys.modules["__main__"], "__file__", str(script), raising=False)
     assert "import mine.py first, and it has no line if __name__" in death(BrokenExecutor("killed"))
+
+
+def test_a_model_that_processes_cannot_import_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, main = lag_problem().model, sys.modules["__main__"]
+    assert isinstance(model, FunctionModel)
+    told = "jobs: other processes cannot import the model 'lag' "
+    with pytest.raises(SpecError, match=rf"{told}\(.*<lambda>.*\): define its function in a .py file"):
+        local_executor(2, replace(model, function=lambda *_: {})).__enter__()
+    monkeypatch.setattr(model.function, "__module__", "__main__")
+    monkeypatch.setattr(main, model.function.__name__, model.function, raising=False)
+    monkeypatch.setattr(main, "__file__", __file__, raising=False)
+    with local_executor(2, model):  # of a script, which processes import
+        pass
+    monkeypatch.setattr(main, "__file__", "<stdin>")
+    with pytest.raises(SpecError, match=rf"{told}\(it was written in a notebook or at a prompt\)"):
+        local_executor(2, model).__enter__()
 
 
 def test_workers_speak_to_the_reader_of_their_parent(at_the_command_line: None) -> None:

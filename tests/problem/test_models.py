@@ -71,7 +71,7 @@ isolation = "each"
 
 
 WRONG = [
-    (COMPONENTS + '[model]\nfmu = "a.fmu"\n' + REST, "model.fmu: a spec has either one FMU here or"),
+    (COMPONENTS + '[model]\nfmu = "a.fmu"\n' + REST, "model.fmu: a spec has one FMU here or"),
     ('[model]\nfmu = "a.fmu"\n' + CONNECTIONS + REST, "connections: only a system has this section"),
     (REST, "model.fmu: this key is missing: Path of the FMU"),
     (COMPONENTS.replace("Gain_2", "Gone_2") + REST, "components.pi.fmu: "),

@@ -45,7 +45,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
         ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),
         ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
-        ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected either range"),
+        ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected range"),
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"tempalte": "x"}, r"requirements\.R\.tempalte: .* did you mean 'template'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),

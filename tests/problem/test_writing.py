@@ -79,7 +79,7 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
 
 def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
     spec = written("NoOutputs_2dymola", tmp_path)
-    assert "# The FMU declares no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")
+    assert "# The FMU has no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")
     assert loaded(spec).requirement.formula.signals == ("x",)
 
 

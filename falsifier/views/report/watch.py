@@ -29,7 +29,7 @@ from falsifier.llm.messages import Exchange
 from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
 from falsifier.record.summary import RunFollower
-from falsifier.views.campaign_progress import overall_line, run_line
+from falsifier.views.campaign_progress import overall_line
 from falsifier.views.exchanges import exchange_html
 from falsifier.views.html import Html, el, join
 from falsifier.views.plotting import plot_coverage, plot_history
@@ -146,7 +146,7 @@ class Watch:
 def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
     """The runs to choose from, those of a campaign with what came of them so far, running ones first."""
     order = sorted(rows, key=lambda run: (run.status != "running", run.finished))[:_MOST_RUNS]
-    told = {run.name: run_line(run) for run in order} or {name: name for name in places}
+    told = {run.name: str(run) for run in order} or {name: name for name in places}
     runs = [
         el("a", text, href=f"?run={quote(name)}") if name in places else text for name, text in told.items()
     ]
