@@ -13,10 +13,11 @@ from falsifier.core.arguments import one_of, positive
 from falsifier.core.fixed import fixed
 from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
+from falsifier.core.space import ValueKind
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError, SpecError, did_you_mean
 
-Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
+Kind = Literal[ValueKind, "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
 
@@ -111,6 +112,11 @@ class Variable:
         low = min(numbers, default=None) if self.low is None else self.low
         high = max(numbers, default=None) if self.high is None else self.high
         return low, high
+
+    @property
+    def items(self) -> tuple[tuple[str, int], ...]:
+        """Names and numbers of an enumeration's items, as ranges have them; empty for other types."""
+        return tuple(self.literals.items())
 
     @property
     def items_text(self) -> str:

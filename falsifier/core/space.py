@@ -4,7 +4,7 @@ If every parameterization is fixed, the search space is also a named box; ``deco
 between vectors and candidates.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from math import ceil, floor, isfinite
 from typing import Literal, get_args
@@ -44,6 +44,11 @@ class Freedom:
     def __post_init__(self) -> None:
         whole("max_control_points", self.max_control_points, least=1)
         positive("min_interval", self.min_interval)
+
+
+def number_names(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
+    """Return the name of each number of a Boolean or an enumeration; empty for other kinds."""
+    return {0: "false", 1: "true"} if kind == "boolean" else {number: name for name, number in items}
 
 
 @dataclass(frozen=True, slots=True)

@@ -258,4 +258,4 @@ def _modes(problem: Problem) -> Iterator[ModeRecord]:
     for name in problem.experiment.outputs:
         variable = problem.info[name] if name in problem.info else Variable(name)
         if variable.kind in ("integer", "boolean", "enumeration"):
-            yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
+            yield ModeRecord(name=name, kind=variable.kind, items=variable.items)

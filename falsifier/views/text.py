@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
-from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line, shell_word
+from falsifier.core.space import number_names
 from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
@@ -151,7 +151,7 @@ def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
 def _known(problem: Problem) -> tuple[dict[str, str], Labels]:
     """Return the units of a model's variables by name, and the names of their numbers."""
     variables = problem.info.variables
-    labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
+    labels = {v.name: number_names(v.kind, v.items) for v in variables}
     return {v.name: v.unit for v in variables}, labels
 
 
