@@ -25,7 +25,7 @@ from falsifier.evaluation.confirm import step_convergence, sufficient_step
 from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import default_interface, make_system, rights_of
+from falsifier.problem.models import make_system, rights_of
 from falsifier.problem.sections import ModelSection
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
@@ -119,7 +119,7 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
     source = one_fmu(given)
     found = read_info(source)
     # Raises an error if the FMU cannot be simulated, before a useless spec is written.
-    FmuModel(source, interface=default_interface(found))
+    FmuModel(source, interface=found.default_interface)
     return starter_spec(_relative(source, path), found)
 
 
@@ -133,7 +133,7 @@ def _print_convergence(
     """Print what halving the step, a spec's if it states one, changes while each input goes up and down."""
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
-    interface = stated.interface or default_interface(found)
+    interface = stated.interface or found.default_interface
     stop_time = stated.stop_time or found.stop_time or DEFAULT_STOP_TIME
     named = (v.name for v in found.observables if v.kind != "string" and v.name not in stated.omit)
     outputs = tuple(named)[:_CHECKED_VARIABLES]

@@ -213,6 +213,11 @@ class ModelInfo:
     def __contains__(self, name: object) -> bool:
         return any(v.name == name for v in self.variables)
 
+    @property
+    def default_interface(self) -> Interface:
+        """Co-simulation if the model offers it, with its exporting tool's solver, or if it offers none."""
+        return "model-exchange" if self.interfaces == ("model-exchange",) else "co-simulation"
+
     def kind(self, name: str) -> Kind:
         """Return the type of a variable's values; real if there is no such variable."""
         return next((v.kind for v in self.variables if v.name == name), "real")

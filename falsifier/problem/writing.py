@@ -20,7 +20,6 @@ from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
@@ -65,7 +64,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     model = ["[model]"]
     if isinstance(fmu, Path):
         model += [f"fmu = {_toml(fmu.as_posix())}"]
-        model += [f"interface = {_toml(default_interface(info))}"]
+        model += [f"interface = {_toml(info.default_interface)}"]
     else:
         sections += _components(fmu, info)
     stop_time = info.stop_time or DEFAULT_STOP_TIME

@@ -86,7 +86,7 @@ def _member(name: str, component: Component) -> Member:
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    interface = component.interface or ("co-simulation" if "co-simulation" in offered else offered[0])
+    interface = component.interface or named.info.default_interface
     return Member(name, path, component.sha256, named, component.step, interface)
 
 
