@@ -240,12 +240,11 @@ def _pictures(result: Result) -> list[Path]:
 
 def llm_use(spent: Spent) -> str:
     """Calls, tokens and cost of the language model."""
-    cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
     lost = f" ({spent.without_reply} of them without a usable reply)" if spent.without_reply else ""
     kept = f", {counted(spent.kept, 'reply')} from the cache" if spent.kept else ""
     requests = f"{counted(spent.calls, 'request')}{lost}{kept}"
-    return f"{requests}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
+    return f"{requests}, {counted(spent.tokens, 'token')}{reasoning}, {spent.cost_text}"
 
 
 def seconds_text(spent: Spent) -> str:
