@@ -12,6 +12,7 @@ from pydantic import Field
 
 from falsifier.core.arguments import list_of, whole
 from falsifier.core.files import readable_part
+from falsifier.core.strict import Strict
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError, written
@@ -23,7 +24,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import Manifest
 from falsifier.search.budget import Budget, budget_of, stated_price
 from falsifier.search.parameterization import engine_parameterization, parameterization_of
-from falsifier.search.request import LLMSettings, RunRequest, Strict
+from falsifier.search.request import LLMSettings, RunRequest
 
 _HASH_DIGITS = 10
 

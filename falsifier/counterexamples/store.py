@@ -17,6 +17,7 @@ from falsifier import __version__
 from falsifier.core.arguments import instance, path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
+from falsifier.core.strict import Strict
 from falsifier.errors import (
     CandidateError,
     JournalError,
@@ -36,7 +37,6 @@ from falsifier.record import manifest
 from falsifier.record.journal import JOURNAL, holds_run, read_journal, recorded_evaluations
 from falsifier.record.manifest import Origin
 from falsifier.record.records import ConfirmedRecord
-from falsifier.search.request import Strict
 from falsifier.stl.margins import signed
 
 FILE_NAME = "counterexample.json"

@@ -5,11 +5,12 @@ from math import inf
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from falsifier.core.arguments import instance
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact_held
+from falsifier.core.strict import Strict
 
 Role = Literal["system", "user", "assistant"]
 Source = Literal["llm", "script", "recording", "cache"]
@@ -24,11 +25,7 @@ UNREADABLE = "unreadable"
 LONGEST_REPLY = 1_000_000
 
 
-class _Value(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
-class Message(_Value):
+class Message(Strict):
     """One message of a conversation."""
 
     role: Role
@@ -43,7 +40,7 @@ class Message(_Value):
         return {k: v for k, v in handler(self).items() if v or k != "stable"}
 
 
-class Usage(_Value):
+class Usage(Strict):
     """Tokens and cost of one request."""
 
     prompt_tokens: int = 0
@@ -80,7 +77,7 @@ class Usage(_Value):
         )
 
 
-class ChatRequest(_Value):
+class ChatRequest(Strict):
     """One request.
 
     Everything that influences the reply is either here or among the parameters of ``LiteLLMChat``: together
@@ -115,7 +112,7 @@ class ChatRequest(_Value):
         return None if self.deadline is None else max(0.0, self.deadline - monotonic())
 
 
-class ChatReply(_Value):
+class ChatReply(Strict):
     """One reply."""
 
     text: str
@@ -130,7 +127,7 @@ class ChatReply(_Value):
     source: Source = "llm"
 
 
-class Exchange(_Value):
+class Exchange(Strict):
     """One request, its reply, and the defect of a rejected reply."""
 
     llm: str

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -14,6 +13,7 @@ from pydantic import (
 )
 
 from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
+from falsifier.core.strict import Strict
 from falsifier.llm import Effort
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address, check_option_values, stated_address
@@ -31,17 +31,11 @@ _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False), BeforeValidator(no
 Keep = Literal["history", "best"]
 
 
-class Strict(BaseModel):
-    """A value of a record that takes no other keys than its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
-
-
 class LLMSettings(Strict):
     """Which language model to ask, and how; what does not fit is a ``ValidationError`` of pydantic."""
 
     # An option that contains a key is rejected, and the error must not show it either.
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, defer_build=True)
+    model_config = ConfigDict(hide_input_in_errors=True)
 
     name: str
     effort: Effort | None = None
