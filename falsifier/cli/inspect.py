@@ -3,7 +3,6 @@
 from contextlib import closing
 from dataclasses import asdict, replace
 from math import isinf
-from os.path import relpath
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from falsifier.cli.options import PATH, changes_in, json_option, out_option, pol
 from falsifier.cli.output import as_shown, say
 from falsifier.context.simulink import read_diagram
 from falsifier.context.values import SIMULINK
-from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
 from falsifier.core.literals import shell_word
 from falsifier.core.model import Experiment, ModelInfo
@@ -104,7 +102,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
 
 
 def _starter(fmus: tuple[Path, ...], path: Path) -> str:
-    from falsifier.problem.writing import starter_spec
+    from falsifier.problem.writing import seen_from, starter_spec
 
     if len(fmus) > 1:
         parts: dict[str, Path] = {}
@@ -112,15 +110,15 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
             name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
             parts[name] = source
         info = System(dict(parts), name=path.stem).info
-        return starter_spec({name: _relative(source, path) for name, source in parts.items()}, info)
+        return starter_spec({name: seen_from(path, source) for name, source in parts.items()}, info)
     given = fmus[0]
     if is_package(given):
-        return starter_spec(_relative(given, path), read_package(given).info)
+        return starter_spec(seen_from(path, given), read_package(given).info)
     source = one_fmu(given)
     found = read_info(source)
     # Raises an error if the FMU cannot be simulated, before a useless spec is written.
     FmuModel(source, interface=found.default_interface)
-    return starter_spec(_relative(source, path), found)
+    return starter_spec(seen_from(path, source), found)
 
 
 def _print_convergence(
@@ -228,8 +226,3 @@ def _existing_fmu(fmu: Path) -> Path:
 
 def _bundled_fmu(name: Path) -> Path:
     return bundled("fmus") / f"{name.name.removesuffix('.fmu')}.fmu"
-
-
-def _relative(fmu: Path, spec: Path) -> Path:
-    """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
-    return Path(utf_8(relpath(fmu.resolve(), spec.resolve().parent)))

@@ -12,6 +12,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable, Item
 
+from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent
 from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
@@ -76,6 +77,14 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
         sections.append(_parameters(tunable, searched=() if inputs else tunable[:1]))
     sections.append(_requirement(info, stop_time))
     return "\n\n".join(sections) + "\n"
+
+
+def seen_from(spec: Path, path: Path) -> Path:
+    """Return a path relative to a spec's folder, as the spec states it; SpecError if it is not of UTF-8.
+
+    Path.relative_to has walk_up only in Python 3.12.
+    """
+    return Path(utf_8(relpath(path.resolve(), spec.resolve().parent)))
 
 
 def _components(fmus: Mapping[str, Path], info: ModelInfo) -> Iterator[str]:
@@ -253,9 +262,9 @@ def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> No
     def moved(named: str) -> str:
         if Path(named).is_absolute():
             return named
-        there = (folder / named).resolve()
+        there = folder / named
         # Only with a slash a text names a folder.
-        return Path(relpath(there, out.resolve().parent)).as_posix() + "/" * there.is_dir()
+        return seen_from(out, there).as_posix() + "/" * there.is_dir()
 
     for section in (document.get("model", {}), *document.get("components", {}).values()):
         if "fmu" in section:
