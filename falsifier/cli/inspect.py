@@ -18,6 +18,7 @@ from falsifier.core.files import absent, bundled
 from falsifier.core.literals import shell_word
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
+from falsifier.core.words import in_unit
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.evaluation.confirm import step_convergence, sufficient_step
 from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text
@@ -163,7 +164,7 @@ def _print_convergence(
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
-        most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
+        most = in_unit(f"{moved.largest:.3g}", found[name].unit)
         share = f"{100 * moved.relative:.2g} % of its range"
         share = "constant at half of the step" if isinf(moved.relative) else share
         say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({share})")

@@ -17,6 +17,15 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
+def in_unit(number: str, unit: str) -> str:
+    """Return a number with its unit, if that is known and has a name.
+
+    >>> in_unit("3", "m/s"), in_unit("3", ""), in_unit("3", "1")
+    ('3 m/s', '3', '3')
+    """
+    return f"{number} {unit}" if unit not in ("", "1") else number
+
+
 def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
     """Return a number with so many digits, a large one with its hundredths, a whole one with all digits.
 

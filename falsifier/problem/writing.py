@@ -16,6 +16,7 @@ from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent
 from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.problem.grid import fitting_interval
@@ -108,7 +109,8 @@ def _local(name: str) -> str:
 
 
 def _input(v: Variable) -> str:
-    meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
+    unit = "" if v.unit == "1" else v.unit
+    meaning = ", ".join(part for part in (v.description, unit and f"in {unit}") if part)
     lines = [f"[inputs.{toml_key(v.name)}]"]
     lines += [_comment(line) for line in (meaning, v.items_text) if line]
     low, high = v.limits
@@ -139,7 +141,7 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
     for v in others[:_SHOWN_PARAMETERS]:
         low, high = v.limits
         shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        default = "not stated" if v.start is None else f"{v.start} {v.unit}".rstrip()
+        default = "not stated" if v.start is None else in_unit(f"{v.start}", v.unit)
         lines.append(_comment(f"{toml_key(v.name)}.range = {shown}  # default: {default}"))
     return "\n".join(lines)
 

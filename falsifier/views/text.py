@@ -9,7 +9,7 @@ from falsifier.analyses.assess import Assurance
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.space import number_names
-from falsifier.core.words import candidate_facts, counted, readable
+from falsifier.core.words import candidate_facts, counted, in_unit, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -167,8 +167,8 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
     values = []
     for name, value in verdict.values.items():
         label = labels[name].get(int(value)) if labels.get(name) else None
-        words = (f"{name} = {readable(value)}", units.get(name), label and f"({label})")
-        values.append(" ".join(filter(None, words)))
+        words = in_unit(f"{name} = {readable(value)}", units.get(name, ""))
+        values.append(f"{words} ({label})" if label else words)
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
         ("robustness", f"{signed(verdict.robustness)} ({meaning})"),

@@ -16,7 +16,7 @@ from falsifier.search.findings import Finding
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, markdown_report
-from falsifier.views.text import result_json, result_text, results_text
+from falsifier.views.text import margin_facts, result_json, result_text, results_text
 from tests.fmu.fixtures import path
 from tests.problems import conditional, easy, hard, impossible, mostly_broken, unusable
 from tests.searches import stop_after
@@ -49,6 +49,12 @@ def test_items_are_told_with_their_names(tmp_path: Path) -> None:
     result = falsify(problem, "corners", budget=9, directory=tmp_path)
     for text in (result_text(result), markdown_report(tmp_path)):
         assert re.search(r"out_Boolean = . \((true|false)\), out_Enumeration = 3 \(third\)", text)
+
+
+def test_the_unit_1_is_not_told(found: Result) -> None:
+    assert found.shown is not None
+    facts = dict(margin_facts(found.shown.verdict, {"x": "1", "u": "V"}, {}))
+    assert facts["values then"] == "x = 0.999973, u = 1 V"
 
 
 def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:
