@@ -14,7 +14,7 @@ import numpy as np
 
 from falsifier.core.arguments import finite, whole
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
-from falsifier.core.words import counted, readable
+from falsifier.core.words import counted, in_unit, readable
 from falsifier.engines.box import Proposal
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -281,6 +281,5 @@ def _input_text(r: InputRange, space: SearchSpace) -> str:
 
 
 def _range_text(r: InputRange | ParameterRange) -> str:
-    unit = f" {r.unit}" if r.unit else ""
-    allowed = "" if r.kind == "real" else ", each allowed number equally likely"
-    return f"[{readable(r.low)}, {readable(r.high)}]{unit}{allowed}"
+    limits = in_unit(f"[{readable(r.low)}, {readable(r.high)}]", r.unit)
+    return limits if r.kind == "real" else f"{limits}, each allowed number equally likely"

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import Range
+from falsifier.core.space import Range, number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.levels import Climb
@@ -184,7 +184,7 @@ def coverage(directory: str | PathLike[str]) -> Coverage:
     described, records = manifest.read(place), read_journal(place)
     candidates = recorded_candidates(records)
     ended = [r for r in records if isinstance(r, EvaluatedRecord)]
-    counting = {m.name: labels_of(m.kind, m.items) for m in described.modes if m.kind != "boolean"}
+    counting = {m.name: number_names(m.kind, m.items) for m in described.modes if m.kind != "boolean"}
     climbs = {name: Climb(counting) for name in described.names}
     predicates = {r.name: parse(r.formula).predicates for r in described.requirements}
 
@@ -271,9 +271,9 @@ class _Seen:
         self.inputs = {r.name for r in described.inputs}
         discrete = [r for r in (*described.inputs, *described.parameters) if r.kind != "real"]
         self.labels = {
-            r.name: labels_of(r.kind, r.items) or {n: str(n) for n in _allowed(r)} for r in discrete
+            r.name: number_names(r.kind, r.items) or {n: str(n) for n in _allowed(r)} for r in discrete
         }
-        self.labels |= {m.name: labels_of(m.kind, m.items) for m in described.modes}
+        self.labels |= {m.name: number_names(m.kind, m.items) for m in described.modes}
         self.values: dict[str, set[int]] = {name: set() for name in self.labels}
         self.changes: dict[str, set[tuple[int, int]]] = {name: set() for name in self.labels}
 
@@ -331,11 +331,6 @@ def cells_of(r: Range, values: Array) -> Cells:
     """Return the part of the range in which each value is, in the shape of the values."""
     edges = np.array(edges_of(r))
     return np.searchsorted((edges[1:, 0] + edges[:-1, 1]) / 2, values, side="right").astype(np.uint16)
-
-
-def labels_of(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
-    """Return the name of each value of a Boolean or enumeration; empty for other kinds."""
-    return {0: "false", 1: "true"} if kind == "boolean" else {number: label for label, number in items}
 
 
 def pace_of(signal: Signal, r: Range, stop_time: float) -> str:

@@ -12,11 +12,11 @@ from pydantic import Field
 
 from falsifier.core.arguments import list_of, whole
 from falsifier.core.files import readable_part
+from falsifier.core.strict import Strict
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import SpecError, written
 from falsifier.llm.conversation import MAX_REASKS
-from falsifier.llm.messages import Strict
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
 from falsifier.problem.loading import load_source

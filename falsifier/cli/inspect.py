@@ -3,7 +3,6 @@
 from contextlib import closing
 from dataclasses import asdict, replace
 from math import isinf
-from os.path import relpath
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +14,17 @@ from falsifier.cli.options import PATH, changes_in, json_option, out_option, pol
 from falsifier.cli.output import as_shown, say
 from falsifier.context.simulink import read_diagram
 from falsifier.context.values import SIMULINK
-from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent, bundled
 from falsifier.core.literals import shell_word
 from falsifier.core.model import Experiment, ModelInfo
 from falsifier.core.signals import Signal
+from falsifier.core.words import in_unit
 from falsifier.errors import MachineError, ModelError, SpecError
 from falsifier.evaluation.confirm import step_convergence, sufficient_step
 from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import default_interface, make_system, rights_of
+from falsifier.problem.models import make_system, rights_of
 from falsifier.problem.sections import ModelSection
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
@@ -104,7 +103,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
 
 
 def _starter(fmus: tuple[Path, ...], path: Path) -> str:
-    from falsifier.problem.writing import starter_spec
+    from falsifier.problem.writing import seen_from, starter_spec
 
     if len(fmus) > 1:
         parts: dict[str, Path] = {}
@@ -112,15 +111,15 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
             name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
             parts[name] = source
         info = System(dict(parts), name=path.stem).info
-        return starter_spec({name: _relative(source, path) for name, source in parts.items()}, info)
+        return starter_spec({name: seen_from(path, source) for name, source in parts.items()}, info)
     given = fmus[0]
     if is_package(given):
-        return starter_spec(_relative(given, path), read_package(given).info)
+        return starter_spec(seen_from(path, given), read_package(given).info)
     source = one_fmu(given)
     found = read_info(source)
     # Raises an error if the FMU cannot be simulated, before a useless spec is written.
-    FmuModel(source, interface=default_interface(found))
-    return starter_spec(_relative(source, path), found)
+    FmuModel(source, interface=found.default_interface)
+    return starter_spec(seen_from(path, source), found)
 
 
 def _print_convergence(
@@ -133,7 +132,7 @@ def _print_convergence(
     """Print what halving the step, a spec's if it states one, changes while each input goes up and down."""
     from falsifier.problem.writing import DEFAULT_STOP_TIME
 
-    interface = stated.interface or default_interface(found)
+    interface = stated.interface or found.default_interface
     stop_time = stated.stop_time or found.stop_time or DEFAULT_STOP_TIME
     named = (v.name for v in found.observables if v.kind != "string" and v.name not in stated.omit)
     outputs = tuple(named)[:_CHECKED_VARIABLES]
@@ -165,7 +164,7 @@ def _print_convergence(
     if not found.outputs:
         say(f"  the {found.noun} declares no outputs; these are its states or other computed variables")
     for name, moved in movements.items():
-        most = f"{moved.largest:.3g} {found[name].unit}".rstrip()
+        most = in_unit(f"{moved.largest:.3g}", found[name].unit)
         share = f"{100 * moved.relative:.2g} % of its range"
         share = "constant at half of the step" if isinf(moved.relative) else share
         say(f"  {name} changes by at most {most}, at {moved.time:.10g} s ({share})")
@@ -228,8 +227,3 @@ def _existing_fmu(fmu: Path) -> Path:
 
 def _bundled_fmu(name: Path) -> Path:
     return bundled("fmus") / f"{name.name.removesuffix('.fmu')}.fmu"
-
-
-def _relative(fmu: Path, spec: Path) -> Path:
-    """Path of the FMU relative to the spec's directory (Path.relative_to has walk_up only in Python 3.12)."""
-    return Path(utf_8(relpath(fmu.resolve(), spec.resolve().parent)))

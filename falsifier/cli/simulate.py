@@ -137,8 +137,7 @@ def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
         low, high = min(values) - room, max(values) + room
         if own is None:
             kind: Any = variable.kind  # no string: it was simulated
-            items = tuple(variable.literals.items())
-            own = InputRange(name, low, high, unit=variable.unit, kind=kind, items=items)
+            own = InputRange(name, low, high, unit=variable.unit, kind=kind, items=variable.items)
         inputs.append(replace(own, low=low, high=high))
     return replace(problem, space=SearchSpace(tuple(inputs), (), problem.space.stop_time))
 

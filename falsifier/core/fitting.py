@@ -8,7 +8,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
+from falsifier.core.space import InputRange, Range, SearchSpace, is_outside, nearest_value, outside_text
 from falsifier.errors import CandidateError
 
 
@@ -63,10 +63,8 @@ def _fitted_signal(space: SearchSpace, r: InputRange, signal: Signal) -> tuple[S
     except CandidateError as error:
         reason = str(error)
     for time, value in zip(signal.times, signal.values, strict=True):
-        if time <= space.stop_time and not r.low <= value <= r.high:
-            raise CandidateError(
-                f"{r.label} at t = {time:g} s: {value:.12g} is outside its range [{r.low:g}, {r.high:g}]"
-            )
+        if time <= space.stop_time and is_outside(r, value):
+            raise CandidateError(f"{r.label} at t = {time:g} s: {value:.12g} is {outside_text(r)}")
     times, interpolation = _allowed(r, signal, space)
     values = signal.held(None).sample(np.asarray(times))
     sampled = Signal(times, tuple(float(v) for v in values), interpolation, r.hold)

@@ -13,10 +13,11 @@ from falsifier.core.arguments import one_of, positive
 from falsifier.core.fixed import fixed
 from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
+from falsifier.core.space import ValueKind
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError, SpecError, did_you_mean
 
-Kind = Literal["real", "integer", "boolean", "enumeration", "string"]
+Kind = Literal[ValueKind, "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
 Interface = Literal["co-simulation", "model-exchange"]
 
@@ -113,6 +114,11 @@ class Variable:
         return low, high
 
     @property
+    def items(self) -> tuple[tuple[str, int], ...]:
+        """Names and numbers of an enumeration's items, as ranges have them; empty for other types."""
+        return tuple(self.literals.items())
+
+    @property
     def items_text(self) -> str:
         """Numbers and names of an enumeration's items; empty for other types."""
         return ", ".join(f"{number} = {name}" for name, number in self.literals.items())
@@ -206,6 +212,11 @@ class ModelInfo:
 
     def __contains__(self, name: object) -> bool:
         return any(v.name == name for v in self.variables)
+
+    @property
+    def default_interface(self) -> Interface:
+        """Co-simulation if the model offers it, with its exporting tool's solver, or if it offers none."""
+        return "model-exchange" if self.interfaces == ("model-exchange",) else "co-simulation"
 
     def kind(self, name: str) -> Kind:
         """Return the type of a variable's values; real if there is no such variable."""

@@ -4,7 +4,7 @@ If every parameterization is fixed, the search space is also a named box; ``deco
 between vectors and candidates.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
 from math import ceil, floor, isfinite
 from typing import Literal, get_args
@@ -44,6 +44,11 @@ class Freedom:
     def __post_init__(self) -> None:
         whole("max_control_points", self.max_control_points, least=1)
         positive("min_interval", self.min_interval)
+
+
+def number_names(kind: str, items: Iterable[tuple[str, int]]) -> dict[int, str]:
+    """Return the name of each number of a Boolean or an enumeration; empty for other kinds."""
+    return {0: "false", 1: "true"} if kind == "boolean" else {number: name for name, number in items}
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,9 +298,9 @@ class SearchSpace:
         outside = [
             *(_signal_outside(r, candidate.signals[r.name]) for r in self.inputs),
             *(
-                f"{p.label}: {value:.12g} is {_outside(p)}"
+                f"{p.label}: {value:.12g} is {outside_text(p)}"
                 for p in self.parameters
-                if _is_outside(p, value := candidate.parameters[p.name])
+                if is_outside(p, value := candidate.parameters[p.name])
             ),
         ]
         if any(outside):
@@ -380,7 +385,8 @@ def _into_range(value: float, ranged: Range) -> float:
     return nearest_value(ranged, min(max(float(value), ranged.low), ranged.high))
 
 
-def _is_outside(ranged: Range, value: float) -> bool:
+def is_outside(ranged: Range, value: float) -> bool:
+    """Whether a value is farther outside a range than a rounding."""
     # Whatever is nearest to an allowed number is rounded to it.
     tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low) if ranged.kind == "real" else 0.5
     return not ranged.low - tolerance <= value <= ranged.high + tolerance
@@ -389,17 +395,18 @@ def _is_outside(ranged: Range, value: float) -> bool:
 def _signal_outside(r: InputRange, signal: Signal) -> str:
     """What is outside the range of an input; empty if nothing is."""
     values = signal.values
-    found = [(t, v) for t, v in zip(signal.times, values, strict=True) if _is_outside(r, v)]
+    found = [(t, v) for t, v in zip(signal.times, values, strict=True) if is_outside(r, v)]
     if not found:
         return ""
     if len(set(values)) == 1 < len(values):
-        return f"{r.label}: {values[0]:.12g} is {_outside(r)}"
+        return f"{r.label}: {values[0]:.12g} is {outside_text(r)}"
     shown = found[:_SHOWN_VALUES]
     more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
     at, what = (", ".join(f"{pair[k]:.12g}" for pair in shown) for k in (0, 1))
     verb = "is" if len(found) == 1 else "are"
-    return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {_outside(r)}"
+    return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {outside_text(r)}"
 
 
-def _outside(ranged: Range) -> str:
+def outside_text(ranged: Range) -> str:
+    """Say of a value that it is outside a range."""
     return f"outside its range [{ranged.low:.12g}, {ranged.high:.12g}]"

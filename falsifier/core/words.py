@@ -17,6 +17,15 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("", "1") else name
 
 
+def in_unit(number: str, unit: str) -> str:
+    """Return a number with its unit, if that is known and has a name.
+
+    >>> in_unit("3", "m/s"), in_unit("3", ""), in_unit("3", "1")
+    ('3 m/s', '3', '3')
+    """
+    return f"{number} {unit}" if unit not in ("", "1") else number
+
+
 def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
     """Return a number with so many digits, a large one with its hundredths, a whole one with all digits.
 
@@ -104,6 +113,16 @@ def listed(parts: Sequence[str]) -> str:
     ('a', 'a, b and c')
     """
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def first_few(parts: Sequence[str], most: int = 10) -> str:
+    """Name the first parts, and say how many more there are.
+
+    >>> first_few(["a", "b"]), first_few(["a", "b", "c"], most=1)
+    ('a, b', 'a and 2 more')
+    """
+    more = f" and {len(parts) - most} more" if len(parts) > most else ""
+    return f"{', '.join(parts[:most])}{more}"
 
 
 def aligned(

@@ -17,6 +17,7 @@ from falsifier import __version__
 from falsifier.core.arguments import instance, path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
+from falsifier.core.strict import Strict
 from falsifier.errors import (
     CandidateError,
     JournalError,
@@ -29,7 +30,6 @@ from falsifier.errors import (
 from falsifier.evaluation.confirm import Confirmation, Outcome, confirm
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.fmu import fmu_files, resolved, with_paths
-from falsifier.llm.messages import Strict
 from falsifier.problem.loading import reloadable, source_file
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource

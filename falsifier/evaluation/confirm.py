@@ -18,7 +18,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate_any
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, is_solved
 from falsifier.problem.problem import Problem
 from falsifier.stl import second_monitor
 from falsifier.stl.margins import signed
@@ -91,8 +91,7 @@ def confirm(problem: Problem, evaluation: Evaluation) -> Confirmation:
     if not is_same:
         _, doubt = _second_opinion(finer, halved)
     outcome: Outcome = "confirmed"
-    is_solved = getattr(problem.model, "interface", "") == "model-exchange"
-    step = "largest solver step" if is_solved else "communication step"
+    step = "largest solver step" if is_solved(problem.model) else "communication step"
     steps = f"half the {step} ({finer.experiment.step_size:.4g} s)"
     if halved.robustness is None or fresh.robustness is None:
         # No verdict either way: the violation at the given step stands, and the reason states the failure.

@@ -6,6 +6,7 @@ from falsifier.fmu.model import (
     fmu_files as fmu_files,
     fmus_sha256 as fmus_sha256,
     is_packaged as is_packaged,
+    is_solved as is_solved,
 )
 from falsifier.fmu.process.network import Coupling as Coupling
 from falsifier.fmu.process.registry import rights_text as rights_text, stop_simulations as stop_simulations

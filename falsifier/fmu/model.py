@@ -176,6 +176,11 @@ def is_packaged(model: Model) -> bool:
     return isinstance(model, System) and model.package is not None
 
 
+def is_solved(model: Model) -> bool:
+    """Whether a solver of ours integrates a model: an FMU in model exchange."""
+    return isinstance(model, FmuModel) and model.interface == "model-exchange"
+
+
 def fmus_sha256(digests: Iterable[str]) -> str | None:
     """Return one hash for the FMUs with these hashes: that of a single FMU is its own; None without FMUs."""
     distinct = sorted(set(digests))

@@ -23,6 +23,7 @@ from pydantic import (
 
 from falsifier.core.literals import printable
 from falsifier.core.signals import Interpolation
+from falsifier.core.strict import Strict
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import objects_in, without_thoughts
 from falsifier.problem.sections import no_truth
@@ -128,9 +129,9 @@ def _storable(text: str) -> str:
     return printable(text[: 2 * _LONGEST_RATIONALE])[:_LONGEST_RATIONALE]
 
 
-class _Part(BaseModel):
+class _Part(Strict):
     # A misspelt key within a part would change what is simulated.
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(allow_inf_nan=False)
 
 
 class WrittenSignal(_Part):

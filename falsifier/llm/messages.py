@@ -5,11 +5,12 @@ from math import inf
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 
 from falsifier.core.arguments import instance
 from falsifier.core.literals import printable
 from falsifier.core.secrets import redact_held
+from falsifier.core.strict import Strict
 
 Role = Literal["system", "user", "assistant"]
 Source = Literal["llm", "script", "recording", "cache"]
@@ -22,12 +23,6 @@ TOOL_CALL = "call of the tool "
 UNREADABLE = "unreadable"
 # Some 250,000 tokens, more than any LLM writes in one reply. What is longer is cut, and rejected when read.
 LONGEST_REPLY = 1_000_000
-
-
-class Strict(BaseModel):
-    """A value of a record that takes no other keys than its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
 
 class Message(Strict):

@@ -15,7 +15,7 @@ from falsifier.core.words import listed, readable
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
 from falsifier.fmu import Rights, System, is_package, read_info, read_package, resolved
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
-from falsifier.problem.models import default_interface, make_model
+from falsifier.problem.models import make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
 from falsifier.problem.requirement import Requirement, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, Simulation
@@ -160,7 +160,7 @@ def join_formula(
     data: dict[str, Any]
     if isinstance(model, Path):
         info, system = read_info(model), None
-        interface = changes.interface or default_interface(info)
+        interface = changes.interface or info.default_interface
         data = {"model": {"fmu": str(model.resolve()), "interface": interface}}
     else:
         if changes.interface == "model-exchange":

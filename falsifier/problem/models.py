@@ -89,16 +89,13 @@ def _existing(path: Path, named: str, key: str) -> Path:
     return found
 
 
-def default_interface(info: ModelInfo) -> Interface:
-    """Return the default interface: co-simulation if the FMU offers it, with its exporting tool's solver."""
-    # Also if it offers none: FmuModel says so.
-    return info.interfaces[0] if info.interfaces == ("model-exchange",) else "co-simulation"
-
-
 def _interface(stated: Interface | None, info: ModelInfo) -> Interface:
-    """Return the stated interface, if the FMU offers it, or the only one that it offers."""
+    """Return the stated interface, if the FMU offers it, or the only one that it offers.
+
+    If it offers none, FmuModel says so.
+    """
     if not info.interfaces or (stated is None and len(info.interfaces) == 1):
-        return default_interface(info)
+        return info.default_interface
     if stated is None or stated not in info.interfaces:
         advice = "; set this key to one of them" if stated is None else f", not {stated}; change this key"
         raise SpecError(f"the FMU offers {' and '.join(info.interfaces)}{advice}", key="model.interface")

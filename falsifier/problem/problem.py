@@ -260,9 +260,9 @@ def _check_variables(problem: Problem) -> None:
     for each in problem.space.ranges:
         variable = info[each.name]  # of a real one, whole numbers alone may be searched
         is_other = variable.kind != "real" and each.kind == "real"
-        items_differ = not each.items or set(each.items) - set(variable.literals.items())
+        items_differ = not each.items or set(each.items) - set(variable.items)
         if is_other or (variable.literals and items_differ):
-            items = f", items={tuple(variable.literals.items())}" if variable.literals else ""
+            items = f", items={variable.items}" if variable.literals else ""
             raise SpecError(
                 f"{problem.name}: {each.label} is of type {variable.kind} in the model: give the range "
                 f"kind={variable.kind!r}{items}"

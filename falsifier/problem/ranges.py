@@ -124,7 +124,7 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
         unit=variable.unit,
         description=variable.description,
         kind=value_kind(variable),
-        items=tuple(variable.literals.items()),
+        items=variable.items,
     )
 
 
@@ -139,7 +139,7 @@ def _parameter_range(variable: Variable, given: tuple[float | str, float | str])
         unit=variable.unit,
         description=variable.description,
         kind=kind,
-        items=tuple(variable.literals.items()),
+        items=variable.items,
     )
 
 

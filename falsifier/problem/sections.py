@@ -5,13 +5,14 @@ from math import isfinite
 from numbers import Real
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from falsifier.core.arguments import utf_8
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
+from falsifier.core.strict import Strict
 from falsifier.errors import did_you_mean, shown
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
@@ -69,10 +70,9 @@ Range = Annotated[tuple[Number, Number], AfterValidator(in_order)]
 Ends = Annotated[tuple[Value, Value], AfterValidator(lambda e: e if str in map(type, e) else in_order(e))]
 
 
-class Strict(BaseModel):
-    """A section that takes no other keys than its own."""
+class Section(Strict):
+    """A section of a spec file, which says what is wrong with its keys."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     # Keys that make another section of it.
     other_keys: ClassVar[tuple[str, ...]] = ()
 
@@ -102,14 +102,14 @@ def _wrong(key: str, message: str) -> PydanticCustomError:
     return PydanticCustomError("wrong_key", "{message}", {"key": key, "message": message})
 
 
-class FreeSection(Strict):
+class FreeSection(Section):
     """Limits of a free parameterization."""
 
     max_control_points: _ControlPoints = Field(description="Maximum number of control points.")
     min_interval: Seconds = Field(description="Minimum time between two control points in s.")
 
 
-class InputSection(Strict):
+class InputSection(Section):
     """One input signal: searched within a range, or kept constant."""
 
     range: Ends | None = Field(
@@ -142,7 +142,7 @@ class InputSection(Strict):
         return all(each is None for each in (self.value, self.control_points, self.interpolation, self.free))
 
 
-class ParameterSection(Strict):
+class ParameterSection(Section):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
     range: Ends | None = Field(None, description="[low, high] to search within; numbers or names of items.")
@@ -164,7 +164,7 @@ _BARE = BeforeValidator(lambda found: {"value": found} if isinstance(found, int 
 Parameters = dict[str, Annotated[ParameterSection, _BARE]]
 
 
-class Simulation(Strict):
+class Simulation(Section):
     """How a model is simulated: keys of [model], which requirements and profiles may override."""
 
     interface: Interface | None = Field(None, description="Required if the FMU offers both.")
@@ -196,7 +196,7 @@ class ModelSection(Simulation):
     record: tuple[str, ...] = Field((), description="Variables to record in addition to the outputs.")
 
 
-class ComponentSection(Strict):
+class ComponentSection(Section):
     """One FMU of a system."""
 
     fmu: str = Field(description="Path of the FMU, relative to the spec file.")
@@ -208,7 +208,7 @@ class ComponentSection(Strict):
     )
 
 
-class ConnectionSection(Strict):
+class ConnectionSection(Section):
     """Where the values of one input of a component come from."""
 
     source: str = Field(alias="from", description="Output, as COMPONENT.VARIABLE.")
@@ -219,7 +219,7 @@ class ConnectionSection(Strict):
     )
 
 
-class CouplingSection(Strict):
+class CouplingSection(Section):
     """How the components of a system exchange values."""
 
     method: Method = Field(
@@ -251,7 +251,7 @@ class CouplingSection(Strict):
     )
 
 
-class ContextSection(Strict):
+class ContextSection(Section):
     """What a language model, and the engine surrogate, may read about the model; nothing else is sent."""
 
     files: tuple[str, ...] = Field(

@@ -5,9 +5,10 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_serializer
+from pydantic import Field, ValidationError, field_serializer
 
 from falsifier.core.files import bundled
+from falsifier.core.strict import Strict
 from falsifier.errors import SpecError, first_fault
 from falsifier.fmu.ssp.package import SUFFIXES as PACKAGES
 from falsifier.problem.sections import ModelChanges, Number, Recordable
@@ -46,7 +47,7 @@ class Target:
         return cls("bundled", requirement=text.partition(":")[2])
 
 
-class ProblemSource(BaseModel):
+class ProblemSource(Strict):
     """A spec's requirement, or an FMU with a formula, and changes to either.
 
     Attributes:
@@ -66,8 +67,6 @@ class ProblemSource(BaseModel):
             lies inside the FMU; ``none``: not what the spec names; ``checked:FILE``: a line of this file
             looks like a key and is none.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     target: Recordable
     stl: str | None = None

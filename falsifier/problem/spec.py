@@ -71,7 +71,7 @@ else:
     AnyRequirement = Annotated[reduce(or_, _TAGGED), Discriminator(_kind_of_requirement)]
 
 
-class Spec(sections.Strict):
+class Spec(sections.Section):
     """A whole spec file."""
 
     model: sections.ModelSection = Field(default_factory=sections.ModelSection)

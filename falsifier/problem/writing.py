@@ -12,15 +12,16 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable, Item
 
+from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent
 from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import default_interface
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
@@ -65,7 +66,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     model = ["[model]"]
     if isinstance(fmu, Path):
         model += [f"fmu = {_toml(fmu.as_posix())}"]
-        model += [f"interface = {_toml(default_interface(info))}"]
+        model += [f"interface = {_toml(info.default_interface)}"]
     else:
         sections += _components(fmu, info)
     stop_time = info.stop_time or DEFAULT_STOP_TIME
@@ -77,6 +78,14 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
         sections.append(_parameters(tunable, searched=() if inputs else tunable[:1]))
     sections.append(_requirement(info, stop_time))
     return "\n\n".join(sections) + "\n"
+
+
+def seen_from(spec: Path, path: Path) -> Path:
+    """Return a path relative to a spec's folder, as the spec states it; SpecError if it is not of UTF-8.
+
+    Path.relative_to has walk_up only in Python 3.12.
+    """
+    return Path(utf_8(relpath(path.resolve(), spec.resolve().parent)))
 
 
 def _components(fmus: Mapping[str, Path], info: ModelInfo) -> Iterator[str]:
@@ -100,7 +109,8 @@ def _local(name: str) -> str:
 
 
 def _input(v: Variable) -> str:
-    meaning = ", ".join(part for part in (v.description, v.unit and f"in {v.unit}") if part)
+    unit = "" if v.unit == "1" else v.unit
+    meaning = ", ".join(part for part in (v.description, unit and f"in {unit}") if part)
     lines = [f"[inputs.{toml_key(v.name)}]"]
     lines += [_comment(line) for line in (meaning, v.items_text) if line]
     low, high = v.limits
@@ -131,7 +141,7 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
     for v in others[:_SHOWN_PARAMETERS]:
         low, high = v.limits
         shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        default = "not stated" if v.start is None else f"{v.start} {v.unit}".rstrip()
+        default = "not stated" if v.start is None else in_unit(f"{v.start}", v.unit)
         lines.append(_comment(f"{toml_key(v.name)}.range = {shown}  # default: {default}"))
     return "\n".join(lines)
 
@@ -252,9 +262,9 @@ def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> No
     def moved(named: str) -> str:
         if Path(named).is_absolute():
             return named
-        there = (folder / named).resolve()
+        there = folder / named
         # Only with a slash a text names a folder.
-        return Path(relpath(there, out.resolve().parent)).as_posix() + "/" * there.is_dir()
+        return seen_from(out, there).as_posix() + "/" * there.is_dir()
 
     for section in (document.get("model", {}), *document.get("components", {}).values()):
         if "fmu" in section:

@@ -17,9 +17,10 @@ from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
 from falsifier.core.space import Range, ValueKind
+from falsifier.core.strict import Strict
+from falsifier.core.words import first_few
 from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
-from falsifier.llm.messages import Strict
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.source import Parameterization, ProblemSource
@@ -156,9 +157,7 @@ def check_no_folder(directory: Path) -> None:
     found = (path for pattern in ("*", "runs/*") for path in directory.glob(f"{pattern}/{MANIFEST}"))
     below = sorted(str(path.parent) for path in found)
     if below and not (directory / MANIFEST).exists():
-        more = f" and {len(below) - _NAMED} more" if len(below) > _NAMED else ""
-        some = ", ".join(below[:_NAMED])
-        raise JournalError(f"{directory} is a folder of runs; give one of them: {some}{more}")
+        raise JournalError(f"{directory} is a folder of runs; give one of them: {first_few(below, _NAMED)}")
 
 
 def check_in_sight(place: Path, sources: Iterable[ProblemSource], remedy: str = _GO_THERE) -> None:
@@ -259,4 +258,4 @@ def _modes(problem: Problem) -> Iterator[ModeRecord]:
     for name in problem.experiment.outputs:
         variable = problem.info[name] if name in problem.info else Variable(name)
         if variable.kind in ("integer", "boolean", "enumeration"):
-            yield ModeRecord(name=name, kind=variable.kind, items=tuple(variable.literals.items()))
+            yield ModeRecord(name=name, kind=variable.kind, items=variable.items)

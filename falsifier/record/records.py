@@ -2,10 +2,11 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import seal
+from falsifier.core.strict import Strict
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.llm.messages import Exchange
@@ -18,9 +19,9 @@ from falsifier.stl.monitor import Verdict
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
 
 
-class _Record(BaseModel):
+class _Record(Strict):
     # The values in it are checked alike.
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(allow_inf_nan=False)
 
     line: int = Field(0, description="Number of the line, from 1; 0 before it is written.")
     run: str = Field("", description="Name of the run that wrote the line, as in its manifest.")
@@ -51,7 +52,7 @@ class EvaluatedRecord(_Record):
     )
     reason: str = ""
     seconds: float
-    log: list[str] = []
+    log: list[str] = Field([])
     trajectory: str | None = Field(None, description="File, relative to the run directory.")
     elapsed: float = _ELAPSED
 

@@ -86,6 +86,11 @@ class Spent:
         """Tokens sent and received."""
         return self.prompt_tokens + self.completion_tokens
 
+    @property
+    def cost_text(self) -> str:
+        """The cost in words."""
+        return "cost unknown" if self.cost is None else f"{self.cost:.4f} US dollars"
+
     @classmethod
     def on_requests(cls, count: int, usage: Usage) -> "Spent":
         """Return what so many requests to a language model used."""

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
+from falsifier.core.strict import Strict
 from falsifier.llm import Effort
-from falsifier.llm.messages import Strict
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_address, check_option_values, stated_address
 from falsifier.problem.sections import no_truth

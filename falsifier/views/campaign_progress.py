@@ -66,6 +66,5 @@ def overall_line(progress: Progress, *, stopped: bool = False) -> str:
         spent.simulations_text,
     ]
     if spent.questions:
-        cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
-        parts.append(f"{spent.tokens} tokens, {cost}")
+        parts.append(f"{spent.tokens} tokens, {spent.cost_text}")
     return ", ".join(parts)

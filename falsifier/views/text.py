@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from falsifier.analyses.assess import Assurance
-from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line, shell_word
-from falsifier.core.words import candidate_facts, counted, readable
+from falsifier.core.space import number_names
+from falsifier.core.words import candidate_facts, counted, in_unit, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -153,7 +153,7 @@ def evaluation_facts(problem: Problem, evaluation: Evaluation) -> list[Fact]:
 def _known(problem: Problem) -> tuple[dict[str, str], Labels]:
     """Return the units of a model's variables by name, and the names of their numbers."""
     variables = problem.info.variables
-    labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
+    labels = {v.name: number_names(v.kind, v.items) for v in variables}
     return {v.name: v.unit for v in variables}, labels
 
 
@@ -172,8 +172,8 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
     for name in [*dict.fromkeys((*first, *verdict.values))][:_MOST_VALUES]:
         value = verdict.values[name]
         label = labels[name].get(int(value)) if labels.get(name) else None
-        words = (f"{name} = {readable(value)}", units.get(name), label and f"({label})")
-        values.append(" ".join(filter(None, words)))
+        words = in_unit(f"{name} = {readable(value)}", units.get(name, ""))
+        values.append(f"{words} ({label})" if label else words)
     if more := len(verdict.values) - len(values):
         values.append(f"and {more} more")
     meaning = margin_words(verdict.robustness, verdict.predicate)
@@ -247,12 +247,11 @@ def _pictures(result: Result) -> list[Path]:
 
 def llm_use(spent: Spent) -> str:
     """Calls, tokens and cost of the language model."""
-    cost = "cost unknown" if spent.cost is None else f"{spent.cost:.4f} US dollars"
     reasoning = f" ({spent.reasoning_tokens} for reasoning)" if spent.reasoning_tokens else ""
     lost = f" ({spent.without_reply} of them without a usable reply)" if spent.without_reply else ""
     kept = f", {counted(spent.kept, 'reply')} from the cache" if spent.kept else ""
     requests = f"{counted(spent.calls, 'request')}{lost}{kept}"
-    return f"{requests}, {counted(spent.tokens, 'token')}{reasoning}, {cost}"
+    return f"{requests}, {counted(spent.tokens, 'token')}{reasoning}, {spent.cost_text}"
 
 
 def seconds_text(spent: Spent) -> str:

@@ -273,6 +273,12 @@ def test_values_outside_the_range_and_missing_inputs_are_refused() -> None:
         fit(space, Candidate())
 
 
+def test_a_value_that_a_rounding_put_outside_fits() -> None:
+    space = lag_problem(points=2).space
+    rounded = Signal((0.0, 5.0, 10.0), (0.0, 1.000001, 1.000001), "linear")
+    assert fit(space, Candidate({"u": rounded})).candidate.signals["u"].values == (0.0, 1.0)
+
+
 def test_what_is_rounded_to_fit_is_said() -> None:
     gear = InputRange(
         "u", 1.0, 7.0, kind="enumeration", items=(("Off", 1), ("On", 7)), interpolation="constant"

@@ -4,8 +4,8 @@ import json
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
+from contextlib import closing, suppress
 from typing import Any
 
 Behaviour = Callable[[socket.socket, bytes, threading.Event], None]
@@ -54,13 +54,8 @@ class HostileServer:
                 self.gone.set()  # the client has cut the connection
 
 
-@contextmanager
-def misbehaving(*behaviours: Behaviour) -> Iterator[HostileServer]:
-    server = HostileServer(behaviours)
-    try:
-        yield server
-    finally:
-        server.close()
+def misbehaving(*behaviours: Behaviour) -> closing[HostileServer]:
+    return closing(HostileServer(behaviours))
 
 
 def _read_request(connection: socket.socket) -> bytes:

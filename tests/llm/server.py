@@ -2,8 +2,8 @@
 
 import json
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -117,13 +117,8 @@ class Server:
         self._http.server_close()
 
 
-@contextmanager
-def serving(*script: Step) -> Iterator[Server]:
-    server = Server(list(script))
-    try:
-        yield server
-    finally:
-        server.close()
+def serving(*script: Step) -> closing[Server]:
+    return closing(Server(list(script)))
 
 
 def _openai(step: Step, body: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from falsifier.core.model import Interface, ModelInfo
 from falsifier.errors import SpecError
 from falsifier.fmu import Coupling, FmuModel, System
 from falsifier.problem.loading import load_problem
-from falsifier.problem.models import default_interface
 from tests.fmu.fixtures import path
 
 COMPONENTS = f"""
@@ -150,4 +149,4 @@ INFO = ModelInfo("m")
     [(("model-exchange", "co-simulation"), "co-simulation"), (("model-exchange",), "model-exchange")],
 )
 def test_co_simulation_goes_first(offered: tuple[Interface, ...], chosen: str) -> None:
-    assert default_interface(replace(INFO, interfaces=offered)) == chosen
+    assert replace(INFO, interfaces=offered).default_interface == chosen

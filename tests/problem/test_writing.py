@@ -1,4 +1,5 @@
 import shutil
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -113,6 +114,19 @@ def test_in_another_folder_the_fmu_and_context_files_are_found(folder: Path) -> 
     out.write_text(with_requirement(subject_of(str(path)), out, "G (rpm <= 1)", description="")[0])
     assert load_problem(f"{out}:R1").name == "R1"
     assert read_spec(out).context.files == read_spec(out).context.checked == ("../notes.md",)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere all names are text")
+def test_from_another_folder_one_that_is_not_of_utf_8_cannot_be_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside = folder / "\udce9"
+    inside.mkdir()
+    (folder / "AT.fmu").rename(inside / "AT.fmu")
+    monkeypatch.chdir(inside)
+    subject = subject_of(spec(Path(), GOOD))
+    with pytest.raises(SpecError, match=r"AT\.fmu: the name is not valid UTF-8"):
+        with_requirement(subject, folder / "new.toml", "G (rpm <= 1)", description="")
 
 
 def test_in_another_folder_files_of_strings_and_of_rights_are_found(tmp_path: Path) -> None:

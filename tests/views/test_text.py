@@ -52,6 +52,12 @@ def test_items_are_told_with_their_names(tmp_path: Path) -> None:
         assert re.search(r"out_Boolean = . \((true|false)\), out_Enumeration = 3 \(third\)", text)
 
 
+def test_the_unit_1_is_not_told(found: Result) -> None:
+    assert found.shown is not None
+    facts = dict(margin_facts(found.shown.verdict, {"x": "1", "u": "V"}, {}))
+    assert facts["values then"] == "x = 0.999973, u = 1 V"
+
+
 def test_without_a_counterexample_the_best_is_told_and_why_it_ended() -> None:
     result = falsify(impossible(), "uniform", budget=1)
     text = result_text(result)

@@ -14,7 +14,7 @@ from falsifier.errors import SpecError
 
 _MAX_TEXT_BYTES = 128 << 20
 _SETTINGS = ("StartTime", "StopTime", "Solver", "SolverName", "FixedStep", "MaxStep", "SampleTime")
-# Parameters of blocks that carry meaning; the others say how a block is drawn or generated.
+# Which parameters of a block carry meaning; the others say how it is drawn or generated.
 _SATURATION = ("LimitOutput", "UpperSaturationLimit", "LowerSaturationLimit")
 _NAMES = tomllib.loads(files(__package__).joinpath("names.toml").read_text(encoding="utf-8"))
 _LISTED, _MEANINGFUL, _DRAWN = (frozenset(_NAMES[key].split()) for key in ("blocks", "meaningful", "drawn"))
@@ -156,7 +156,7 @@ def _meaningful(
     if kind not in ("Constant", "SubSystem") or sample not in ("inf", "-1"):
         found["SampleTime"] = sample
     return tuple(
-        (name, shortened(" ".join(value.split()), _LONGEST_VALUE))
+        (name, shortened(_in_one_line(value), _LONGEST_VALUE))
         for name, value in found.items()
         if value.strip() not in _EMPTY or (name in _KEPT_EVEN_IF_EMPTY and value.strip())
     )

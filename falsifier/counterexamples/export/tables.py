@@ -15,7 +15,7 @@ from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
 from falsifier.core.model import Kind, Model, ModelInfo, Variable
 from falsifier.core.signals import Signal
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, is_solved
 from falsifier.problem.problem import Problem
 
 # Times that are less than this apart, in s, are one.
@@ -43,7 +43,7 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
     experiment = problem.experiment
     steps = round(experiment.stop_time / experiment.step)
     times = np.arange(steps + 1, dtype=np.float64) * np.float64(experiment.stop_time / steps)
-    if getattr(problem.model, "interface", "") == "model-exchange":
+    if is_solved(problem.model):
         times = np.union1d(times, _beginnings(problem, candidate))
     columns = {}
     for variable in problem.info.inputs:
@@ -95,7 +95,7 @@ def _values(
 ) -> NDArray[np.float64] | None:
     if variable.name in candidate.signals:
         signal = candidate.signals[variable.name]
-        if getattr(problem.model, "interface", "") == "model-exchange" and not variable.is_continuous:
+        if is_solved(problem.model) and not variable.is_continuous:
             grid = problem.experiment.times  # on which a solver changes it
             times = grid[np.searchsorted(grid, times + _TIME_ROUNDING, side="right") - 1]
         values = signal.sample(times)

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element
 
 from falsifier.core.arguments import path_of
 from falsifier.core.model import INTERFACE_TAGS, Interface, ModelInfo, Variable
+from falsifier.core.words import first_few
 from falsifier.errors import ModelError, ModelFileError, did_you_mean
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.libraries import Libraries, can_run_windows, find_libraries, platforms
@@ -32,8 +33,6 @@ from falsifier.fmu.description.xml import read_xml
 # FMI 2 and FMI 3 write it differently.
 _SAVING = ("canGetAndSetFMUstate", "canGetAndSetFMUState")
 _NO_LIBRARIES = Libraries({}, {}, {}, ())
-# Maximum number of names in one note.
-_SHOWN_NAMES = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,19 +202,19 @@ def _notes(
         )
     times = {k: experiment[k] for k in ("stopTime", "stepSize", "tolerance") if k in experiment}
     if unusable := [f"{k} = {v}" for k, v in times.items() if float(v) <= 0.0]:
-        said.append(f"ignored in the default experiment, as not greater than 0: {_listed(unusable)}")
+        said.append(f"ignored in the default experiment, as not greater than 0: {first_few(unusable)}")
     if needs_tool:
         said.append(needed_tool_text(tool, needs_tool))
     if clocks := tuple(input_clocks(root).values()):
-        said.append(f"input clocks are ignored, so they never tick: {_listed(clocks)}")
+        said.append(f"input clocks are ignored, so they never tick: {first_few(clocks)}")
     if ignored := [v.name for v in variables if v.is_clocked]:
-        said.append(f"variables of input clocks are ignored: {_listed(ignored)}")
+        said.append(f"variables of input clocks are ignored: {first_few(ignored)}")
     if binary := [element.attrib["name"] for element in root.findall("ModelVariables/Binary")]:
-        said.append(f"binary variables are ignored: {_listed(binary)}")
+        said.append(f"binary variables are ignored: {first_few(binary)}")
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
-        said.append(f"two names of one input: {_listed(aliases)}; use the second")
+        said.append(f"two names of one input: {first_few(aliases)}; use the second")
     if doubtful := [*_surplus(root, slots), *(text for v in variables if (text := _doubt(v)))]:
-        said.append(f"the description contradicts itself: {_listed(doubtful)}")
+        said.append(f"the description contradicts itself: {first_few(doubtful)}")
     return tuple(said)
 
 
@@ -259,8 +258,3 @@ def needed_tool_text(tool: str, interfaces: Sequence[Interface]) -> str:
         f"{' and '.join(interfaces)} {need} the exporting tool to be installed on this machine"
         f"{f' ({tool})' if tool else ''}, as the FMU says with needsExecutionTool"
     )
-
-
-def _listed(names: Sequence[str]) -> str:
-    more = len(names) - _SHOWN_NAMES
-    return ", ".join(names[:_SHOWN_NAMES]) + (f" and {more} more" if more > 0 else "")

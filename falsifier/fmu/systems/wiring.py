@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from falsifier.core.model import Variable
+from falsifier.core.words import first_few
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu.description.model_description import describe
 from falsifier.fmu.description.structure import Structure, conversion, read_structure
@@ -86,7 +87,7 @@ def _member(name: str, component: Component) -> Member:
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    interface = component.interface or ("co-simulation" if "co-simulation" in offered else offered[0])
+    interface = component.interface or named.info.default_interface
     return Member(name, path, component.sha256, named, component.step, interface)
 
 
@@ -237,10 +238,9 @@ def _check_restorable(loop: Sequence[Member]) -> None:
         )
 
 
-def _order_note(names: Sequence[str], late: Sequence[str], most: int = 10) -> str:
+def _order_note(names: Sequence[str], late: Sequence[str]) -> str:
     text = f"components step in the order {', '.join(names)}"
     if not late:
         return text
-    few = ", ".join(late[:most]) + (f" and {len(late) - most} more" if len(late) > most else "")
     verb = "uses" if len(late) == 1 else "use"
-    return f"{text}; {few} {verb} the values of the previous communication point"
+    return f"{text}; {first_few(late)} {verb} the values of the previous communication point"

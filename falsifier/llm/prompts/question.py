@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import number_names
 from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
@@ -339,8 +340,5 @@ def _text(inputs: Sequence[str], *lines: str) -> str:
 
 def _counting(view: View) -> dict[str, dict[int, str]]:
     """Recorded signals that may count up, with the names of their values; none where no types are told."""
-    return {
-        name: {number: item for item, number in view.variable(name).literals.items()}
-        for name in view.experiment.outputs
-        if view.variable(name).kind in ("integer", "enumeration")
-    }
+    recorded = map(view.variable, view.experiment.outputs)
+    return {v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")}

@@ -13,8 +13,8 @@ from falsifier.analyses.coverage import (
     PairCoverage,
     RangeCoverage,
     edges_of,
-    labels_of,
 )
+from falsifier.core.space import number_names
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.views.plotting.axes import Colour, caption, fit_labels, new_figure, whole_ticks
@@ -120,8 +120,8 @@ def _whole(axis: "Axis", r: RangeCoverage) -> None:
     """Put the ticks of an integer, Boolean or enumeration at its numbers, with their names."""
     if r.searched.kind != "real":
         low, high = r.searched.low, r.searched.high
-        names = labels_of(r.searched.kind, r.searched.items)
-        whole_ticks(axis, {number: name for number, name in names.items() if low <= number <= high})
+        names = number_names(r.searched.kind, r.searched.items).items()
+        whole_ticks(axis, {number: name for number, name in names if low <= number <= high})
 
 
 def _label(r: RangeCoverage) -> str:

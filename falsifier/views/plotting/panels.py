@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from falsifier.analyses.coverage import labels_of
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import Range
+from falsifier.core.space import Range, number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import with_unit
 from falsifier.stl import Formula
@@ -73,7 +72,7 @@ def panels(
     Those of a system are grouped by component, after quantities of several components. Labels are names of
     the numbers of other signals that are not real, by signal.
     """
-    labels = {**labels, **{r.name: labels_of(r.kind, r.items) for r in inputs if r.kind != "real"}}
+    labels = {**labels, **{r.name: number_names(r.kind, r.items) for r in inputs if r.kind != "real"}}
     compared: dict[Expression, _Judged] = {}
     for predicate, window in judged_windows(formula):
         compared.setdefault(compared_sides(predicate)[0], []).append((predicate, window))

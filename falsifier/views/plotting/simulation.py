@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from falsifier.analyses.coverage import labels_of
 from falsifier.core.arguments import instance
+from falsifier.core.space import number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import readable, shortened, with_unit
 from falsifier.evaluation.confirm import Confirmation
@@ -86,7 +86,7 @@ def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verd
     if evaluation.trajectory is None or evaluation.verdict is None:
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
     variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
-    labels = {v.name: labels_of(v.kind, v.literals.items()) for v in variables}
+    labels = {v.name: number_names(v.kind, v.items) for v in variables}
     drawn = panels(
         problem.requirement.formula,
         evaluation.trajectory,

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from falsifier.analyses.coverage import labels_of
 from falsifier.campaigns.analysis import Run, Table, load, main_table, not_begun, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, load_counterexample
@@ -206,8 +206,8 @@ def _drawn(
     searched = (*run.manifest.inputs, *run.manifest.parameters)
     units = {r.name: r.unit for r in searched if r.unit} | dict(trajectory.units if trajectory else {})
     described, drawn = run.manifest, list[Panel]()
-    labels = {r.name: labels_of(r.kind, r.items) for r in searched if r.kind != "real"}
-    labels |= {mode.name: labels_of(mode.kind, mode.items) for mode in described.modes}
+    labels = {r.name: number_names(r.kind, r.items) for r in searched if r.kind != "real"}
+    labels |= {mode.name: number_names(mode.kind, mode.items) for mode in described.modes}
     if trajectory is not None:
         formula, components = parse(described.requirement.formula), described.components
         drawn = panels(formula, trajectory, candidate, described.inputs, verdict, labels, components)

@@ -11,7 +11,7 @@ from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.literals import shell_word
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, listed, readable, with_unit
+from falsifier.core.words import counted, in_unit, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
@@ -115,7 +115,7 @@ def _course(signal: Signal) -> str:
 def parameter_facts(shown: Shown) -> list[Fact]:
     """Return the parameters of a simulation with their values and units."""
     values = shown.candidate.parameters.items()
-    return [(name, f"{value:.10g} {shown.units.get(name, '')}".strip()) for name, value in values]
+    return [(name, in_unit(f"{value:.10g}", shown.units.get(name, ""))) for name, value in values]
 
 
 def tried(section: Section) -> list[Fact]:

@@ -99,7 +99,7 @@ def test_levels_and_closeness_to_a_threshold_count_in_octaves() -> None:
 
 
 def test_of_thousands_of_signals_those_of_the_formula_and_some_others_are_looked_at() -> None:
-    kinds: dict[str, Kind] = {f"y{i}": "real" for i in range(2000)} | {"x": "real"}
+    kinds: dict[str, Kind] = {name: "real" for name in (*(f"y{i}" for i in range(2000)), "x")}
     u = InputRange("u", 0.0, 1.0)
     marker = Marker(function_problem(lag, "G[0,10] (x <= 0.9)", (u,), (), kinds, 10.0, 0.1))
     assert list(marker.kinds) == [*(f"y{i}" for i in range(200)), "x"]
