@@ -6,11 +6,11 @@ between vectors and candidates.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from math import ceil, floor, isfinite
+from math import ceil, floor, inf, isfinite, prod
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.arguments import finite, instance, one_of, positive, whole
 from falsifier.core.candidate import Candidate
@@ -237,6 +237,16 @@ class SearchSpace:
         return (*points, *(Dimension(p.name, None, p.low, p.high) for p in self.parameters))
 
     @property
+    def candidates(self) -> float:
+        """Number of different candidates; infinite if something is real, or control points may be chosen."""
+        if any(r.free for r in self.inputs):
+            return inf
+        counts = {
+            r.name: 1 if r.low == r.high else inf if r.kind == "real" else len(r.numbers) for r in self.ranges
+        }
+        return prod(counts[d.name] for d in self.dimensions)
+
+    @property
     def bounds(self) -> NDArray[np.float64]:
         """Bounds of the vector form, shape (d, 2)."""
         return np.array([(d.low, d.high) for d in self.dimensions], dtype=np.float64).reshape(-1, 2)
@@ -374,11 +384,16 @@ def _check_freedom(r: InputRange, signal: Signal, stop_time: float) -> None:
 
 def nearest_value(ranged: Range, value: float) -> float:
     """Return the nearest number that an input or parameter can take; for reals, the value itself."""
-    if ranged.kind == "real":
-        return value
-    if ranged.items:
-        return float(min(ranged.numbers, key=lambda n: abs(n - value)))
-    return min(max(float(round(value)), ranged.low), ranged.high)
+    return value if ranged.kind == "real" else float(nearest_numbers(ranged, value))
+
+
+def nearest_numbers(ranged: Range, values: ArrayLike) -> NDArray[np.float64]:
+    """Return the nearest numbers that an input or parameter without reals can take, in the same shape."""
+    given = np.asarray(values, dtype=np.float64)
+    if not ranged.items:
+        return np.clip(np.rint(given), ranged.low, ranged.high)
+    numbers = np.array(ranged.numbers, dtype=np.float64)
+    return np.asarray(numbers[np.abs(given[..., None] - numbers).argmin(axis=-1)])
 
 
 def _into_range(value: float, ranged: Range) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, SearchSpace, nearest_value
+from falsifier.core.space import Freedom, InputRange, SearchSpace, nearest_numbers
 from falsifier.problem.problem import Problem
 
 # Single precision in the rollout of learnt dynamics, double precision elsewhere.
@@ -120,10 +120,8 @@ class Layout:
             if r.low == r.high:
                 result[..., group] = 0.0
             elif r.kind != "real":
-                levels, which = np.unique(np.clip(result[..., group], 0.0, 1.0), return_inverse=True)
-                values = [nearest_value(r, r.low + (r.high - r.low) * float(v)) for v in levels]
-                scaled = (np.array(values) - r.low) / (r.high - r.low)
-                result[..., group] = scaled[which].reshape(result[..., group].shape)
+                values = r.low + (r.high - r.low) * np.clip(result[..., group], 0.0, 1.0)
+                result[..., group] = (nearest_numbers(r, values) - r.low) / (r.high - r.low)
         return result
 
     def inputs(self, points: Array, grid: TimeGrid) -> Array:

@@ -130,6 +130,7 @@ class _Loop:
     is_answered: bool = False
     server: str = ""
     unrecorded: str = ""
+    simulated: set[int] = field(default_factory=set)  # hashes of the candidates that were
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
@@ -165,6 +166,8 @@ class _Loop:
             limit = self.limit_reached()
             if limit is not None:
                 return limit
+            if len(self.simulated) == searched_space(standing[0].problem.space, self.used).candidates:
+                return f"all {len(self.simulated)} candidates of the search space were simulated"
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
             try:
@@ -286,6 +289,7 @@ class _Loop:
             )
         )
         self.count += 1
+        self.simulated.add(hash(evaluation.candidate.key))
         for state, seen in judged:
             state.untold.append(seen)
             if seen.violated and state.counterexample is None:

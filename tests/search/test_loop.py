@@ -1,5 +1,6 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from time import sleep
 
@@ -8,7 +9,7 @@ import pytest
 from falsifier.analyses.assess import assess
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace, ValueKind
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace, ValueKind
 from falsifier.engines import make_engine
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
@@ -26,7 +27,7 @@ from falsifier.search.loop import search
 from falsifier.search.steps import Steps
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit
-from falsifier.testing import lag_problem
+from falsifier.testing import FREE, START, lag_problem
 from tests.problems import mostly_broken
 from tests.record.support import run
 from tests.searches import Wrapped
@@ -157,11 +158,22 @@ def whole(problem: Problem, kind: ValueKind) -> Problem:
 @pytest.mark.parametrize(
     "engine", ["surrogate", "coverage", "corners", "uniform", "sobol", "cma", "bayesian"]
 )
-def test_few_whole_numbers_do_not_stall_an_engine(engine: str) -> None:
+def test_a_search_of_few_whole_numbers_ends_when_all_were_simulated(engine: str) -> None:
     problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
-    result = run(problem, engine=engine, budget=8)
-    assert result.spent.simulations == 8
-    assert {e.candidate.signals["u"].values for e in result.evaluations} <= {(-1.0,), (0.0,), (1.0,)}
+    result = run(problem, engine=engine, budget=60)
+    assert result.reason == "all 3 candidates of the search space were simulated"
+    assert {e.candidate.signals["u"].values for e in result.evaluations} == {(-1.0,), (0.0,), (1.0,)}
+
+
+def test_only_whole_numbers_at_given_times_can_be_counted() -> None:
+    space = whole(lag_problem(inputs=1), "integer").space
+    assert space.candidates == 3
+    (u,) = space.inputs
+    gear, still = ParameterRange("gear", 1, 4, kind="integer"), ParameterRange("still", 0.5, 0.5)
+    given = replace(u, control_points=2)
+    assert replace(space, inputs=(given,), parameters=(gear, still)).candidates == 3**2 * 4
+    assert replace(space, inputs=(replace(given, free=FREE),)).candidates == inf
+    assert replace(space, parameters=(START,)).candidates == inf
 
 
 def unusable(request: ChatRequest) -> ChatReply:

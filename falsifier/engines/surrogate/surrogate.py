@@ -1,6 +1,6 @@
 """The surrogate engine: arms that search in different ways on one history, rated by what they bring."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
@@ -27,7 +27,11 @@ from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
-_DRAWS = 100
+_DRAWS = 1000
+# Arms that think for long: if what they propose was simulated, others are asked for this candidate.
+_SLOW = ("dynamics", "region", "cma")
+# How often another engine is asked for one candidate.
+_REQUESTS = 3
 # Maximum number of simulations from which dynamics are learnt, the best and the latest.
 _MOST_TRACES = 60
 # Mean rank, from 0, of the simulation from which deviations are learnt: around the very best alone, the same
@@ -189,11 +193,14 @@ class Surrogate:
 
     def _ask_one(self) -> Candidate:
         rng = np.random.default_rng([self.seed, self._asked])
-        pending = self._propose(rng)
+        left_out: set[str] = set()
+        pending = self._propose(rng, left_out)
         for _ in range(self.settings.retries):
             if self._objection(pending) == 0.0:
                 break
-            pending = min(pending, self._propose(rng), key=self._objection)
+            if pending.arm in _SLOW:
+                left_out.add(pending.arm)
+            pending = min(pending, self._propose(rng, left_out), key=self._objection)
         if is_seen(pending.point, self._tried):
             pending = self._unseen(rng) or pending
         self._asked += 1
@@ -221,8 +228,9 @@ class Surrogate:
         asked = [p.point for p in self._pending.values()] + self._failed
         return np.concatenate([self.history.points, np.array(asked).reshape(-1, self.layout.dimension)])
 
-    def _propose(self, rng: np.random.Generator) -> Pending:
-        arm = self._opening[self._asked] if self._asked < len(self._opening) else self._choose(rng)
+    def _propose(self, rng: np.random.Generator, left_out: Collection[str]) -> Pending:
+        is_opening = self._asked < len(self._opening)
+        arm = self._opening[self._asked] if is_opening else self._choose(rng, left_out)
         if engine := self._engines.get(arm):
             return self._asked_of(arm, engine)
         match arm:
@@ -251,7 +259,7 @@ class Surrogate:
 
     def _asked_of(self, arm: str, engine: BoxEngine) -> Pending:
         """Ask another engine; what it asks for although it was simulated is told to it at once."""
-        for _ in range(self.settings.retries + 1):
+        for _ in range(_REQUESTS):
             (candidate,) = engine.ask()
             point = self.layout.point(candidate)
             known = next((s for s in self.history.samples if is_seen(point, s.point[None])), None)
@@ -264,8 +272,8 @@ class Surrogate:
         point = self.layout.settled(point)  # so that equal candidates have equal points
         return Pending(arm, self.layout.candidate(point, origin=self.name, rationale=why), point)
 
-    def _choose(self, rng: np.random.Generator) -> str:
-        """Choose among the arms that can propose something now."""
+    def _choose(self, rng: np.random.Generator, left_out: Collection[str]) -> str:
+        """Choose among the arms that can propose something now, without those left out."""
         if len(self.history.samples) < 2:
             return "random"
         has_inputs, differs = bool(self.problem.space.inputs), not self._levels.is_plateau
@@ -285,7 +293,7 @@ class Surrogate:
             "levels": lead,
             "push": (lead or (has_inputs and not differs)) and not self._pushes.is_done,
         }
-        arms = [arm for arm in _PRIORS if can.get(arm, True)]
+        arms = [arm for arm in _PRIORS if can.get(arm, True) and arm not in left_out]
         is_trial = self._asked < len(self._opening) + self.settings.trial
         reserved = {} if is_trial else dict.fromkeys(_SIMPLE, self.settings.reserved)
         leading = _WHERE_LEVELS_LEAD if lead else {} if has_inputs or is_trial else _OF_PARAMETERS
