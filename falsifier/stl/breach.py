@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import readable
+from falsifier.core.words import in_unit, readable
 from falsifier.stl import formula as stl
 from falsifier.stl.diagnosis import seconds, valued
 from falsifier.stl.expression import Expression, Number, unit_of
@@ -325,7 +325,7 @@ class _Search:
         if len(names) <= _MOST_SIGNALS and not condition.formula.horizon(self.trajectory.step):
             values, units = self.trajectory.at(self._time(sample)), self.trajectory.units
             read = ", ".join(
-                f"{name_text(n)} = {readable(values[n])}{f' {units[n]}' if n in units else ''}" for n in names
+                in_unit(f"{name_text(n)} = {readable(values[n])}", units.get(n, "")) for n in names
             )
         if now:
             return f"{condition.text} held{f' ({read} at {at})' if read else ''}"

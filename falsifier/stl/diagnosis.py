@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import readable
+from falsifier.core.words import in_unit, readable
 from falsifier.stl import formula as stl
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.margins import is_on_limit
@@ -244,7 +244,7 @@ def valued(side: Expression, values: Mapping[str, float], margin: float, unit: s
     # So many digits that both sides read as different.
     ratio = 0.0 if is_on_limit(margin) else abs(value / margin)
     digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
-    return f"{side} = {readable(value, int(np.clip(digits, _DIGITS, _MOST_DIGITS)))}{unit and f' {unit}'}"
+    return in_unit(f"{side} = {readable(value, int(np.clip(digits, _DIGITS, _MOST_DIGITS)))}", unit)
 
 
 def _over(window: tuple[float, float] | None) -> str:

@@ -14,7 +14,7 @@ def broken(formula: str, **columns: list[float]) -> Breach:
     columns = columns or {"load": LOAD, "error": ERROR}
     n = len(next(iter(columns.values())))
     arrays = {name: np.array(c, dtype=np.float64) for name, c in columns.items()}
-    shown = Trajectory(np.arange(n, dtype=np.float64), arrays, {"error": "mm", "load": "kN"})
+    shown = Trajectory(np.arange(n, dtype=np.float64), arrays, {"error": "mm", "load": "kN", "share": "1"})
     breach = Monitor(parse(formula), 1.0, n).evaluate(shown).breach
     assert breach is not None
     return breach
@@ -119,6 +119,7 @@ def test_truths_and_numbers_alone_have_no_values() -> None:
     assert broken("G[0,2] 1 >= 2").text == "1 >= 2 was violated from 0 to 2 s"
     assert broken("F[0,2] 1 >= 2").text == "1 >= 2 held at no time from 0 to 2 s"
     assert broken("load", load=[0.0]).text == "load was violated at 0 s: load = 0 kN", "a unit: no Boolean"
+    assert broken("share > 1", share=[0.5]).text == "share > 1 was violated at 0 s: share = 0.5"
 
 
 def test_of_random_formulas_what_broke_was_false_all_the_time() -> None:
