@@ -14,7 +14,7 @@ from falsifier.engines.layout import Array, Layout
 _MAX_LEVELS = 32
 # Share of pieces of a real input that are at a bound.
 _AT_BOUND = 0.6
-# Where an input has few control points, the probability that all of them are drawn, each by itself.
+# Where an input has few control points, or few values, the probability that all are drawn, each by itself.
 _INDEPENDENT = 0.5
 # Share of inputs that keep their value in a new tail, if there are several.
 _KEPT = 0.25
@@ -93,11 +93,11 @@ class Programs:
         """Return the program that is the same up to a time in s, and drawn again after it."""
         point = self._parameters(rng, point)
         pace = float(np.exp(rng.uniform(0.0, np.log(max(self._longest, 2)))))
-        if rng.random() < _INDEPENDENT and not any(self._layout.is_fine):
-            pace = 0.5
+        is_independent, are_few = rng.random() < _INDEPENDENT, not any(self._layout.is_fine)
         for j in self._moving(rng):
             start = int(np.searchsorted(self._times[j], time, side="right"))
-            self._fill(rng, j, point[self._groups[j]], start, pace)
+            one_by_one = is_independent and (are_few or self._levels[j] is not None)
+            self._fill(rng, j, point[self._groups[j]], start, 0.5 if one_by_one else pace)
         return point
 
     def repeated(
