@@ -1,6 +1,7 @@
 import importlib.util
 import re
 import shutil
+import sysconfig
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -46,6 +47,11 @@ PREFIXED = '#define FMI{0}_FUNCTION_PREFIX Lag_\n#define MODEL "lag.h"\n#include
 OWN = """<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="Lag"><SourceFileSet>
 <SourceFile name="own.c"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>"""
 DESCRIPTION, BUILD = "modelDescription.xml", "sources/buildDescription.xml"
+# As PythonFMU links its library: the Python that it calls is that of the process.
+CALLS_PYTHON = "const char *Py_GetVersion(void);\nconst char *(*const used)(void) = Py_GetVersion;\n"
+needs_library = pytest.mark.skipif(
+    not sysconfig.get_config_var("Py_ENABLE_SHARED"), reason="this Python has no shared library"
+)
 UNLISTED = re.sub(
     r"<SourceFiles>.*?</SourceFiles>", "", text_of("Lag_2sources", DESCRIPTION), flags=re.DOTALL
 )
@@ -70,8 +76,13 @@ UNLISTED = re.sub(
         ),
         # The name in drafts of the standard.
         ("Lag_3", {BUILD: None, "sources/build_description.xml": text_of("Lag_3sources", BUILD)}),
+        pytest.param(
+            "Lag_2",
+            {"sources/all.c": PREFIXED.format(2) + CALLS_PYTHON, "resources/slavemodule.txt": "model"},
+            marks=needs_library,
+        ),
     ],
-    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft"],
+    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft", "Python"],
 )
 def test_sources_become_a_working_fmu(tmp_path: Path, name: str, files: dict[str, str | None]) -> None:
     source = rearranged(tmp_path, f"{name}sources", files)
