@@ -28,8 +28,8 @@ _SHOWN_BYTES = 64 << 10
 _DROPPED = "(further output was dropped)"
 # What Wine would start besides the worker, or ask the user to install.
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
-# What PythonFMU puts into FMUs that call the Python of the process that loads them.
-_WRITTEN_IN_PYTHON = "*/resources/slavemodule.txt"
+# What PythonFMU puts into FMUs that call the Python of the process that loads them; there are FMUs of FMUs.
+_WRITTEN_IN_PYTHON = ("*/resources/slavemodule.txt", "*/resources/*/resources/slavemodule.txt")
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
 _SIGNALS = {
     0xC0000005: signal.SIGSEGV,  # access violation
@@ -133,7 +133,7 @@ class Started:
         if through_wine:
             _make_prefix(scratch / "prefix")
             environment = _wine_environment(environment, scratch)
-        elif any(folder.glob(_WRITTEN_IN_PYTHON)):
+        elif any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
             environment = _python_environment(environment)
         # It gets no descriptors for these through Wine.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
