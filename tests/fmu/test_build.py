@@ -47,6 +47,8 @@ PREFIXED = '#define FMI{0}_FUNCTION_PREFIX Lag_\n#define MODEL "lag.h"\n#include
 OWN = """<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="Lag"><SourceFileSet>
 <SourceFile name="own.c"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>"""
 DESCRIPTION, BUILD = "modelDescription.xml", "sources/buildDescription.xml"
+ASKS = "#define _GNU_SOURCE 1\n#include <locale.h>\n#include <stdlib.h>\n"
+ASKED = "double (*const used)(const char *, char **, locale_t) = strtod_l;\n"
 # As PythonFMU links its library: the Python that it calls is that of the process.
 CALLS_PYTHON = "const char *Py_GetVersion(void);\nconst char *(*const used)(void) = Py_GetVersion;\n"
 needs_library = pytest.mark.skipif(
@@ -76,13 +78,17 @@ UNLISTED = re.sub(
         ),
         # The name in drafts of the standard.
         ("Lag_3", {BUILD: None, "sources/build_description.xml": text_of("Lag_3sources", BUILD)}),
-        pytest.param(
-            "Lag_2",
-            {"sources/all.c": PREFIXED.format(2) + CALLS_PYTHON, "resources/slavemodule.txt": "model"},
-            marks=needs_library,
+        ("Lag_2", {"sources/all.c": ASKS + PREFIXED.format(2) + ASKED}),
+        *(
+            pytest.param(
+                "Lag_2",
+                {"sources/all.c": PREFIXED.format(2) + CALLS_PYTHON, f"{of}resources/slavemodule.txt": ""},
+                marks=needs_library,
+            )
+            for of in ("", "resources/00/")
         ),
     ],
-    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft", "Python"],
+    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft", "GNU", "Python", "FMU of FMUs"],
 )
 def test_sources_become_a_working_fmu(tmp_path: Path, name: str, files: dict[str, str | None]) -> None:
     source = rearranged(tmp_path, f"{name}sources", files)
