@@ -107,8 +107,7 @@ class FmuModel(Isolated):
 
     def _with_hint(self, error: ModelError) -> ModelError:
         """Return the error; if the FMU runs only where its exporting tool is installed, it says so."""
-        needs_tool = self._description.needs_tool
-        if self.interface not in needs_tool:
+        if self.interface not in self._description.needs_tool:
             return error
         return ModelError(f"{error}; {needed_tool_text(self.info.tool, (self.interface,))}")
 
