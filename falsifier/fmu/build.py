@@ -61,9 +61,11 @@ def _compile(path: Path, folder: Path, major: int, identifier: str, target: Path
     folders += [str(header.parent.relative_to(root)) for header in sorted(root.rglob("*.h"))]
     # FMI 2 and 3 sources may put a prefix before all function names, which libraries must not have. It has no
     # effect if the header is read before the sources define it. Sources that never include the header may
-    # declare the standard's types on their own, which it would contradict.
+    # declare the standard's types on their own, which it would contradict. It reads the system's headers,
+    # so the sources cannot ask these for more any longer, as OpenModelica's do.
     standard = f"fmi{major}Functions.h"
-    header = ("-include", standard) if major > 1 and standard in {file.name for file in included} else ()
+    early = major > 1 and standard in {file.name for file in included}
+    header = ("-D_GNU_SOURCE", "-include", standard) if early else ()
     compile_c(
         path,
         root,

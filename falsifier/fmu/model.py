@@ -14,7 +14,7 @@ from falsifier.core.arguments import path_of
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo
 from falsifier.core.signals import Signal, constant_pieces
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import ModelError, SimulationError
+from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import WINDOWS, file_hash
 from falsifier.fmu.description.model_description import Description, describe, needed_tool_text
 from falsifier.fmu.process.network import Coupling, Member, Network, Place
@@ -69,7 +69,7 @@ class FmuModel(Isolated):
         """
         try:
             return simulate(self.order, experiment, self._pieces(signals, experiment), parameters)
-        except (ModelError, SimulationError) as error:
+        except ModelError as error:
             raise self._with_hint(error) from None
 
     def place(self, name: str) -> tuple[str, int]:
@@ -105,15 +105,11 @@ class FmuModel(Isolated):
                     tables[variable.name] = _held_pieces(signal, experiment.times, whole=whole)
         return tables
 
-    def _with_hint(self, error: ModelError | SimulationError) -> ModelError | SimulationError:
+    def _with_hint(self, error: ModelError) -> ModelError:
         """Return the error; if the FMU runs only where its exporting tool is installed, it says so."""
-        needs_tool = self._description.needs_tool
-        if self.interface not in needs_tool:
+        if self.interface not in self._description.needs_tool:
             return error
-        text = f"{error}; {needed_tool_text(self.info.tool, (self.interface,))}"
-        if isinstance(error, ModelError):
-            return ModelError(text)
-        return SimulationError(text, status=error.status, time=error.time, log=error.log)
+        return ModelError(f"{error}; {needed_tool_text(self.info.tool, (self.interface,))}")
 
     @property
     def _description(self) -> Description:

@@ -1,6 +1,7 @@
 import importlib.util
 import re
 import shutil
+import sysconfig
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -46,6 +47,12 @@ PREFIXED = '#define FMI{0}_FUNCTION_PREFIX Lag_\n#define MODEL "lag.h"\n#include
 OWN = """<fmiBuildDescription fmiVersion="3.0"><BuildConfiguration modelIdentifier="Lag"><SourceFileSet>
 <SourceFile name="own.c"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>"""
 DESCRIPTION, BUILD = "modelDescription.xml", "sources/buildDescription.xml"
+ASKS = "#define _GNU_SOURCE 1\n#include <locale.h>\n#include <stdlib.h>\n"
+ASKED = "double (*const used)(const char *, char **, locale_t) = strtod_l;\n"
+# As PythonFMU links its library: it calls the Python of the process, which must be a shared library.
+CALLS_PYTHON = PREFIXED.format(2)
+if sysconfig.get_config_var("Py_ENABLE_SHARED"):
+    CALLS_PYTHON += "const char *Py_GetVersion(void);\nconst char *(*const used)(void) = Py_GetVersion;\n"
 UNLISTED = re.sub(
     r"<SourceFiles>.*?</SourceFiles>", "", text_of("Lag_2sources", DESCRIPTION), flags=re.DOTALL
 )
@@ -70,8 +77,11 @@ UNLISTED = re.sub(
         ),
         # The name in drafts of the standard.
         ("Lag_3", {BUILD: None, "sources/build_description.xml": text_of("Lag_3sources", BUILD)}),
+        ("Lag_2", {"sources/all.c": ASKS + PREFIXED.format(2) + ASKED}),
+        ("Lag_2", {"sources/all.c": CALLS_PYTHON, "resources/slavemodule.txt": ""}),
+        ("Lag_2", {"sources/all.c": CALLS_PYTHON, "resources/00/resources/slavemodule.txt": ""}),
     ],
-    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft"],
+    ids=["FMI 2", "FMI 3", "prefix 2", "prefix 3", "subfolder", "draft", "GNU", "Python", "FMU of FMUs"],
 )
 def test_sources_become_a_working_fmu(tmp_path: Path, name: str, files: dict[str, str | None]) -> None:
     source = rearranged(tmp_path, f"{name}sources", files)

@@ -74,6 +74,15 @@ def test_a_failed_instantiation_tells_the_models_words_and_that_it_needs_its_too
     assert "co-simulation needs the exporting tool" in note
 
 
+def test_a_model_that_runs_is_not_said_to_need_its_tool(tmp_path: Path) -> None:
+    def claiming(text: bytes) -> bytes:
+        return text.replace(b"<CoSimulation ", b'<CoSimulation needsExecutionTool="true" ')
+
+    model = FmuModel(fixtures.altered(fixtures.path("Silent_2"), tmp_path / "a.fmu", claiming, ending=".xml"))
+    with pytest.raises(SimulationError, match=r"the valve is open too far$"):
+        run(model, ("y",), signals=FAILS)
+
+
 @pytest.mark.parametrize("name", ["Table_1", "Table_2", "Table_3"])
 def test_strings_can_be_set(name: str, tmp_path: Path) -> None:
     (tmp_path / "tables").mkdir()

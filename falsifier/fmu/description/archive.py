@@ -90,6 +90,9 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         what = _KINDS.get(path.suffix.lower(), "FMU")
         raise _damaged(f"{path}: not a readable {what}, which is a zip archive", error) from error
     with archive:
+        for entry in archive.infolist():  # some tools write the names as Windows knows them
+            entry.filename = entry.filename.replace("\\", "/")
+        archive.NameToInfo = {entry.filename: entry for entry in archive.infolist()}
         for fault in _faults(archive.infolist()):
             raise ModelError(f"{path}: {fault}")
         yield archive

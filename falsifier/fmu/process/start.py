@@ -2,6 +2,8 @@
 
 import os
 import signal
+import sys
+import sysconfig
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -26,6 +28,8 @@ _SHOWN_BYTES = 64 << 10
 _DROPPED = "(further output was dropped)"
 # What Wine would start besides the worker, or ask the user to install.
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
+# What PythonFMU puts into FMUs that call the Python of the process that loads them; there are FMUs of FMUs.
+_WRITTEN_IN_PYTHON = ("*/resources/slavemodule.txt", "*/resources/*/resources/slavemodule.txt")
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
 _SIGNALS = {
     0xC0000005: signal.SIGSEGV,  # access violation
@@ -129,6 +133,8 @@ class Started:
         if through_wine:
             _make_prefix(scratch / "prefix")
             environment = _wine_environment(environment, scratch)
+        elif any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
+            environment = _python_environment(environment)
         # It gets no descriptors for these through Wine.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
         self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
@@ -162,6 +168,14 @@ class Started:
 @lru_cache(maxsize=1)
 def _hidden() -> tuple[str, ...]:
     return hidden_places(os.environ, posix_files.homes(), is_root=os.geteuid() == 0)
+
+
+def _python_environment(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return an environment in which libraries find the Python of this process, and its packages."""
+    library = Path(*sysconfig.get_config_vars("LIBDIR", "INSTSONAME"))
+    found = {"LD_PRELOAD": str(library if library.is_file() else library.name)}
+    folders = (str(Path(sys.executable).parent), environment.get("PATH", os.defpath))
+    return {**found, **environment, "PATH": os.pathsep.join(folders)}
 
 
 def _make_prefix(prefix: Path) -> None:

@@ -60,7 +60,7 @@ def test_binaries_for_other_systems_are_named_with_what_helps(tmp_path: Path) ->
         "no binary for x86_64-linux, only for x86-linux; a 32-bit binary cannot be loaded here; export it "
         "again for this platform (binaries/linux64/M.so is missing)"
     )
-    (said,) = notes(tmp_path, ("darwin64/M.dylib", "nothing"))
+    (said,) = notes(tmp_path, ("darwin64\\M.dylib", "nothing"))  # as Windows knows the name
     assert "only for x86_64-darwin; binaries for macOS run only there" in said
     (said,) = notes(tmp_path, ("darwin64/M.dylib", "nothing"), sources=True)
     assert "it contains C sources: compile them with `falsifier tools build my.fmu`" in said
