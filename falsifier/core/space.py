@@ -390,7 +390,7 @@ def nearest_numbers(ranged: Range, values: ArrayLike) -> NDArray[np.float64]:
     """Return the nearest numbers that an input or parameter without reals can take, in the same shape."""
     given = np.asarray(values, dtype=np.float64)
     if not ranged.items:
-        return np.clip(np.rint(given), ranged.low, ranged.high)
+        return np.clip(np.rint(given), ranged.low, ranged.high) + 0.0  # nowhere -0
     numbers = np.array(ranged.numbers, dtype=np.float64)
     return np.asarray(numbers[np.abs(given[..., None] - numbers).argmin(axis=-1)])
 
