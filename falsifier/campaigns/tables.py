@@ -253,8 +253,8 @@ _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
     "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
 }
 _LEGEND = (
-    "FR: falsified runs / finished runs, which falsified or spent their budget. Budget: limit on the "
-    "simulations of a run; several if runs differ. S: simulations per falsified run; std is the sample "
+    "FR: falsified runs / finished runs, which falsified, spent their budget or tried all. Budget: limit on "
+    "the simulations of a run; several if runs differ. S: simulations per falsified run; std is the sample "
     "standard deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. "
     "Best robustness: the smallest of all runs. Seconds, tokens and cost are means per run."
 )

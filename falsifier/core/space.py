@@ -241,10 +241,9 @@ class SearchSpace:
         """Number of different candidates; infinite if something is real, or control points may be chosen."""
         if any(r.free for r in self.inputs):
             return inf
-        counts = {
-            r.name: 1 if r.low == r.high else inf if r.kind == "real" else len(r.numbers) for r in self.ranges
-        }
-        return prod(counts[d.name] for d in self.dimensions)
+        counts = {r.name: len(r.numbers) if r.items else r.high - r.low + 1 for r in self.ranges}
+        counts |= {r.name: inf for r in self.ranges if r.kind == "real" and r.low < r.high}
+        return prod((counts[d.name] for d in self.dimensions), start=1.0)
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -391,7 +390,7 @@ def nearest_numbers(ranged: Range, values: ArrayLike) -> NDArray[np.float64]:
     """Return the nearest numbers that an input or parameter without reals can take, in the same shape."""
     given = np.asarray(values, dtype=np.float64)
     if not ranged.items:
-        return np.clip(np.rint(given), ranged.low, ranged.high)
+        return np.clip(np.rint(given), ranged.low, ranged.high) + 0.0  # nowhere -0
     numbers = np.array(ranged.numbers, dtype=np.float64)
     return np.asarray(numbers[np.abs(given[..., None] - numbers).argmin(axis=-1)])
 

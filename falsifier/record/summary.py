@@ -59,7 +59,7 @@ class Summary:
 
     @property
     def finished(self) -> bool:
-        """Whether it ended with a result: falsified, or budget used up. Other runs can be continued."""
+        """Whether it ended with a result: falsified, or at a limit, or with nothing left to try."""
         return self.status in ("falsified", "not falsified")
 
     @property

@@ -1,4 +1,4 @@
-"""The loop: ask, simulate, judge, tell, until every requirement is falsified or the budget is used up."""
+"""The loop: ask, simulate, judge, tell, until all is falsified, or nothing is left to spend or to try."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.words import counted
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
@@ -130,7 +131,7 @@ class _Loop:
     is_answered: bool = False
     server: str = ""
     unrecorded: str = ""
-    simulated: set[int] = field(default_factory=set)  # hashes of the candidates that were
+    simulated: set[object] = field(default_factory=set)  # keys of candidates with the spec's control points
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
@@ -147,12 +148,14 @@ class _Loop:
 
     def run(self, jobs: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
+        searched = searched_space(self.states[0].problem.space, self.used)
+        most = searched.candidates
         self.emit(
             events.RunStarted(
                 problems=tuple(state.problem for state in self.states),
                 engines=tuple(state.engine.name for state in self.states),
                 budget=self.budget,
-                searched=searched_space(self.states[0].problem.space, self.used),
+                searched=searched,
                 server=self.server,
                 replayed=self.steps.replayed,
             )
@@ -166,8 +169,8 @@ class _Loop:
             limit = self.limit_reached()
             if limit is not None:
                 return limit
-            if len(self.simulated) == searched_space(standing[0].problem.space, self.used).candidates:
-                return f"all {len(self.simulated)} candidates of the search space were simulated"
+            if len(self.simulated) == most and self.count >= self.steps.replayed:
+                return f"the whole search space was simulated, {counted(int(most), 'candidate')}"
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
             try:
@@ -289,7 +292,9 @@ class _Loop:
             )
         )
         self.count += 1
-        self.simulated.add(hash(evaluation.candidate.key))
+        space, signals = asked.problem.space, evaluation.candidate.signals
+        if all(space.is_fixed(r, signals[r.name]) for r in space.inputs):  # known ones may have others
+            self.simulated.add(evaluation.candidate.key)
         for state, seen in judged:
             state.untold.append(seen)
             if seen.violated and state.counterexample is None:

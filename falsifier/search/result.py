@@ -34,9 +34,9 @@ class Result:
 
     Attributes:
         problem: what was searched.
-        status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up),
-            ``interrupted`` or ``failed`` (the language model gave no usable answer, more than half of the
-            simulations failed, there was none, or the run could not be recorded).
+        status: ``falsified`` (a confirmed counterexample), ``not falsified`` (budget used up, or nothing left
+            to try), ``interrupted`` or ``failed`` (the language model gave no usable answer, more than half
+            of the simulations failed, there was none, or the run could not be recorded).
         reason: why the run ended, in words.
         counterexample: the confirmed violation, or None.
         best: evaluation with the smallest robustness, or None if every simulation failed.

@@ -279,6 +279,11 @@ def test_a_value_that_a_rounding_put_outside_fits() -> None:
     assert fit(space, Candidate({"u": rounded})).candidate.signals["u"].values == (0.0, 1.0)
 
 
+def test_what_is_rounded_to_zero_has_no_sign() -> None:
+    space = SearchSpace((), (ParameterRange("n", -3.0, 3.0, kind="integer"),), 10.0)
+    assert str(space.admit(Candidate({}, {"n": -0.3})).parameters["n"]) == "0.0"
+
+
 def test_what_is_rounded_to_fit_is_said() -> None:
     gear = InputRange(
         "u", 1.0, 7.0, kind="enumeration", items=(("Off", 1), ("On", 7)), interpolation="constant"

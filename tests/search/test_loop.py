@@ -20,10 +20,11 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.record.journal import read_journal
 from falsifier.record.records import AskedRecord, EndedRecord
-from falsifier.record.run import falsify
+from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunEnded, RunStarted
 from falsifier.search.loop import search
+from falsifier.search.result import Result
 from falsifier.search.steps import Steps
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit
@@ -161,8 +162,36 @@ def whole(problem: Problem, kind: ValueKind) -> Problem:
 def test_a_search_of_few_whole_numbers_ends_when_all_were_simulated(engine: str) -> None:
     problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
     result = run(problem, engine=engine, budget=60)
-    assert result.reason == "all 3 candidates of the search space were simulated"
+    assert result.reason == "the whole search space was simulated, 3 candidates"
     assert {e.candidate.signals["u"].values for e in result.evaluations} == {(-1.0,), (0.0,), (1.0,)}
+
+
+def test_candidates_with_other_control_points_are_none_of_the_search_space() -> None:
+    fixed = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
+    (u,) = fixed.space.inputs
+    problem = replace(fixed, space=replace(fixed.space, inputs=(replace(u, free=FREE),)))
+    known = [Candidate({"u": Signal((0.0, t), (0.0, 1.0), "constant")}) for t in (2.0, 4.0, 6.0)]
+    result = falsify(problem, "uniform", budget=60, start_from=known)
+    assert isinstance(result, Result) and result.reason.startswith("the whole search space was simulated")
+    assert len({e.candidate.key for e in result.evaluations}) == 6
+
+
+def test_minus_one_and_minus_two_are_two_candidates() -> None:
+    bias = ParameterRange("bias", -2, -1, kind="integer")  # their hashes are equal
+    result = run(lag_problem("G[0,10] (x <= 2)", inputs=0, parameters=[bias]), budget=60)
+    assert result.reason == "the whole search space was simulated, 2 candidates"
+
+
+def test_a_record_that_goes_on_when_all_were_simulated_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = whole(lag_problem("G[0,10] (x <= 2)"), "integer")
+    with monkeypatch.context() as earlier:
+        earlier.setattr(SearchSpace, "candidates", inf)
+        assert run(problem, tmp_path, budget=20).spent.simulations == 20
+    (resumed,) = resume(tmp_path, problems=[problem], budget=30)
+    assert resumed.spent.simulations == 20
+    assert resumed.reason == "the whole search space was simulated, 3 candidates"
 
 
 def test_only_whole_numbers_at_given_times_can_be_counted() -> None:
@@ -174,6 +203,9 @@ def test_only_whole_numbers_at_given_times_can_be_counted() -> None:
     assert replace(space, inputs=(given,), parameters=(gear, still)).candidates == 3**2 * 4
     assert replace(space, inputs=(replace(given, free=FREE),)).candidates == inf
     assert replace(space, parameters=(START,)).candidates == inf
+    many = replace(u, control_points=2000)
+    for parameters in ((START,), (replace(gear, high=1e30),)):  # numbers too large for some calculations
+        assert replace(space, inputs=(many,), parameters=parameters).candidates == inf
 
 
 def unusable(request: ChatRequest) -> ChatReply:

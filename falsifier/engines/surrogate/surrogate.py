@@ -28,7 +28,7 @@ from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
 _DRAWS = 1000
-# Arms that think for long: if what they propose was simulated, others are asked for this candidate.
+# Arms that think for long: if what they propose was simulated, or would probably fail, others are asked.
 _SLOW = ("dynamics", "region", "cma")
 # How often another engine is asked for one candidate.
 _REQUESTS = 3
