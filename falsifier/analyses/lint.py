@@ -224,8 +224,6 @@ def _is_declared_independent(problem: Problem) -> bool:
     model = problem.model
     if not isinstance(model, FmuModel) or problem.space.parameters:
         return False
-    if not problem.info.fmi_version.startswith(("2", "3")):
-        return False
     known = read_structure(model.path, model.sha256).reaching
     searched = set(problem.space.names)
     signals = problem.requirement.formula.signals

@@ -302,11 +302,15 @@ def check_names(problems: Iterable[Problem]) -> None:
 
 
 def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
-    """Group problems that differ only in their requirement; within a group all record the same signals."""
-    groups: dict[str, list[Problem]] = {}
+    """Group problems that are simulated alike; within a group all record the same signals."""
+    groups: list[tuple[object, list[Problem]]] = []
     for problem in problems:
-        bare, fixed = replace(problem.experiment, outputs=()), sorted(problem.parameters.items())
-        key = repr((problem.model, problem.space.inputs, problem.space.parameters, bare, fixed))
-        groups.setdefault(key, []).append(problem)
-    every = groups.values()
-    return [[p.recording(n for q in group for n in q.experiment.outputs) for p in group] for group in every]
+        bare = replace(problem.experiment, outputs=())
+        simulated = (problem.model, problem.space, bare, problem.parameters)
+        group = next((members for other, members in groups if other == simulated), [])
+        if not group:
+            groups.append((simulated, group))
+        group.append(problem)
+    return [
+        [p.recording(n for q in group for n in q.experiment.outputs) for p in group] for _, group in groups
+    ]

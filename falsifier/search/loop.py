@@ -10,7 +10,7 @@ from time import perf_counter
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
-from falsifier.errors import ChatError, SpecError, refusal
+from falsifier.errors import ChatError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange
 from falsifier.problem.problem import Problem, check_limits, check_names
@@ -50,19 +50,12 @@ def search(
         One result per problem, in their order.
 
     Raises:
-        SpecError: if the problems differ in more than their requirement or share a name, a range exceeds the
-            model's limits, or an engine returns no candidate or too many.
+        SpecError: if the problems share a name, a range exceeds the model's limits, or an engine returns no
+            candidate or too many.
         CandidateError: if an engine returns a candidate outside the search space.
     """
     check_names(problems)
     check_limits(problems[0])
-    one, *others = problems
-    for other in others:
-        if replace(other, requirement=one.requirement, source=one.source) != one:
-            raise SpecError(
-                f"{one.name} and {other.name} differ in what is varied or in how it is simulated, so they "
-                "cannot share a search: falsify them one after the other"
-            )
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     steps = steps or Steps()
     began = perf_counter() - steps.seconds

@@ -9,7 +9,7 @@ from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
 from falsifier.counterexamples.simplicity import simplicity
-from falsifier.errors import CandidateError, SpecError
+from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import half_step
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.loading import load_problem
@@ -42,10 +42,7 @@ def assert_local_minimum(problem: Problem, shrunk: Shrunk) -> None:
     limit = simplicity(problem, shrunk.evaluation.candidate)
     for propose in PASSES:
         for proposal in propose(problem, shrunk.evaluation.candidate):
-            try:
-                candidate = problem.space.admit(proposal)
-            except CandidateError:
-                continue
+            candidate = problem.space.admit(proposal)
             if simplicity(problem, candidate) < limit:
                 robustness = evaluate(problem, candidate).robustness
                 violated = robustness is not None and robustness < 0 and robustness <= shrunk.at_most

@@ -111,12 +111,6 @@ def test_where_there_is_no_account_none_is_to_be_checked() -> None:
 REFUSED = ConnectionRefusedError(111, "Connection refused")
 
 
-def test_a_local_server_is_looked_for_where_its_provider_puts_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert "nothing is listening at http://localhost:11434" in str(told(REFUSED, "ollama_chat/m"))
-    monkeypatch.setenv("OLLAMA_API_BASE", "http://127.0.0.1:4444")
-    assert "nothing is listening at http://127.0.0.1:4444" in str(told(REFUSED, "ollama_chat/m"))
-
-
 def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
     error = told(REFUSED, "openai/m", "http://elsewhere.example/v1")
     assert isinstance(error, TransientChatError) and error.patience is None

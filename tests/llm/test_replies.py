@@ -283,6 +283,7 @@ def reads_or_tells(form: ReplyForm, text: str) -> None:
 @given(st.dictionaries(keys, anything, max_size=4), st.booleans())
 @example({"point": ["0\x1f"]}, False)
 @example({"point": {}}, False)
+@example({"point": [100, 0, 0, 0, 325, 1100]}, False)
 def test_any_json_gives_candidates_or_says_what_is_wrong(reply: dict[str, Any], free: bool) -> None:
     reads_or_tells(form_of(free=free), json.dumps(reply))
 

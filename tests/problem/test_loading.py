@@ -166,7 +166,6 @@ def test_a_template_becomes_the_formula_of_its_simulation() -> None:
         ("AT1", "rise signal=speed reference=80 time=51", r"stl: needs values up to 51 s"),
         (str(AT), "rise signal=sped reference=80 time=10", r"stl: unknown signal 'sped'"),
         ("AT1", "G ('speed' <= 120)", r"stl: unknown signal 'speed': .*; write speed"),
-        (str(AT), "stays_within signal=speed", r"^stl: expected low, high or both"),
         ("AT1", f"{RISE} stop_time=10", r"^stl: stop_time: it changes .*\(stop_time, "),
         ("AT1", "ramp_limit signal=speed limit=9", r"unknown signal 'der\(speed\)'.*state over and range"),
         ("AT1", "not speed=9", r"equality is =="),

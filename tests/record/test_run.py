@@ -66,7 +66,10 @@ def test_problems_of_one_call_have_different_names(other: Problem, tmp_path: Pat
 def test_formulas_for_one_fmu_are_named_and_loaded_again(tmp_path: Path) -> None:
     formulas = {"low": "G[0,1] (wheel <= 500)", "high": "G[0,1] (engine <= -1)"}
     fmu = bundled("fmus") / "AT.fmu"
-    problems = [Problem.from_fmu(fmu, formula, name=name) for name, formula in formulas.items()]
+    problems = [
+        Problem.from_fmu(fmu, formula, name=name, context=[f"{name}.md"])
+        for name, formula in formulas.items()
+    ]  # each has files of its own, and they share the search all the same
     results = falsify(problems, "corners", budget=1, directory=tmp_path)
     assert [(r.problem.name, r.falsified) for r in results] == [("low", False), ("high", True)]
     for again in ([], problems):  # both record what either of them names

@@ -33,8 +33,6 @@ class SampleProgress:
         stages: set[Stage] = set()
         ranges = {}
         for name in view.experiment.outputs:
-            if name not in columns:
-                continue
             column = columns[name]
             if view.is_discrete(name, column):
                 kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))].tolist()
