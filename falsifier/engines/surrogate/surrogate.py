@@ -28,7 +28,7 @@ from falsifier.stl import Verdict
 
 # Random points among which one that was not simulated is looked for, where all other ideas were.
 _DRAWS = 1000
-# Arms that think for long: if what they propose was simulated, or would probably fail, others are asked.
+# Arms that think for long: if what they propose was simulated, others are asked.
 _SLOW = ("dynamics", "region", "cma")
 # How often another engine is asked for one candidate.
 _REQUESTS = 3
@@ -198,7 +198,7 @@ class Surrogate:
         for _ in range(self.settings.retries):
             if self._objection(pending) == 0.0:
                 break
-            if pending.arm in _SLOW:
+            if pending.arm in _SLOW and is_seen(pending.point, self._tried):
                 left_out.add(pending.arm)
             pending = min(pending, self._propose(rng, left_out), key=self._objection)
         if is_seen(pending.point, self._tried):
