@@ -55,7 +55,6 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             is_free=True,
         ),
         "uniform": Registered("falsifier.engines.simple:Uniform", "uniform random points"),
-        "sobol": Registered("falsifier.engines.simple:Sobol", "scrambled Sobol sequence"),
         "corners": Registered("falsifier.engines.simple:Corners", "constant extremes first, then random"),
         "cma": Registered("falsifier.engines.optimisers.cma:CMA", "covariance matrix adaptation (CMA-ES)"),
         "bayesian": Registered(

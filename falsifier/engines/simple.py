@@ -22,25 +22,6 @@ class Uniform(BoxEngine):
         return Proposal(rng.random(self.box.dimension), "uniform random")
 
 
-class Sobol(BoxEngine):
-    """Successive points of one scrambled Sobol sequence."""
-
-    name = "sobol"
-
-    def __init__(self, problem: Problem, *, seed: int) -> None:
-        super().__init__(problem, seed=seed)
-        from scipy.stats import qmc
-
-        # For more coordinates scipy has no direction numbers: they are drawn at random.
-        count = min(self.box.dimension, qmc.Sobol.MAXDIM)
-        self._sequence = qmc.Sobol(count, scramble=True, seed=np.random.default_rng(seed))
-
-    def _propose(self, rng: np.random.Generator) -> Proposal:
-        point = rng.random(self.box.dimension)
-        point[: self._sequence.d] = self._sequence.random(1)[0]
-        return Proposal(point, f"point {self._asked + 1} of a Sobol sequence")
-
-
 class Corners(BoxEngine):
     """All corners of the inputs' and parameters' ranges, then uniform random points.
 

@@ -40,7 +40,7 @@ def test_names_are_readable_and_differ_with_anything_that_matters() -> None:
     base = name()
     assert base.startswith("AT1-surrogate-free-0-")
     others = {
-        name("sobol"),
+        name("uniform"),
         name(parameterization="fixed"),
         name(profile="instance2"),
         name(seed=1),

@@ -66,8 +66,8 @@ def test_an_absent_package_is_an_error_with_the_command_that_brings_it(
 
 
 def test_a_wrong_name_nothing_to_vary_and_no_adviser_are_errors() -> None:
-    with pytest.raises(SpecError, match="did you mean 'sobol'"):
-        make_engine("sobl", lag_problem(), seed=0)
+    with pytest.raises(SpecError, match="did you mean 'optuna'"):
+        make_engine("optna", lag_problem(), seed=0)
     with pytest.raises(SpecError, match="nothing to search"):
         make_engine("uniform", lag_problem(inputs=0), seed=0)
     with pytest.raises(SpecError, match="llm=NAME"):

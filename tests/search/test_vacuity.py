@@ -19,7 +19,7 @@ from tests.searches import stop_after
 
 
 def findings(problem: Problem, budget: int = 5) -> list[Finding]:
-    result = falsify(problem, "sobol", budget=budget)
+    result = falsify(problem, "uniform", budget=budget)
     assert not result.falsified
     return [f for f in result.findings if f.kind not in ("parameterization", "effect", "margin")]
 
@@ -44,7 +44,7 @@ def test_a_condition_that_never_held_is_told_with_how_close_it_came() -> None:
 
 def simulations(problem: Problem, budget: int) -> list[Evaluation]:
     seen: list[Event] = []
-    falsify(problem, "sobol", budget=budget, listeners=[seen.append])
+    falsify(problem, "uniform", budget=budget, listeners=[seen.append])
     return [event.evaluation for event in seen if isinstance(event, Evaluated)]
 
 
@@ -90,7 +90,7 @@ def test_a_boolean_that_hides_the_margin_is_told() -> None:
     problem = Problem.from_fmu(
         bundled("fmus/HeaterLimpHome.fmu"), "G[0,9] not limp", inputs={"disagreement": (0, 5)}
     )
-    told = {f.kind: f.text for f in falsify(problem, "sobol", budget=3).findings}["margin"]
+    told = {f.kind: f.text for f in falsify(problem, "uniform", budget=3).findings}["margin"]
     assert told.startswith("The robustness has few values, because limp is Boolean")
     assert "compare the numbers of which limp is made instead (the model has temperature and" in told
 
@@ -103,14 +103,14 @@ def test_a_falsified_requirement_has_no_findings() -> None:
 
 def test_a_resumed_run_finds_the_same(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
-    falsify(problem, "sobol", budget=5, directory=tmp_path / "a", listeners=stop_after(3))
+    falsify(problem, "uniform", budget=5, directory=tmp_path / "a", listeners=stop_after(3))
     (resumed,) = resume(tmp_path / "a", problems=[problem])
-    assert resumed.findings == falsify(problem, "sobol", budget=5).findings
+    assert resumed.findings == falsify(problem, "uniform", budget=5).findings
 
 
 def test_findings_are_on_the_terminal_in_json_and_in_reports(tmp_path: Path) -> None:
     problem = lag_problem("G[0,10] (x >= 2 -> u <= 0)")
-    result = falsify(problem, "sobol", budget=5, directory=tmp_path)
+    result = falsify(problem, "uniform", budget=5, directory=tmp_path)
     text = result.findings[0].text
     assert f"  note           {text}" in result_text(result)
     assert text in results_text([result])

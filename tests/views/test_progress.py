@@ -73,7 +73,7 @@ def test_of_several_requirements_progress_names_the_one_that_improved(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with make_display() as display:
-        falsify([impossible(), hard()], "sobol", budget=6, listeners=[display])
+        falsify([impossible(), hard()], "uniform", budget=6, listeners=[display])
     improved = [line for line in capsys.readouterr().err.splitlines() if "best robustness" in line]
     assert improved[0].startswith("simulation 1: NEVER: best robustness +")
     assert "; HARD: best robustness " in improved[0]

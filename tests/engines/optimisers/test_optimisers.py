@@ -68,7 +68,7 @@ def test_optuna_learns_from_candidates_of_others_and_announces_nothing(
 ) -> None:
     problem = box_problem()
     alone, taught = (make_engine("optuna", problem, seed=1) for _ in range(2))
-    for candidate in make_engine("sobol", problem, seed=5).ask(60):
+    for candidate in make_engine("uniform", problem, seed=5).ask(60):
         taught.tell([bowl(problem, candidate)])
     found = [min(bowl(problem, c).robustness or 9.0 for c in engine.ask(5)) for engine in (taught, alone)]
     assert found[0] < found[1]
