@@ -19,7 +19,8 @@ _LARGEST = 1e25
 # Cells over the formula's horizon on which free inputs are held and outputs predicted: enough for pieces of
 # 1 % of the horizon, few enough for a roll-out in milliseconds.
 CELLS = 100
-# Maximum number of held cells of an input that are few.
+# Maximum number of held cells of an input that are few: searched as the spec's control points, such inputs
+# need fewer simulations (design/search.md).
 _FEW_CELLS = 10
 # Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
 _MAX_HORIZONS = 20

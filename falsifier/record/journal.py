@@ -281,7 +281,7 @@ def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
 
 
 def candidates_in(directory: Path) -> dict[int, Candidate]:
-    """Read a run's candidates by the index of their evaluation, of all its requirements only once."""
+    """Read a run's candidates by the index of their evaluation, once for all its requirements."""
     state = (directory / JOURNAL).stat()
     return _candidates_in(directory, (state.st_size, state.st_mtime_ns))
 

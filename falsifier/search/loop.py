@@ -4,16 +4,17 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from math import inf
 from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.words import counted
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
-from falsifier.errors import ChatError, refusal
+from falsifier.errors import ChatError, SpecError, refusal
 from falsifier.evaluation.evaluate import Evaluation, judge
 from falsifier.llm.messages import Chat, Exchange
-from falsifier.problem.problem import Problem, check_limits, check_names
+from falsifier.problem.problem import Problem, alike, check_limits, check_names
 from falsifier.problem.source import Parameterization
 from falsifier.search import events
 from falsifier.search.budget import Budget, LimitReached, RunChat, Spent
@@ -50,12 +51,17 @@ def search(
         One result per problem, in their order.
 
     Raises:
-        SpecError: if the problems share a name, a range exceeds the model's limits, or an engine returns no
-            candidate or too many.
+        SpecError: if the problems are not simulated alike or share a name, a range exceeds the model's
+            limits, or an engine returns no candidate or too many.
         CandidateError: if an engine returns a candidate outside the search space.
     """
     check_names(problems)
     check_limits(problems[0])
+    if len(groups := alike(problems)) > 1:
+        raise SpecError(
+            f"{groups[0][0].name} and {groups[1][0].name} differ in what is varied or in how it is simulated"
+            ", so they cannot share a search: falsify them one after the other"
+        )
     states = [RequirementState(*each) for each in zip(problems, engines, strict=True)]
     steps = steps or Steps()
     began = perf_counter() - steps.seconds
@@ -124,7 +130,9 @@ class _Loop:
     is_answered: bool = False
     server: str = ""
     unrecorded: str = ""
-    simulated: set[object] = field(default_factory=set)  # keys of candidates with the spec's control points
+    # Keys of the candidates with the spec's control points, if the search space has a finite number of them.
+    simulated: set[object] = field(default_factory=set)
+    most: float = inf  # number of candidates of the search space
 
     def attach(self) -> None:
         """Connect to the engines that ask a language model, to count and record every exchange."""
@@ -142,7 +150,7 @@ class _Loop:
     def run(self, jobs: int) -> str:
         """Search until every requirement is falsified or a limit is reached; return why the search ended."""
         searched = searched_space(self.states[0].problem.space, self.used)
-        most = searched.candidates
+        self.most = searched.candidates
         self.emit(
             events.RunStarted(
                 problems=tuple(state.problem for state in self.states),
@@ -162,8 +170,8 @@ class _Loop:
             limit = self.limit_reached()
             if limit is not None:
                 return limit
-            if len(self.simulated) == most and self.count >= self.steps.replayed:
-                return f"the whole search space was simulated, {counted(int(most), 'candidate')}"
+            if len(self.simulated) == self.most and self.count >= self.steps.replayed:
+                return f"the whole search space was simulated, {counted(int(self.most), 'candidate')}"
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
             try:
@@ -285,9 +293,10 @@ class _Loop:
             )
         )
         self.count += 1
-        space, signals = asked.problem.space, evaluation.candidate.signals
-        if all(space.is_fixed(r, signals[r.name]) for r in space.inputs):  # known ones may have others
-            self.simulated.add(evaluation.candidate.key)
+        if self.most < inf:
+            space, signals = asked.problem.space, evaluation.candidate.signals
+            if all(space.is_fixed(r, signals[r.name]) for r in space.inputs):  # known ones may have others
+                self.simulated.add(evaluation.candidate.key)
         for state, seen in judged:
             state.untold.append(seen)
             if seen.violated and state.counterexample is None:

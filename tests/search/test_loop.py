@@ -192,6 +192,13 @@ def test_a_record_that_goes_on_when_all_were_simulated_is_repeated(
     assert resumed.reason == "the whole search space was simulated, 3 candidates"
 
 
+def test_problems_that_are_simulated_in_different_ways_cannot_share_a_search() -> None:
+    problems = lag_problem(name="one"), lag_problem(name="other", points=5)
+    engines = [make_engine("uniform", each, seed=1) for each in problems]
+    with pytest.raises(SpecError, match=r"one and other differ in what is varied .* one after the other"):
+        search(problems, engines, Budget(1))
+
+
 def test_only_whole_numbers_at_given_times_can_be_counted() -> None:
     space = whole(lag_problem(inputs=1), "integer").space
     assert space.candidates == 3

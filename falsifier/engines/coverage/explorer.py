@@ -134,7 +134,7 @@ class CoverageEngine:
         self.layout = planning_layout(problem.space, TimeGrid.of(problem))
         self.seed = seed
         self._explorer = Explorer(problem, self.layout, repeats=True)
-        self._known: set[int] = set()  # what was simulated or is about to be
+        self._known: set[object] = set()  # what was simulated or is about to be
         self._asked = 0
 
     def ask(self, n: int = 1) -> list[Candidate]:
@@ -144,7 +144,7 @@ class CoverageEngine:
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Add the trajectories to what was reached."""
         for evaluation in evaluations:
-            self._known.add(hash(evaluation.candidate.key))
+            self._known.add(evaluation.candidate.key)
             if evaluation.trajectory is not None:
                 self._explorer.learn(self.layout.point(evaluation.candidate), evaluation.trajectory)
 
@@ -158,7 +158,7 @@ class CoverageEngine:
                 point = self.layout.settled(rng.random(self.layout.dimension))
                 idea = Proposal(point, "random: all other ideas were simulated")
             candidate = self.layout.candidate(idea.point, origin=self.name, rationale=idea.rationale)
-            if hash(candidate.key) not in self._known:
+            if candidate.key not in self._known:
                 break
-        self._known.add(hash(candidate.key))
+        self._known.add(candidate.key)
         return candidate

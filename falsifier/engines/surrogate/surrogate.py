@@ -281,7 +281,7 @@ class Surrogate:
         can = {
             # Of signals with few values, dynamics that are linear know nothing.
             "dynamics": differs and not self._levels.is_staircase,
-            # Of given control points, a model needs fewer simulations than changes do; of free inputs, more.
+            # Of few control points, a model needs fewer simulations than changes do; of many cells, more.
             # Where levels lead, they do what a change would.
             "changes": differs and is_fine and not lead,
             "region": differs and not is_fine,

@@ -44,7 +44,7 @@ def test_nothing_is_simulated_twice(points: int) -> None:
 
 def test_a_small_space_is_searched_as_a_whole() -> None:
     problem = lag_problem(
-        "G[0,10] (x <= 99)", inputs=0, parameters=[ParameterRange("x0", 0, 9, kind="integer")]
+        "G[0,10] (x <= 99)", inputs=0, parameters=[ParameterRange("x0", -4, 5, kind="integer")]
     )
     asked = drive(CoverageEngine(problem, seed=2), partial(evaluate, problem), rounds=14)
     assert len({c.key for c in asked[:10]}) == 10
