@@ -1,12 +1,16 @@
 """CMA-ES, the evolution strategy with covariance matrix adaptation, from the package ``cma``."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from cma import CMAEvolutionStrategy
 
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
+
+if TYPE_CHECKING:  # loading it takes longer than a short search
+    from cma import CMAEvolutionStrategy
 
 # Initial standard deviation as a share of the ranges: the authors recommend about a third.
 _FIRST_STEP = 0.3
@@ -27,14 +31,16 @@ class CMA(BoxEngine):
         super().__init__(problem, seed=seed)
         self._rng = np.random.default_rng([seed, 1])
         self._worst = 0.0
-        self._strategy = self._start()
+        self._strategy: CMAEvolutionStrategy | None = None
         self._generation: list[Array] = []
         self._costs: list[float | None] = []
         self._next = 0
         # Where different points have the same candidate, its cost is known from the first one.
         self._known: dict[bytes, float] = {}
 
-    def _start(self) -> CMAEvolutionStrategy:
+    def _start(self) -> "CMAEvolutionStrategy":
+        from cma import CMAEvolutionStrategy
+
         # The package requires two dimensions: a single coordinate is complemented by an unused second one.
         dimension = max(2, self.box.dimension)
         return CMAEvolutionStrategy(
@@ -50,14 +56,13 @@ class CMA(BoxEngine):
 
     def _propose(self, rng: np.random.Generator) -> Proposal:
         for _ in range(_GENERATIONS):
-            if not self._generation:
-                self._begin()
+            strategy = self._begun()
             while self._next < len(self._generation):
                 point = self._own(self._next)
                 self._next += 1
                 known = self._known.get(_key(point)) if self.box.has_gaps else None
                 if known is None:
-                    why = f"generation {self._strategy.countiter + 1} of the evolution strategy"
+                    why = f"generation {strategy.countiter + 1} of the evolution strategy"
                     return Proposal(point, why)
                 self._costs[self._next - 1] = known
             if not self._end():
@@ -84,17 +89,20 @@ class CMA(BoxEngine):
         """Return a point of the generation, as its candidate has it."""
         return self.box.settled(self._generation[i][: self.box.dimension])
 
-    def _begin(self) -> None:
-        if self._strategy.stop():
+    def _begun(self) -> "CMAEvolutionStrategy":
+        """Return the strategy, with a new generation if the last one has ended."""
+        if self._strategy is None or (not self._generation and self._strategy.stop()):
             self._strategy = self._start()
-        self._generation = [np.asarray(x) for x in self._strategy.ask()]
-        self._costs = [None] * len(self._generation)
-        self._next = 0
+        if not self._generation:
+            self._generation = [np.asarray(x) for x in self._strategy.ask()]
+            self._costs = [None] * len(self._generation)
+            self._next = 0
+        return self._strategy
 
     def _end(self) -> bool:
         """Tell the strategy if the costs of the whole generation are known; return whether they were."""
         told = [cost for cost in self._costs if cost is not None]
-        if not self._generation or len(told) < len(self._generation):
+        if self._strategy is None or not self._generation or len(told) < len(self._generation):
             return False
         self._strategy.tell(self._generation, told)
         self._generation, self._next = [], 0
