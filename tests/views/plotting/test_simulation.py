@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import FunctionModel
+from falsifier.core.function_model import FunctionModel
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
