@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,9 +9,8 @@ from falsifier.core.literals import toml_key
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.errors import FalsifierError, written
+from falsifier.errors import written
 from falsifier.problem.grid import default_freedom, smallest_window
-from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection
 from falsifier.problem.source import Parameterization
@@ -23,11 +21,8 @@ _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)",
 
 # parameterization: only fixed control points were searched; condition: that of an implication never held;
 # disjunct: one side of an ``or`` always held; threshold: a predicate was never near its threshold;
-# constant: the robustness was the same in all simulations; effect: an input or parameter had none;
-# margin: the robustness cannot say how near a violation is.
-FindingKind = Literal[
-    "parameterization", "condition", "disjunct", "threshold", "constant", "effect", "margin"
-]
+# constant: the robustness was the same in all simulations; margin: it cannot say how near a violation is.
+FindingKind = Literal["parameterization", "condition", "disjunct", "threshold", "constant", "margin"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,7 +32,7 @@ class Finding:
     Attributes:
         kind: what it is about.
         text: what it is, and what would have to happen, in words.
-        part: the part of the formula, or the input or parameter, that it is about; empty if it is about none.
+        part: the part of the formula that it is about; empty if it is about none.
         margin: how far the part was from changing its truth; None if that has no meaning.
         time: when it came closest, in s; None if that has no meaning.
         simulation: index of the evaluation in which it came closest; None if that has no meaning.
@@ -130,21 +125,13 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
 
 def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
     """Say what makes inputs free; empty if all of them are, and the engine alone does not use it."""
-
-    def are_free(found: Problem) -> bool:
-        return all(r.free for r in found.space.inputs if r.name in coarse)
-
     source, count, shortest = problem.source, limits.max_control_points, limits.min_interval
-    if are_free(problem):
+    if all(r.free for r in problem.space.inputs if r.name in coarse):
         return ""
     if source is None:
         return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
     option = written(f"--parameterization free:{shortest:g}", f"shortest_piece={shortest:g}")
-    if source.parameterization == "fixed":
-        with suppress(FalsifierError, OSError):  # its files may have changed since
-            if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
-                return written("--parameterization free", "parameterization='free'")
-    elif source.parts.kind == "spec":
+    if source.parameterization != "fixed" and source.parts.kind == "spec":
         places = " and ".join(f"[inputs.{toml_key(name)}]" for name in coarse)
         option += f", or free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in {places}"
     return option
