@@ -1,4 +1,3 @@
-import json
 import os
 import signal
 import subprocess
@@ -10,10 +9,9 @@ import pytest
 from matplotlib.figure import Figure
 
 from falsifier.cli.files import checked_picture
-from falsifier.cli.output import as_shown, conclude, say
+from falsifier.cli.output import conclude, say
 from falsifier.errors import SpecError
 from falsifier.views.plotting.axes import save_figure
-from falsifier.views.text import fact_lines
 from tests.command import ROOT, listen_to_interrupts
 
 
@@ -34,21 +32,6 @@ def test_a_result_that_cannot_be_printed_keeps_its_code(
     monkeypatch.undo()
     assert end.value.code == 1
     assert "the result cannot be printed: No space left" in capsys.readouterr().err
-
-
-def test_long_facts_are_wrapped_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "\n".join(
-        ["AT1: falsified", *fact_lines([("confirmed", "a well-known cause " * 6), ("gear", "4")])]
-    )
-    assert as_shown(text, {}, as_json=False) == text
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", "60")
-    first, *facts, last = as_shown(text, {}, as_json=False).splitlines()
-    assert (first, last) == ("AT1: falsified", "  gear           4")
-    assert facts[0].startswith("  confirmed      a well-known cause")
-    assert len(facts) > 2 and max(map(len, facts)) <= 60
-    assert all(line.startswith(" " * 17 + "a well-known") or line[17] != " " for line in facts)
-    assert json.loads(as_shown(text, {"a": "b " * 90}, as_json=True)) == {"a": "b " * 90}
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
