@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from falsifier.cli.files import checked_picture
-from falsifier.cli.output import conclude, say
+from falsifier.cli.output import say
 from falsifier.errors import SpecError
 from falsifier.views.plotting.axes import save_figure
 from tests.command import ROOT, listen_to_interrupts
@@ -18,20 +18,6 @@ from tests.command import ROOT, listen_to_interrupts
 def test_results_have_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
     say("a\x1b[2Jb\n", nl=False)
     assert capsys.readouterr().out == "a\N{REPLACEMENT CHARACTER}[2Jb\n"
-
-
-def test_a_result_that_cannot_be_printed_keeps_its_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(sys.stdout, "write", full)
-    with pytest.raises(SystemExit) as end:
-        conclude("falsified", 1)
-    monkeypatch.undo()
-    assert end.value.code == 1
-    assert "the result cannot be printed: No space left" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
@@ -68,16 +54,6 @@ output.end_at_interrupts(1)
 print("ready", flush=True)
 {REST}
 """
-CLOSED = """
-import os, sys
-from falsifier.cli import output
-
-output.open_streams()
-assert os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT) > 2
-print("lost")
-print("lost", file=sys.stderr)
-output.settle_streams()
-"""
 
 
 def started(code: str) -> "subprocess.Popen[str]":
@@ -113,15 +89,3 @@ def test_a_signal_that_comes_twice_at_once_counts_once() -> None:
         process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=50)
     assert (process.returncode, out, err) == (0, "summary\n", "")
-
-
-def test_files_do_not_take_the_place_of_closed_streams(tmp_path: Path) -> None:
-    file = tmp_path / "journal"
-    command = 'exec "$0" -c "$1" "$2" <&- >&- 2>&-'
-    done = subprocess.run(
-        ["sh", "-c", command, sys.executable, CLOSED, str(file)],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        check=False,
-    )
-    assert done.returncode == 0
-    assert file.read_text() == ""
