@@ -29,6 +29,9 @@ _DIGITS_OF_PARAMETER = 5
 _MOST_PIECES = 12
 _ROUGHLY = 0.02
 
+# Of a signal with more switches only their number and distances, and its mean are told in brief.
+_MOST_IN_BRIEF = 16
+
 
 def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
     """Decimals that show a number of this magnitude with that many significant digits.
@@ -105,11 +108,14 @@ def runs(values: Sequence[float]) -> str:
     return f"[{', '.join(parts)}]"
 
 
-def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:
-    """Each input with its own control points and interpolation, and parameters."""
+def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
+    """Each input with its own control points and interpolation, and parameters.
+
+    In brief, signals of many pieces are only described.
+    """
     lines = []
     for r in view.space.inputs:
-        told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time)
+        told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time, in_brief=in_brief)
         lines.append(f"{r.name}: {told}")
     for p in view.space.parameters:
         decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
@@ -117,15 +123,29 @@ def as_signals(view: View, candidate: Candidate) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _signal_text_in(r: InputRange, signal: Signal, stop_time: float) -> str:
+def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:
     """Parameterization with values rounded to some thousandths of the range."""
     decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
     rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
     if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
         rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
+        if in_brief and rough.switches > _MOST_IN_BRIEF:
+            return _described(rough, stop_time, decimals)
         if rough.switches < rounded.switches:
             return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
     return signal_text(rounded, stop_time=stop_time)
+
+
+def _described(signal: Signal, stop_time: float, decimals: int) -> str:
+    """What is to be known of constant pieces that are not listed."""
+    lengths = np.diff((*signal.times, stop_time))
+    low, high = (plain(v, decimals) for v in (min(signal.values), max(signal.values)))
+    mean = plain(float(np.average(signal.values, weights=lengths)), decimals)
+    apart = [number(float(f(lengths)), 3) for f in (np.min, np.median, np.max)]
+    return (
+        f"{len(lengths)} constant pieces between {low} and {high}, mean {mean}, "
+        f"each {apart[0]} to {apart[2]} s long, {apart[1]} s in the median"
+    )
 
 
 def _merged(signal: Signal, tolerance: float) -> Signal:

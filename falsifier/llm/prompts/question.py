@@ -282,10 +282,11 @@ class Questions:
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
         head = (robustness, doubt, *notes, f"the first to reach: {', '.join(news)}" if news else "")
+        brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, *found.full),
             _text(inputs, *head, *found.short),
-            _text(inputs, *head, found.line),
+            _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
         depth = _FULL if news or best is None or verdict.robustness < best else _SHORT

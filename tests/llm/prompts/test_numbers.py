@@ -37,6 +37,19 @@ def test_signals_are_told_with_their_own_control_points() -> None:
     )
 
 
+def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
+    times = [0.0, 2.5, *(2.5 + 0.25 * k for k in range(1, 30))]
+    signal = Signal(tuple(times), tuple(float(k % 2) for k in range(31)), "constant")
+    made = Candidate({"u": signal, "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25})
+    assert as_signals(VIEW, made, in_brief=True) == (
+        "u: 31 constant pieces between 0 and 1, mean 0.375, each 0.25 to 2.5 s long, 0.25 s in the median",
+        "v: constant -1",
+        "x0 = 0.25",
+    )
+    assert as_signals(VIEW, STEP, in_brief=True) == as_signals(VIEW, STEP)
+    assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
+
+
 @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
 def test_printed_bounds_lie_inside_the_range(low: float, width: float) -> None:
     for digits in (7, 10):
