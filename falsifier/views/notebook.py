@@ -13,7 +13,8 @@ from typing import Any
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
-from falsifier.core.words import candidate_facts, readable
+from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.explain import Explanation
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
@@ -23,11 +24,13 @@ from falsifier.stl import Verdict, in_words
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import el, join, picture, table
 from falsifier.views.model_text import info_text
-from falsifier.views.plotting import plot_evaluation, png
+from falsifier.views.plotting import plot_evaluation, plot_trajectory, png
 from falsifier.views.text import Fact, broken_facts, margin_facts, result_facts, seconds_text
 
 # Images are stored in the notebook file; at this resolution about 20 kB each.
 _DPI = 80
+# Maximum number of signals in a trajectory's figure; the table lists all.
+_DRAWN_SIGNALS = 6
 # Maximum number of questions to a language model that a result shows; each adds its prompt to the notebook.
 _SHOWN_QUESTIONS = 5
 
@@ -77,6 +80,22 @@ def evaluation_html(evaluation: Evaluation) -> str:
     return table((), [*facts, *([("proposed by", origin)] if origin else [])])
 
 
+def trajectory_html(trajectory: Trajectory) -> str:
+    """Range of each signal, and a figure of the first few."""
+    header = ("signal", "unit", "first", "smallest", "largest", "last")
+    rows = [
+        (name, trajectory.units.get(name, ""), *(readable(v, 5) for v in (c[0], c.min(), c.max(), c[-1])))
+        for name, c in trajectory.columns.items()
+    ]
+    end = trajectory.times[-1]
+    about = f"{counted(len(trajectory), 'sample')} from 0 to {end:.10g} s, every {trajectory.step:g} s"
+    parts = [el("p", about), table(header, rows)]
+    if trajectory.names:
+        drawn = plot_trajectory(trajectory, trajectory.names[:_DRAWN_SIGNALS])
+        parts.append(picture(png(drawn, dpi=_DPI), "png", "signals over time"))
+    return join(*parts)
+
+
 def result_html(result: Result) -> str:
     """How the run ended, as on a terminal, with a figure of the counterexample or of the best evaluation."""
     found, spent, shown = result.counterexample, result.spent, result.shown
@@ -98,5 +117,6 @@ _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
     Confirmation: lambda c: join(el("p", f"{c.outcome}: {c.reason}"), evaluation_html(c.evaluation)),
     Explanation: lambda explanation: el("p", explanation.text),
     ModelInfo: lambda info: el("pre", info_text(info)),
+    Trajectory: trajectory_html,
     Result: result_html,
 }

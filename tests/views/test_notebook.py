@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from IPython.core.formatters import DisplayFormatter
 
-from falsifier import Evaluation, ParameterRange, explain, falsify
+from falsifier import Evaluation, ParameterRange, evaluate, explain, falsify
 from falsifier.core.candidate import Candidate
 from falsifier.testing import lag_problem
 from falsifier.views.notebook import register
@@ -69,6 +69,15 @@ def test_a_result_without_a_violation_shows_the_best_and_why_it_ended(notebook: 
     html = notebook.html(falsify(impossible(), "corners", budget=3))
     assert "the budget of 3 simulations is used up" in html
     assert "(holds with this margin" in html
+
+
+def test_a_trajectory_shows_each_signal(notebook: Notebook) -> None:
+    problem = hard()
+    trajectory = evaluate(problem, falsify(problem, budget=1).evaluations[0].candidate).trajectory
+    assert trajectory is not None
+    html = notebook.html(trajectory)
+    assert all(f">{name}<" in html for name in trajectory.names)
+    assert len(pictures(html)) == 1
 
 
 def test_a_failed_evaluation_says_why(notebook: Notebook) -> None:
