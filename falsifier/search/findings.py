@@ -21,8 +21,11 @@ _NUMBER = re.compile(r"(?<!\w)[-+]?(?:0x[0-9a-f]+|\d+(?:\.\d*)?(?:e[-+]?\d+)?)",
 
 # parameterization: only fixed control points were searched; condition: that of an implication never held;
 # disjunct: one side of an ``or`` always held; threshold: a predicate was never near its threshold;
-# constant: the robustness was the same in all simulations; margin: it cannot say how near a violation is.
-FindingKind = Literal["parameterization", "condition", "disjunct", "threshold", "constant", "margin"]
+# constant: the robustness was the same in all simulations; effect: an input or parameter had none;
+# margin: the robustness cannot say how near a violation is.
+FindingKind = Literal[
+    "parameterization", "condition", "disjunct", "threshold", "constant", "effect", "margin"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,7 +35,7 @@ class Finding:
     Attributes:
         kind: what it is about.
         text: what it is, and what would have to happen, in words.
-        part: the part of the formula that it is about; empty if it is about none.
+        part: the part of the formula, or the input or parameter, that it is about; empty if it is about none.
         margin: how far the part was from changing its truth; None if that has no meaning.
         time: when it came closest, in s; None if that has no meaning.
         simulation: index of the evaluation in which it came closest; None if that has no meaning.

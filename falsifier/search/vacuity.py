@@ -1,6 +1,6 @@
 """What a whole search did not test, collected simulation by simulation.
 
-Parts of the requirement that never had a say, and signals that nothing moved.
+Parts of the requirement that never had a say, and inputs and parameters without an effect on it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -10,6 +10,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.candidate import Candidate
+from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed, readable
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
@@ -69,6 +71,7 @@ class Vacuity:
             for formula, part in self._monitor.watched
         ]
         self._parts = list(seen.values())
+        self._effects = Effects(problem)
         self._count = 0
         self._robustness: set[float] = set()
         self._first: dict[str, NDArray[np.float64]] = {}
@@ -80,6 +83,7 @@ class Vacuity:
         if verdict is None or trajectory is None:
             return
         self._count += 1
+        self._effects.see(evaluation.candidate, trajectory)
         if len(self._robustness) <= 1:
             self._robustness.add(verdict.robustness)
         for name in set(self._problem.requirement.formula.signals) - self._moved:
@@ -111,10 +115,12 @@ class Vacuity:
         far = [part for part in kept if not is_on_limit(part.distance) and part.formula not in said]
         found = (*map(self._condition, never), *map(self._disjunct, always), *map(self._far, far))
         unique = {(finding.kind, finding.part): finding for finding in found}
+        # If nothing moves the requirement's signals, that has been said of everything that was searched.
+        idle = self._effects.findings() if self._moved else ()
         if hidden := hidden_margin(self._problem):
             what, advice = hidden
             constant += (Finding(kind="margin", text=f"{what[0].upper()}{what[1:]}; {advice}."),)
-        return (*constant, *unique.values())
+        return (*constant, *unique.values(), *idle)
 
     @property
     def _in_all(self) -> str:
@@ -204,3 +210,47 @@ def hidden_margin(problem: Problem) -> tuple[str, str] | None:
         f"the robustness has few values, because {names_are} Boolean: none says how near a violation is",
         f"compare the numbers of which {names_are} made instead ({known})",
     )
+
+
+class Effects:
+    """Compares simulations that differ in one input or parameter alone.
+
+    Others say nothing for certain: what one input changes, another may change back.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._names = problem.space.names
+        # An input that the formula names has an effect on it, whatever the system does.
+        signals = problem.requirement.formula.signals
+        self._signals = [s for s in signals if s not in self._names or s in problem.info.starts]
+        self._judged = [name for name in self._names if name not in problem.requirement.formula.signals]
+        # By name and the hash of everything else: what was simulated, and what came of it.
+        self._seen: dict[tuple[str, int], tuple[set[int], set[int]]] = {}
+
+    def see(self, candidate: Candidate, trajectory: Trajectory) -> None:
+        """Add a simulation."""
+        varied = {**candidate.signals, **candidate.parameters}
+        parts = {name: hash(varied[name]) for name in self._names}
+        outcome = hash(tuple(trajectory[name].tobytes() for name in self._signals))
+        for name in self._judged:
+            rest = hash(tuple((other, part) for other, part in parts.items() if other != name))
+            values, outcomes = self._seen.setdefault((name, rest), (set(), set()))
+            values.add(parts[name])
+            outcomes.add(outcome)
+
+    def findings(self) -> Iterator[Finding]:
+        """Yield what never had an effect although simulations differ in it alone."""
+        if not self._signals:
+            return
+        for name in self._judged:
+            alone = [seen for (of, _), seen in self._seen.items() if of == name and len(seen[0]) > 1]
+            if alone and all(len(outcomes) == 1 for _, outcomes in alone):
+                count = sum(len(values) for values, _ in alone)
+                yield Finding(
+                    kind="effect",
+                    text=(
+                        f"{name} had no effect on {listed(self._signals)}: the same in "
+                        f"{counted(count, 'simulation')} that differ in it alone."
+                    ),
+                    part=name,
+                )

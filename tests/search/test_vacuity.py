@@ -2,6 +2,7 @@ from pathlib import Path
 
 import pytest
 
+from falsifier import Candidate, ParameterRange, Signal, evaluate
 from falsifier.campaigns.analysis import load_run
 from falsifier.core.files import bundled
 from falsifier.evaluation.evaluate import Evaluation
@@ -9,7 +10,8 @@ from falsifier.problem.problem import Problem
 from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
 from falsifier.search.findings import Finding
-from falsifier.testing import lag_problem
+from falsifier.search.vacuity import Effects
+from falsifier.testing import Array, lag, lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import result_json, result_text, results_text
 from tests.problems import still
@@ -19,7 +21,7 @@ from tests.searches import stop_after
 def findings(problem: Problem, budget: int = 5) -> list[Finding]:
     result = falsify(problem, "uniform", budget=budget)
     assert not result.falsified
-    return [f for f in result.findings if f.kind not in ("parameterization", "margin")]
+    return [f for f in result.findings if f.kind not in ("parameterization", "effect", "margin")]
 
 
 def test_a_condition_that_never_held_is_told_with_how_close_it_came() -> None:
@@ -117,3 +119,41 @@ def test_findings_are_on_the_terminal_in_json_and_in_reports(tmp_path: Path) -> 
     assert load_run(tmp_path).findings == result.findings
     assert "What this does not show" in markdown_report(tmp_path)
     assert "The condition x &gt;= 2 never held" in html_report(tmp_path)
+
+
+def deaf(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> dict[str, Array]:
+    """Respond to u alone."""
+    return {"x": lag(times, {"u": inputs["u"]}, {})["x"]}
+
+
+def seen(problem: Problem, *pairs: tuple[float, float]) -> list[str]:
+    effects = Effects(problem)
+    for u, v in pairs:
+        candidate = Candidate({"u": Signal((0.0,), (u,)), "v": Signal((0.0,), (v,))})
+        evaluation = evaluate(problem, candidate)
+        assert evaluation.trajectory is not None
+        effects.see(candidate, evaluation.trajectory)
+    return [finding.text for finding in effects.findings()]
+
+
+def test_an_input_that_changes_nothing_by_itself_is_told() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2, response=deaf)
+    assert seen(problem, (0.5, 0.0), (0.5, 1.0), (0.2, 0.0)) == [
+        "v had no effect on x: the same in 2 simulations that differ in it alone."
+    ]
+
+
+def test_inputs_that_differ_together_or_have_any_effect_are_no_finding() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2, response=deaf)
+    assert not seen(problem, (0.5, 0.0), (0.2, 1.0))
+    assert not seen(lag_problem("G[0,10] (x <= 2)", inputs=2), (0.5, 0.0), (0.5, 1.0))
+    named = lag_problem("G[0,10] (x <= v + 3)", inputs=2, response=deaf)
+    assert not seen(named, (0.5, 0.0), (0.5, 1.0)), "the formula names v"
+
+
+@pytest.mark.parametrize("starts", [(), (ParameterRange("x", 0.0, 0.0),)])
+def test_the_result_of_a_search_tells_it(starts: tuple[ParameterRange, ...]) -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2, parameters=starts, response=deaf)
+    result = falsify(problem, "corners", budget=6)
+    (found,) = [f for f in result.findings if f.kind == "effect"]
+    assert found.part == "v"
